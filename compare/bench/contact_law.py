@@ -26,6 +26,8 @@ LARGEST, CONE, MEETING = 1.0, 0.999, 1.0
 """Steps are tried up to this, s; from this share of the cone on a contact slides; longest that bodies meet, s."""
 UNEVEN = 0.1
 """Share of an approach that may be left after a blow of normal forces that should end it."""
+FAINT = 1e-3
+"""A load that could speed up the lighter body by less than this share of g counts as none."""
 SOLREF = (0.02, 1.0)
 """What the engine takes for a solref of which one number is positive and the other is not."""
 
@@ -65,6 +67,7 @@ class Contacts:
         return bool(self.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE)
 
     @property
+    @np.errstate(invalid="ignore")  # a contact that bears nothing
     def cone(self) -> Array:
         """Share of the friction cone, or pyramid, in use."""
         used = np.abs(self.force[:, 1:]) / self.friction * self._frictional
@@ -74,6 +77,11 @@ class Contacts:
     @property
     def _frictional(self) -> Array:
         return np.arange(1, 6) < self.dim[:, None]
+
+    @property
+    def parts(self) -> bool:
+        """Whether any joint moves a body along a normal."""
+        return bool((abs(self.rows[:, 0]) > 1e-9 * abs(self.rows).max(initial=1e-300)).any())
 
     @property
     def softness(self) -> Array:
@@ -155,7 +163,7 @@ class Contacts:
         return Law(
             depth=depth - self.margin,
             creep=np.where(slides | (self.dim == 1), np.nan, np.hypot(creep[:, 0], creep[:, 1])),
-            turning=np.where(slides, np.nan, np.hypot.reduce(creep[:, 2:], 1)),
+            turning=np.where(slides | (self.dim <= 3), np.nan, np.hypot.reduce(creep[:, 2:], 1)),
             hover=np.where(self.dim > 1, hover, np.inf),
             slides=slides,
             weight=np.column_stack([self.normals / softness, sideways]),
@@ -169,14 +177,14 @@ class Contacts:
         chosen = {
             f.name: v[which] for f in dataclasses.fields(self) if np.ndim(v := getattr(self, f.name)) and len(v) == n
         }
-        flat = chosen["rows"].reshape(-1, self.rows.shape[2])
+        flat = chosen["rows"].reshape(6 * len(chosen["dim"]), self.rows.shape[2])
         _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
-        chosen["rows"] = chosen["rows"] @ directions[sizes > 1e-9 * sizes[0]].T
+        chosen["rows"] = chosen["rows"] @ directions[sizes > 1e-9 * sizes.max(initial=0)].T
         return dataclasses.replace(self, **chosen)
 
     def matrices(self) -> tuple[Array, Array, Array]:
         """Of ``mass a + damping v + stiffness x = 0``, small motions about the settled state."""
-        law, flat = self.law(), self.rows.reshape(-1, self.rows.shape[2])
+        law, flat = self.law(), self.rows.reshape(6 * len(self.dim), self.rows.shape[2])
         weight = law.weight * (np.arange(6) < self.dim[:, None])
 
         values = weight, weight * law.damping, weight * law.stiffness[:, None] * (np.arange(6) == 0)
@@ -192,7 +200,7 @@ class Contacts:
         forms = [4 * mass - 2 * damping - stiffness]
         if self.integrator == mujoco.mjtIntegrator.mjINT_RK4:  # its region ends at -2.785 and 2.83 i
             forms = [2.785**2 * mass - 2.785 * damping + stiffness, 8 * mass - stiffness]
-        return all(np.linalg.eigvalsh(form)[0] > 0 for form in forms)
+        return all((np.linalg.eigvalsh(form) > 0).all() for form in forms)
 
     def largest_step(self, below: float = LARGEST) -> float:
         """Largest stable time step, s, to 1 %; inf if there is none up to `below`."""
@@ -207,8 +215,11 @@ class Contacts:
     def approach(self) -> Array:
         """The motion, in the coordinates of `rows`, that opens all contacts at 1 m/s without slip; its square, a mass.
 
-        It is nan if normal forces alone cannot end it: then a body lands on other contacts, too, or begins to turn.
+        It is nan if no joint moves the normals, or normal forces alone cannot end it: then a body lands on other
+        contacts, too, or begins to turn.
         """
+        if not self.parts:
+            return np.full(self.rows.shape[2], np.nan)
         wanted = np.tile(np.eye(1, 6), len(self.dim))[0]
         found: Array = np.linalg.lstsq(self.rows.reshape(len(wanted), -1), wanted)[0]
         found /= np.mean(self.rows[:, 0] @ found)
@@ -248,7 +259,7 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Law:
-    """What n contacts do under their loads, nan where one slides or lacks friction; and their small motions."""
+    """What n contacts do under their loads, nan where one slides or lacks that friction; and their small motions."""
 
     depth: Array
     creep: Array
@@ -289,7 +300,7 @@ def reference(
 
 
 def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
-    """The contacts that carry a load at a state, and their numbers in `data`."""
+    """The contacts that carry more than a faint load at a state, and their numbers in `data`."""
     twin = copy.copy(model)  # in it each row is a direction of a contact, whatever the cone and the integrator
     twin.opt.cone, twin.opt.integrator = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtIntegrator.mjINT_EULER
     twin.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
@@ -302,7 +313,8 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     force = np.zeros((len(number), 6))
     for k, each in enumerate(number):
         mujoco.mj_contactForce(model, data, each, force[k])
-    number, force = number[force[:, 0] > 0], force[force[:, 0] > 0]
+    bears = force[:, 0] > FAINT * weights(model)[model.geom_bodyid[found.geom[number]]].min(1)
+    number, force = number[bears], force[bears]
     first, dim = state.contact.efc_address[number], found.dim[number]
     row = np.minimum(first[:, None] + np.arange(6), max(state.nefc - 1, 0))
     there = np.arange(6) < dim[:, None]
@@ -326,6 +338,15 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     return described, number
 
 
+def weights(model: Any) -> Array:
+    """Of each body that moves by joints of its own, with all that is welded to it, N; of others inf, or 0 without g."""
+    mass = np.bincount(model.body_weldid, model.body_mass, model.nbody)[model.body_weldid]
+    moved = model.body_dofnum[model.body_weldid] > 0
+    weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+    g = 0.0 if weightless else np.hypot.reduce(model.opt.gravity)
+    return np.where(moved, g * mass, np.inf if g else 0)
+
+
 def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
     """Of contacts with these numbers: all that options of the model decide, by the names in `Contacts`."""
     option = model.opt
@@ -340,25 +361,26 @@ def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
     }
 
 
-def replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[str]:
-    """What the engine takes in the place of what the model says, for the contacts of one pair."""
+def replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """What the engine takes in the place of what the model says, for the contacts of one pair: its kind, and how."""
     asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
     if (asked > 0).sum() == 1:
-        yield f"solref {asked[0]:g} {asked[1]:g} is of neither format: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
+        yield "solref of neither format", f"{asked[0]:g} {asked[1]:g}: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
     for name in ("solref", "solreffriction"):
         ref = getattr(c, name)
         if (ref[0] > 0).all():
             taken = 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))
             if taken > 1.000001 * ref[0, 0]:
-                yield f"{name} {ref[0, 0]:g} s is too short for the time step: {taken:.3g} s is taken (refsafe)"
+                yield f"{name} too short for the time step", f"{ref[0, 0]:g} s: {taken:.3g} s is taken (refsafe)"
     if c.solreffriction.any() and c.pyramidal:
-        yield "solreffriction is ignored by the pyramidal cone"
+        yield "solreffriction", "the pyramidal cone ignores it"
     if (clipped := np.clip(imp[:2], *limits) != imp[:2]).any():
-        yield f"impedance {imp[:2][clipped][0]:g} is outside {limits[0]:g} … {limits[1]:g}: the limit is taken"
+        yield "impedance out of range", f"{imp[:2][clipped][0]:g}: the limit is taken, {limits[0]:g} or {limits[1]:g}"
     if (np.sort(c.geoms[0]) == np.sort(np.column_stack([model.pair_geom1, model.pair_geom2]))).all(1).any():
         return  # parameters of the geoms count for nothing
     for name, mixed in (("solref", asked), ("solimp", imp), ("friction", c.friction[0, [0, 2, 3]])):
         own = getattr(model, f"geom_{name}")[c.geoms[0]]
         if not np.allclose(own[0], own[1]):
             first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
-            yield f"{name} {first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): {taken} is taken"
+            said = f"{first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): {taken} is taken"
+            yield f"{name} of two geoms", said

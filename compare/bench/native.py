@@ -15,10 +15,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench import forecast
 from compare.bench.adapters.mujoco_free import pairs
 from compare.bench.case import Case
 from compare.bench.contact_law import impedance, reference
+from compare.bench.settled import load
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
@@ -148,7 +148,7 @@ def read(path: Path) -> Native:
     InputError
         If it is no MJCF, or lacks a ball or anything for it to pair.
     """
-    model, _ = forecast.load(path)
+    model, _ = load(path)
     moves = model.body_weldid[model.geom_bodyid] > 0
     spheres = np.flatnonzero(moves & (model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)).tolist()
     named = [geom for geom in spheres if model.geom(geom).name == "ball"]

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from rich.text import Text
 
-from compare.bench import exact, forecast, grade, league, native
+from compare.bench import exact, forecast, forecast_page, grade, league, native, settled
 from compare.bench.case import VERSION
 from compare.bench.native import CHOICES, NUMBERS, Native
 from compare.commands import options, running
@@ -42,12 +42,14 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "forecast", foretold, "scene.xml --try")
     command.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
     command.add_argument("--keyframe", metavar="NAME", help="begin with this keyframe, by name or number")
+    driven = "controls: a number for each actuator, or NAME=NUMBER for some"
+    command.add_argument("--ctrl", nargs="+", default=[], metavar="[NAME=]N", help=driven)
     longest = "longest time to wait until the model has settled; 0 takes the state as it stands"
     command.add_argument("--settle", type=options.moment, default=10.0, help=longest)
     for name, unit, how in (("creep", "m s-1", "creeps faster"), ("depth", "m", "sinks in deeper")):
         limit = options.Number(unit, POSITIVE)
         command.add_argument(f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured")
-    command.add_argument("--try", dest="tries", action="store_true", help="make the advised change and measure again")
+    command.add_argument("--try", dest="tries", action="store_true", help="follow the advice and measure again")
     command.add_argument("-o", "--output", type=options.written, help="HTML page to write")
     options.outputs(command)
 
@@ -221,28 +223,30 @@ def foretold(args: argparse.Namespace) -> int:
     heard = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)  # it would write a log here; what it warns of is in the table
     try:
-        model, data = forecast.load(args.file, args.keyframe)
-        found = forecast.forecast(model, data, forecast.settle(model, data, args.settle), **good)
-        after = None
-        if args.tries and found.change:
-            found, after = forecast.tried(model, data, found, args.settle, **good)
-    except forecast.UnsettledError as error:
+        model, data = settled.load(args.file, args.keyframe)
+        settled.drive(model, data, args.ctrl)
+        found = forecast.forecast(model, data, settled.settle(model, data, args.settle), **good)
+        after = held = None
+        if args.tries:
+            found, after, held = forecast.tried(model, data, found, args.settle, **good)
+    except settled.UnsettledError as error:
         print(f"dualball: {args.file}: {error}", file=sys.stderr)
         return 1
     finally:
         mujoco.set_mju_user_warning(heard)
     if args.output:
-        write_text(args.output, forecast.html(found, after, str(args.file)))
-    shown: list[Any] = [pages.table(title, rows, **LOOK) for title, rows in forecast.tables(found)]
-    shown += [Text(f"• {line}") for line in forecast.sentences(found)]
-    if after:
-        shown += [Text(""), pages.table(*forecast.changed(found, after), **LOOK)]
-    options.show({"before": found, "after": after}, args.json, *shown)
+        write_text(args.output, forecast_page.html(found, after, held, str(args.file)))
+    shown: list[Any] = [Text(f"• {line}") for line in forecast_page.sentences(found)]
+    shown += [Text(f"\n{text}") for _, text in forecast_page.paste(found)]
+    tables = forecast_page.tables(found) + forecast_page.again(found, after, held)
+    shown += [Text(""), *(pages.table(title, rows, **LOOK) for title, rows in tables)]
+    options.show({"before": found, "after": after, "held": held}, args.json, *shown)
+    said = [f"{args.file}: {found.unsettled}"] if found.unsettled else []
     limits = ("creep", "m/s", args.max_creep), ("depth", "m", args.max_depth)
-    code = 0
     for pair, (name, unit, limit) in itertools.product(found.pairs, limits):
         value = getattr(pair, f"{name}_measured")
         if limit and value > limit:
-            print(f"dualball: {pair.name}: {name} {value:.3g} {unit}, more than {limit:g}", file=sys.stderr)
-            code = 1
-    return code
+            said.append(f"{pair.name}: {name} {value:.3g} {unit}, more than {limit:g}")
+    for line in said:
+        print(f"dualball: {line}", file=sys.stderr)
+    return int(bool(said))

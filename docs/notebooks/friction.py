@@ -13,7 +13,9 @@ import matplotlib.pyplot as plt
 import mujoco
 import numpy as np
 
-from compare.bench import forecast
+from compare.bench.forecast import forecast
+from compare.bench.forecast_page import sentences
+from compare.bench.settled import settle
 from mjsim import Coulomb
 
 plt.rcParams |= {
@@ -73,8 +75,7 @@ def settled(text):
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
-    moving = forecast.settle(model, data, limit=10.0)
-    return model, data, forecast.forecast(model, data, moving)
+    return model, data, forecast(model, data, settle(model, data, limit=10.0))
 
 
 for text in (SLOPE, GRIPPER):
@@ -85,7 +86,7 @@ for text in (SLOPE, GRIPPER):
             f"creep {1e6 * pair.creep:.4g} µm/s predicted, "
             f"{1e6 * pair.creep_measured:.4g} µm/s measured"
         )
-    for line in forecast.sentences(found):
+    for line in sentences(found):
         print("   ", line)
 
 # %% [markdown]

@@ -1,10 +1,11 @@
 """Ways to step a MuJoCo scene that is to hold still, and what a scene costs and does while it is stepped.
 
-Needs MuJoCo, NumPy and the memory for friction alone, so that it runs beside any package that brings scenes.
+Needs MuJoCo, NumPy and `mujoco_coulomb` alone, so that it runs beside any package that brings scenes.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -16,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 try:
-    from mujoco_coulomb import FrictionMemory  # alone, beside packages that need MuJoCo 3
+    from mujoco_coulomb import Coulomb  # alone, beside packages that need MuJoCo 3
 except ImportError:
-    from mjsim import FrictionMemory
+    from mjsim import Coulomb
 
 Array = npt.NDArray[np.float64]
 ELLIPTIC = {"cone": mujoco.mjtCone.mjCONE_ELLIPTIC}
@@ -103,25 +104,6 @@ class PairPose(Halves):
         return where
 
 
-class Remembering(Halves):
-    """Contacts that remember their friction."""
-
-    def __init__(self, model: Any) -> None:
-        super().__init__(model)
-        self._memory = FrictionMemory(model)
-
-    def step(self, data: Any, nstep: int = 1) -> None:
-        self._memory.step(data, nstep)
-
-    def step2(self, data: Any) -> None:
-        self._memory.step(data)  # begins with the first half again, which a controller has not changed
-
-
-def rigid(model: Any) -> Stepper:
-    """The rigid law."""
-    raise NotImplementedError("contacts of the rigid law are still to come")
-
-
 @dataclass(frozen=True)
 class Way:
     """Options of the model, and what steps it."""
@@ -136,8 +118,8 @@ WAYS = {
     "impratio 100": Way(options=ELLIPTIC | {"impratio": 100}),
     "noslip": Way(options={"noslip_iterations": 10}),
     "a pose a pair": Way(PairPose, ELLIPTIC, timed=False),
-    "memory": Way(Remembering),
-    "rigid": Way(rigid),
+    "soft": Way(Coulomb),
+    "rigid": Way(functools.partial(Coulomb, rigid=True)),
 }
 """By the heads of their columns. A pose a pair is written in Python, so its cost says nothing."""
 

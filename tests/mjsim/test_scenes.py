@@ -11,7 +11,7 @@ from docs.studies.ways import CREEP, SLIP, WAYS
 
 def both(run):
     """What a scene comes to in plain MuJoCo, and with a memory."""
-    return run(WAYS["plain"]), run(WAYS["memory"])
+    return run(WAYS["plain"]), run(WAYS["soft"])
 
 
 def assert_no_worse(plain, memory):
@@ -25,51 +25,51 @@ def assert_no_worse(plain, memory):
 @pytest.mark.parametrize("name", ["treadmill", "nut", "tactile", "mocap", "tendon", "sleeping"])
 def test_what_should_hold_still_does(name):
     """Its creep is at least a hundred times less."""
-    plain, memory = both(SCENES[name].run)
+    plain, soft = both(SCENES[name].run)
     assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
     assert_no_worse(plain, memory)
 
 
 def test_a_castle_stands(monkeypatch):
     monkeypatch.setattr(small_scenes, "COURSES", 2)
-    plain, memory = both(small_scenes.castle)
+    plain, soft = both(small_scenes.castle)
     assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
     assert_no_worse(plain, memory)
 
 
 def test_fallen_dominos_lie_still():
-    plain, memory = (small_scenes.pushed(WAYS[name], push=3.0) for name in ("plain", "memory"))
+    plain, soft = (small_scenes.pushed(WAYS[name], push=3.0) for name in ("plain", "soft"))
     assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
     assert_no_worse(plain, memory)
 
 
 def test_a_shaken_grip_slips_less():
-    plain, memory = both(small_scenes.mocap)
+    plain, soft = both(small_scenes.mocap)
     assert memory.values[SLIP] < 0.1 * plain.values[SLIP]
 
 
 @pytest.mark.xfail(reason="rows of contacts lack what turning bodies add to the acceleration: creep is omega^2 r/b")
 def test_a_carousel_holds_what_stands_on_it():
     """An integrator of first order leaves h omega^2 r/2."""
-    assert small_scenes.carousel(WAYS["memory"]).values[CREEP] < 1.1 * 0.002 * small_scenes.TURN**2 * 0.2 / 2
+    assert small_scenes.carousel(WAYS["soft"]).values[CREEP] < 1.1 * 0.002 * small_scenes.TURN**2 * 0.2 / 2
 
 
 def test_nothing_brakes_what_rolls():
     """But a pose a pair of bodies does."""
-    plain, memory = both(small_scenes.rolling)
+    plain, soft = both(small_scenes.rolling)
     assert memory.values == pytest.approx(plain.values, abs=1e-6)
     braked = small_scenes.rolling(WAYS["a pose a pair"])
     assert min(braked.values.values()) > 10 * max(plain.values.values())
 
 
 def test_blows_of_a_cradle_stay_as_they_are():
-    plain, memory = both(small_scenes.cradle)
+    plain, soft = both(small_scenes.cradle)
     assert memory.values == pytest.approx(plain.values, abs=0.02)
 
 
 def test_flexes_are_left_to_mujoco():
     model = small_scenes.soft_grip()
-    one, other = (small_scenes.Run(WAYS[name], model) for name in ("plain", "memory"))
+    one, other = (small_scenes.Run(WAYS[name], model) for name in ("plain", "soft"))
     for run in (one, other):
         run.advance(0.1)
     assert other.data.qpos == pytest.approx(one.data.qpos, abs=1e-9)
@@ -81,7 +81,7 @@ def test_flexes_are_left_to_mujoco():
 )
 def test_robots_hold_still(package, name):
     pytest.importorskip(package, reason=f"the scene comes with {package}")
-    plain, memory = both(SCENES[name].run)
+    plain, soft = both(SCENES[name].run)
     assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
     assert not memory.wrong
 
@@ -89,7 +89,7 @@ def test_robots_hold_still(package, name):
 @pytest.mark.slow
 def test_a_panda_lifts_and_lets_go():
     pytest.importorskip("robosuite", reason="the scene comes with robosuite")
-    plain, memory = both(robot_scenes.lift)
+    plain, soft = both(robot_scenes.lift)
     assert memory.values[CREEP] < 1e-7
     assert memory.values[SLIP] < plain.values[SLIP]
     assert not memory.wrong

@@ -1,0 +1,120 @@
+"""A forecast in words, tables and as a page."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+
+from compare.bench.advice import FAULTS
+from compare.bench.contact_law import FAINT
+from compare.bench.forecast import SHOWN, Forecast, PairForecast
+from compare.bench.settled import NOISE, few
+from compare.kit import pages
+
+OFF = 0.05
+"""Share of the predicted creep by which the measured one may differ without a word."""
+Table = tuple[str, list[list[str]]]
+"""Its title and its rows, a head first."""
+
+
+def sentences(f: Forecast) -> Iterator[str]:
+    """What to do, what was found when it was tried, and what else should be known, in words."""
+    sliding, rattling = [p.name for p in f.pairs if p.slides], [p.name for p in f.pairs if p.moves]
+    moving = [*f.settled.moving.values()]
+    if f.change:
+        name, factor, unit = FAULTS[f.change.quantity]
+        endless = "any" if f.change.quantity == "largest_step" else "∞"
+        before, after, found = (_number(v, factor, endless) for v in (f.change.before, f.change.after, f.change.found))
+        done = "" if found == "–" else f" Tried: {found} {unit}."
+        yield f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to {after} {unit}.{done}"
+    if f.remedy:
+        yield (
+            f"{'That alone does not cure' if f.change else 'No single option cures'} the creep. Step with "
+            "mjsim.Coulomb: what friction can hold then stays. Creep 0, depth as it is; what it costs is not forecast."
+        )
+    if sliding:
+        yield f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction holds them."
+    if lost := [p.name for p in f.pairs if p.slides and p.creep_measured > p.hover]:
+        yield f"These slide so fast that contact is lost again and again: {few(lost)}."
+    if off := [p.name for p in f.pairs if abs(p.creep_measured - p.creep) > OFF * p.creep + NOISE]:
+        yield f"Creep is not what was predicted at {few(off)}: not settled yet, or the solver stops early (tolerance)."
+    if f.settled.collapsed:
+        how = "To hold it up: --ctrl, --keyframe, or in Python control."
+        yield f"Collapsed since the start: {few(f.settled.collapsed)}. The table is of how it lies. {how}"
+    if moving:
+        yield f"Not settled: {few(moving)}."
+    elif not f.settled.steady:
+        yield "Speeds still change, slowly: loads, and what is forecast from them, are means over a second."
+    if rattling:
+        yield f"Nothing is forecast, and what is shown are means, where bodies move or lose contact: {few(rattling)}."
+    if not (f.change or f.remedy or sliding or moving or rattling or f.settled.collapsed):
+        yield "Nothing needs to change."
+    if f.settled.asleep:
+        yield f"MuJoCo puts to sleep, so that nothing creeps till it wakes: {few(f.settled.asleep)}. Forecast awake."
+    if stuck := [p.name for p in f.pairs if not p.parts]:
+        yield f"No joint can part these; they bear what the overlap they were built with asks for: {few(stuck)}."
+    yield from _replaced(f.pairs)
+    if math.isfinite(f.largest_step):
+        yield f"The contacts are stable up to a step of {1e3 * f.largest_step:.3g} ms (now {1e3 * f.timestep:g} ms)."
+    if f.flexible:
+        yield f"{f.flexible} contacts of flexible bodies are left out."
+
+
+def _replaced(pairs: Sequence[PairForecast]) -> Iterator[str]:
+    """What MuJoCo replaces: a line a kind, with an example."""
+    for kind in dict.fromkeys(kind for p in pairs for kind in p.replaced):
+        those = [p for p in pairs if kind in p.replaced]
+        more = f", and at {len(those) - 1} more" if len(those) > 1 else ""
+        yield f"MuJoCo replaces {kind} at {those[0].name}{more}: {those[0].replaced[kind]}."
+
+
+def _number(value: float, factor: float = 1, endless: str = "any") -> str:
+    """Three digits, none for what is next to nothing."""
+    value *= factor
+    if not math.isfinite(value):
+        return endless if math.isinf(value) else "–"
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
+
+
+def tables(f: Forecast) -> list[Table]:
+    """The worst pairs: at rest and in motion; what was measured is called found, what nobody has is left out."""
+    rest = [["pair", "creep\nµm/s", "found\nµm/s", "turning\nµrad/s", "found\nµrad/s", "depth\nµm", "found\nµm"]]
+    rest[0] += ["load\nN", "cone\n%"]
+    motion = [["pair", "hover\nmm/s", "bounce\n%", "found\n%", "decay\n1/s", "step\nms"]]
+    for p in f.pairs[:SHOWN]:
+        micro = p.creep, p.creep_measured, p.turning, p.turning_measured, p.depth, p.depth_measured
+        rest.append([p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), _number(p.cone, 100)])
+        bounce = [_number(v, 100) for v in (p.rebound, p.rebound_measured)]
+        motion.append([p.name, _number(p.hover, 1e3), *bounce, _number(p.decay), _number(p.largest_step, 1e3)])
+    title = f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
+    return [(title, _filled(rest)), ("In motion", _filled(motion))]
+
+
+def _filled(rows: list[list[str]]) -> list[list[str]]:
+    """Without the columns in which there is nothing."""
+    there = [any(cell != "–" for cell in column[1:]) for column in zip(*rows, strict=True)]
+    return [[*itertools.compress(row, there)] for row in rows]
+
+
+def again(f: Forecast, after: Forecast | None, held: Forecast | None) -> list[Table]:
+    """What the change was for, after it; and creep with the remedy."""
+    shown = []
+    if after and f.change:
+        shown.append((f"With {f.change.written}", tables(after)[f.change.quantity == "largest_step"][1]))
+    if held:
+        shown.append(("With mjsim.Coulomb", tables(held)[0][1]))
+    return shown
+
+
+def paste(f: Forecast) -> list[tuple[str, str]]:
+    """What to paste, and where."""
+    mjcf = [("MJCF", f.change.mjcf)] if f.change else []
+    return mjcf + ([("Python", f.remedy)] if f.remedy else [])
+
+
+def html(f: Forecast, after: Forecast | None, held: Forecast | None, file: str) -> str:
+    """The forecast, and those after the change and with the remedy, as one self-contained page."""
+    shown = tables(f) + again(f, after, held)
+    said = {"file": file, "sentences": list(sentences(f)), "paste": paste(f), "faint": f"{FAINT:.1%}"}
+    return pages.render("compare.bench", "forecast.html", tables=shown, **said)

@@ -1,0 +1,204 @@
+"""Any MuJoCo model brought to rest: stepping with its controller, and what still moves, lies or sleeps in the end."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from compare.bench.contact_law import Array
+from model import InputError, StorageError
+from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
+
+Control = Callable[[Any, Any], None]
+"""Sets `data.ctrl`, or any force, of a model and its data before a step; it may be given copies of both."""
+Step = Callable[[Any, Any, int], None]
+"""Advances the data of a model by a number of steps, as `mujoco.mj_step` does."""
+STEADY, STILL = 2e-3, 1e-8
+"""A speed that changes by less than this share, or by this (m/s), from one window to the next has settled."""
+NOISE = 1e-6
+"""Speeds that are not told apart, m/s."""
+RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
+"""A body moves on if its speed changes by this share, or this (m/s), between windows, or if it turns by this, rad."""
+WINDOW, WINDOW_STEPS = 0.1, 50
+"""A window is so long, s, and of so many steps."""
+BENT, SUNK = 0.3, 0.1
+"""A robot has collapsed if a driven joint has turned by this, rad, and it sank by this share of its size."""
+BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
+"""What the engine warns of when a model diverges."""
+
+
+class UnsettledError(RuntimeError):
+    """A model that diverges."""
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What a model has come to; bodies in words."""
+
+    steady: bool
+    """Whether no speed changes any more but by little."""
+    moving: Mapping[int, str]
+    """Bodies that have not settled, by number."""
+    collapsed: tuple[str, ...]
+    """Robots that are not as they began."""
+    asleep: tuple[str, ...]
+    """Bodies that MuJoCo would freeze now."""
+
+
+def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
+    """A model and its state, at a keyframe by name or number.
+
+    Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it has no such keyframe, or its
+    time step is no positive number.
+    """
+    if not path.is_file():
+        raise StorageError(f"cannot read {path}: {'it is a directory' if path.is_dir() else 'there is no such file'}")
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+        check_number("timestep", model.opt.timestep, "s", POSITIVE)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}") from error
+    data, names = mujoco.MjData(model), [model.key(k).name or str(k) for k in range(model.nkey)]
+    if keyframe is not None:
+        if keyframe not in names and keyframe not in map(str, range(model.nkey)):
+            raise InputError(f"{path} has no keyframe {keyframe!r}, but {', '.join(names) or 'none at all'}")
+        mujoco.mj_resetDataKeyframe(model, data, names.index(keyframe) if keyframe in names else int(keyframe))
+    return model, data
+
+
+def drive(model: Any, data: Any, values: Sequence[str]) -> None:
+    """Set controls: a number for each actuator, or NAME=NUMBER for some.
+
+    Raises `InputError` for a name or a number that the model does not allow.
+    """
+    names = [model.actuator(k).name or str(k) for k in range(model.nu)]
+    given = [(name, text) if equals else ("", name) for name, equals, text in (v.rpartition("=") for v in values)]
+    if not all(name for name, _ in given):
+        if any(name for name, _ in given) or len(given) != model.nu:
+            raise InputError(f"--ctrl needs NAME=NUMBER, or as many numbers as there are actuators: {model.nu}")
+        given = list(zip(names, values, strict=True))
+    for name, text in given:
+        if name not in names:
+            raise InputError(f"--ctrl: there is no actuator {name!r}, but {few(names) or 'none at all'}")
+        k = names.index(name)
+        allowed = Range(*model.actuator_ctrlrange[k].tolist()) if model.actuator_ctrllimited[k] else ANY
+        data.ctrl[k] = parse_number(f"--ctrl: {name}", text, "1", allowed)
+
+
+def stepping(control: Control | None, step: Step = mujoco.mj_step) -> Step:
+    """Steps with a controller before each."""
+    if control is None:
+        return step
+
+    def controlled(model: Any, data: Any, nstep: int) -> None:
+        for _ in range(nstep):
+            control(model, data)
+            step(model, data, 1)
+
+    return controlled
+
+
+def awake(model: Any) -> Any:
+    """The model, or a copy in which nothing sleeps."""
+    sleep = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    if model.opt.enableflags & sleep:
+        model = copy.copy(model)
+        model.opt.enableflags &= ~sleep
+    return model
+
+
+def settle(model: Any, data: Any, limit: float, control: Control | None = None, law: Step = mujoco.mj_step) -> Settled:
+    """Step until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
+
+    `law` steps in the place of `mj_step`. Raises `UnsettledError` if the model diverges.
+    """
+    sleepy, model, step = model, awake(model), stepping(control, law)
+    mujoco.mj_forward(model, data)
+    first, radius = copy.copy(data), radii(model)
+    scale = np.where(np.isfinite(radius), radius, 0)[:, None] ** [0, 0, 0, 1, 1, 1]
+    last = np.full((model.nbody, 6), 1e9)
+    begin, calm, restless = data.time, 0, np.zeros(model.nbody, bool)
+    speed, change = np.zeros((2, model.nbody))
+    while data.time < begin + limit and calm < 2:
+        start, velocity = data.time, advance(model, data, step)
+        speed, change = np.hypot.reduce(velocity * scale, 1), np.hypot.reduce((velocity - last) * scale, 1)
+        turned, last = np.hypot.reduce(velocity[:, 3:], 1) * (data.time - start), velocity
+        restless = (change > np.minimum(RESTLESS * speed, JOLT) + NOISE) | (turned > TURNING)
+        restless[0] = False  # the world
+        calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0  # a speed may pass through a maximum
+    moving = {int(b): f"{_body(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
+    steady = bool((change <= STEADY * speed + NOISE).all())
+    return Settled(steady, moving, tuple(_collapsed(model, first, data)), tuple(_asleep(sleepy, model, data, step)))
+
+
+def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
+    """Trees of bodies that sank while joints turned which an actuator drives."""
+    turned, gravity = np.zeros(model.nv), np.array(model.opt.gravity)
+    mujoco.mj_differentiatePos(model, turned, 1, first.qpos, data.qpos)
+    hinges = model.jnt_type[model.dof_jntid] != mujoco.mjtJoint.mjJNT_SLIDE
+    bent = np.where(
+        hinges & np.isin(np.arange(model.nv), first.moment_colind[first.actuator_moment != 0]), abs(turned), 0
+    )
+    for tree in range(model.ntree):
+        own, bodies = model.dof_treeid == tree, np.flatnonzero(model.body_treeid == tree)
+        root, joint = bodies[0], model.joint(model.dof_jntid[(bent * own).argmax()])
+        size = np.hypot.reduce(first.xipos[bodies] - first.subtree_com[root], 1).max()
+        sunk = (data.subtree_com[root] - first.subtree_com[root]) @ gravity / (np.hypot.reduce(gravity) or 1)
+        if bent[own].max() > BENT and sunk > SUNK * size:
+            by = f"joint {joint.name or joint.id!r} by {bent[own].max():.2g} rad"
+            yield f"{_body(model, root)} by {sunk:.2g} m, its {by}"
+
+
+def _asleep(sleepy: Any, model: Any, data: Any, step: Step) -> Iterator[str]:
+    """Bodies that fall asleep at once if they may."""
+    if sleepy is not model:
+        state = copy.copy(data)
+        step(sleepy, state, 2 * mujoco.mjMINAWAKE)
+        for tree in np.flatnonzero(state.tree_asleep >= 0):
+            yield _body(model, int(np.flatnonzero(model.body_treeid == tree)[0]))
+
+
+def advance(model: Any, data: Any, step: Step, time: float = WINDOW) -> Array:
+    """Mean velocities of the bodies in a window, shape (nbody, 6): of the centre of mass, m/s, and turning, rad/s.
+
+    Raises `UnsettledError` if the model diverges.
+    """
+    mujoco.mj_forward(model, data)
+    place, axes, begin = data.xipos.copy(), data.xmat.reshape(-1, 3, 3).copy(), data.time
+    steps = max(WINDOW_STEPS, math.ceil(time / model.opt.timestep))
+    step(model, data, steps)
+    if bad := [each for each in (data.warning[kind] for kind in BAD) if each.number]:
+        body = _body(model, model.dof_bodyid[min(bad[0].lastinfo, model.nv - 1)])
+        raise UnsettledError(f"the model diverges before {begin + steps * model.opt.timestep:.3g} s, {body} first")
+    mujoco.mj_forward(model, data)
+    turn = data.xmat.reshape(-1, 3, 3) @ axes.transpose(0, 2, 1)
+    axis = np.column_stack([turn[:, i, j] - turn[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]) / 2
+    sine = np.hypot.reduce(axis, 1, keepdims=True).clip(1e-30)
+    angle = np.arctan2(sine, (np.trace(turn, axis1=1, axis2=2)[:, None] - 1) / 2)
+    mean: Array = np.hstack([data.xipos - place, axis * angle / sine]) / (steps * model.opt.timestep)
+    return mean
+
+
+def radii(model: Any) -> Array:
+    """Of each body, m: that of its largest geom; infinite where none has a size."""
+    radius = np.zeros(model.nbody)
+    np.maximum.at(radius, model.geom_bodyid, model.geom_rbound)
+    return np.where(radius > 0, radius, np.inf)
+
+
+def _body(model: Any, body: int) -> str:
+    return f"body {model.body(body).name or body!r}"
+
+
+def few(names: Sequence[str]) -> str:
+    """The first three of some names, and how many more there are."""
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
