@@ -62,11 +62,11 @@ def _layout(struct: str) -> type[ctypes.Structure]:
 _DATA = (
     "time", "ncon", "nefc", "ne", "nf", "warning", "geom_xpos", "geom_xmat", "contact", "efc_KBIP", "efc_R", "efc_D",
     "efc_diagA", "efc_vel", "efc_margin", "efc_aref", "efc_frictionloss", "efc_J", "efc_J_rownnz", "efc_J_rowadr",
-    "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D",
+    "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D", "qvel",
 )  # fmt: skip
 (
     TIME, NCON, NEFC, NE, NF, WARNING, XPOS, XMAT, CONTACT, KBIP, R, D, DIAG, VEL, MARGIN, AREF, LOSS, J, ROWNNZ, ROWADR,
-    COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D,
+    COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D, QVEL,
 ) = range(len(_DATA))  # fmt: skip
 _CONTACT = ("dist", "pos", "frame", "friction", "mu", "dim", "geom", "efc_address", "includemargin", "adhesion")
 DIST, POS, FRAME, FRICTION, MU, DIM, GEOM, ADDRESS, INCLUDE, ADHESION = range(len(_DATA), len(_DATA) + len(_CONTACT))
@@ -261,9 +261,9 @@ COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, 
 """Contacts now and before, rows, dry rows now and before; whether forces are still to be found; resets by the engine."""
 MOMENT, LASTED, LEAST = 31, 32, 33
 """Time and time step of the last call, s; distance by which contacts must move for points to be put back, m."""
-RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, CALM, NEAR = range(34, 43)
+RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, CALM, NEAR, FIXED = range(34, 44)
 """The numbers of a `law.Law`, in its order."""
-HEAD = 43
+HEAD = 44
 INDEX, FIRST, LENGTH, AT = range(4)
 """Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
 SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
@@ -336,12 +336,13 @@ def control(m: int, d: int, head: int) -> None:
     start = _array(d, START)
     for i in range(_number(m, NV)):
         start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
-    if known and _still(m, d, head):
+    still = known and _still(m, d, head)
+    if still:
         rows = _block(head, ROWS)
         for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
             rows[r + MEMORY] = rows[r + source]
     else:
-        _turn_in(m, head, source, known)
+        _turn_in(m, d, head, source, known)
         _find(m, d, head)
         if _hand_on(m, d, head, False) > numbers[LEAST] and _put_back(m, d, head):
             _find(m, d, head)
@@ -350,11 +351,14 @@ def control(m: int, d: int, head: int) -> None:
     if counts[COUNT] + counts[COUNT_DRY] == 0:
         counts[PENDING] = 0
         return
-    _accelerate(m, d, head)
+    _multiply(m, head, _array(d, QACC))
     if numbers[RIGID]:
         _stiffen(m, d, head)
     elif numbers[SERVO]:
         _lift(m, d, head)
+    if elapsed > 0 and known and not still:
+        _turn(m, d, head, elapsed)
+        _multiply(m, head, _array(d, QACC))
     _hold(m, d, head)
     enough = numbers[SHARE] * _gravity(m)
     if _foresee(m, d, head, enough):
@@ -425,7 +429,7 @@ def _still(m: int, d: int, head: int) -> bool:
 
 
 @compiled
-def _turn_in(m: int, head: int, source: int, known: bool) -> None:
+def _turn_in(m: int, d: int, head: int, source: int, known: bool) -> None:
     """What contacts bore, friction in the axes of both bodies, becomes what is handed on."""
     counts = _int64(head)
     if not known:
@@ -433,6 +437,7 @@ def _turn_in(m: int, head: int, source: int, known: bool) -> None:
         return
     if not counts[TURNED]:
         convert(m, head, source)
+        carry_on(m, d, head)
     counts[TURNED] = 0
     for i in range(2):
         counts[KEPT + i], counts[BEFORE + i] = counts[BEFORE + i], counts[KEPT + i]
@@ -464,6 +469,53 @@ def convert(m: int, head: int, source: int) -> None:
     dry = _room(head, DRY, counts[COUNT_DRY])
     for i in range(counts[COUNT_DRY]):
         dry[i] = rows[ROW * (counts[COUNT_ROWS] + i) + source]
+
+
+@compiled
+def carry_on(m: int, d: int, head: int) -> None:
+    """The velocity that each contact's last Jacobian gives to the present speeds, along its last axes: `law.SPEED`."""
+    counts, edges, ngeom = _int64(head), not _elliptic(m), _number(m, NGEOM)
+    kept, axes, poses = _block(head, KEPT), _block(head, AXES), _block(head, POSES)
+    places, rows = _int64(counts[PLACES]), _block(head, ROWS)
+    _multiply(m, head, _array(d, QVEL))
+    for i in range(counts[COUNT]):
+        k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT] + RESIDUAL, 12 * ngeom + 20 * places[4 * i + INDEX] + 3
+        for t in range(2 if places[4 * i + LENGTH] > 1 else 0):
+            speed = _tangential(rows, r, t, edges, axes[24 * i + 18 + t])
+            for j in range(3):
+                one, two = (j + 1) % 3, (j + 2) % 3
+                across = poses[at + one] * poses[at + 3 + two] - poses[at + two] * poses[at + 3 + one]
+                kept[k + j] = kept[k + j] + speed * across if t else speed * poses[at + 3 + j]
+
+
+@compiled
+def _tangential(rows: Any, r: int, t: int, edges: bool, friction: float) -> float:
+    """What `RESIDUAL` of a contact's rows is along a tangent."""
+    return (rows[r + 2 * ROW * t] - rows[r + 2 * ROW * t + ROW]) / (2 * friction) if edges else rows[r + ROW * (t + 1)]
+
+
+@compiled
+def _turn(m: int, d: int, head: int, elapsed: float) -> None:
+    """Add to the reference accelerations of what sticks to bodies that turn what the rows leave out, -dJ/dt v."""
+    counts, edges = _int64(head), not _elliptic(m)
+    kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
+    contact, reference = _int64(d + _at(CONTACT))[0], _array(d, AREF)
+    _multiply(m, head, _array(d, QVEL))
+    for i in range(counts[COUNT]):
+        k, a, r = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT] + RESIDUAL
+        if kept[k + law.STATE] != law.STICKS or kept[k + law.SPEED] > 1e300 or places[4 * i + LENGTH] == 1:
+            continue
+        frame = _real(contact + places[4 * i + INDEX] * _at(SIZE) + _at(FRAME))
+        for t in range(2):
+            friction, before = axes[24 * i + 18 + t], 0.0
+            for j in range(3):
+                before += frame[3 * t + 3 + j] * kept[k + law.SPEED + j]
+            change = (_tangential(rows, r, t, edges, friction) - before) / elapsed
+            if edges:
+                reference[a + 2 * t] -= friction * change
+                reference[a + 2 * t + 1] += friction * change
+            else:
+                reference[a + 1 + t] -= change
 
 
 @compiled
@@ -544,6 +596,7 @@ def _hand_on(m: int, d: int, head: int, scattered: bool) -> float:
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
     count, kept, before = counts[COUNT], _block(head, KEPT), _block(head, BEFORE)
     axes, places, rows = _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
+    numbers, bound = _real(head), _array(m, RBOUND)
     first, moved, fewer = 0, 0.0, False
     for i in range(counts[COUNT_BEFORE]):
         b, nearest, least, begin = W * i, -1, math.inf, first
@@ -564,10 +617,15 @@ def _hand_on(m: int, d: int, head: int, scattered: bool) -> float:
         if nearest < 0:
             continue
         k = W * nearest
-        moved, fewer = max(moved, least), fewer or kept[k + law.STATE] != law.NEW
+        alone = kept[k + law.STATE] == law.NEW
+        moved, fewer = max(moved, least), fewer or not alone
         kept[k + law.STATE] = max(kept[k + law.STATE], before[b + law.STATE])
         kept[k + law.ERROR] = max(kept[k + law.ERROR], before[b + law.ERROR])
         kept[k + law.LIFT] = max(kept[k + law.LIFT], before[b + law.LIFT])
+        reach = numbers[FIXED] * max(bound[int(before[b])], bound[int(before[b + 1])])
+        fixed = alone and least <= 2 * reach**2
+        for j in range(3):  # a contact that wanders over its bodies, or is made of several, has none
+            kept[k + law.SPEED + j] = before[b + law.SPEED + j] if fixed else math.inf
         for j in range(5):
             kept[k + law.LOAD + j] += before[b + law.LOAD + j]
         for side in range(2):
@@ -692,16 +750,16 @@ def _hold(m: int, d: int, head: int) -> None:
 
 
 @compiled
-def _accelerate(m: int, d: int, head: int) -> None:
-    """J qacc of all rows, into `RESIDUAL`."""
-    counts, rows, qacc = _int64(head), _block(head, ROWS), _array(d, QACC)
+def _multiply(m: int, head: int, vector: Any) -> None:
+    """J times a vector, of all rows, into `RESIDUAL`."""
+    counts, rows = _int64(head), _block(head, ROWS)
     jacobian, columns, moves = _block(head, JACOBIAN), _int64(counts[COLUMNS]), False
     for i in range(_number(m, NV)):
-        moves |= qacc[i] != 0
+        moves |= vector[i] != 0
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
         total, begin = 0.0, int(rows[r + BEGIN])
         for n in range(begin, begin + int(rows[r + NONZEROS]) if moves else begin):
-            total += jacobian[n] * qacc[columns[n]]
+            total += jacobian[n] * vector[columns[n]]
         rows[r + RESIDUAL] = total
 
 
@@ -794,7 +852,7 @@ def _weigh(m: int, d: int, head: int) -> float:
     """Forces and slip that follow from the accelerations; by how much what was foreseen is wrong at most, m s-2."""
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    _accelerate(m, d, head)
+    _multiply(m, head, _array(d, QACC))
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
         rows[r + RESIDUAL] -= rows[r + REFERENCE] + rows[r + SOFT] * rows[r + HELD]
     most = 0.0
@@ -1050,13 +1108,18 @@ class Simulation:
         self._data = data
         return int(self.address)
 
+    def _meet(self, data: Any) -> None:
+        self._alive, self._data = data, data._address
+
     def control(self, model: Any, data: Any) -> None:
+        self._meet(data)
         control(model._address, data._address, self.address)
 
     def retain(self, model: Any, data: Any) -> None:
         retain(model._address, data._address, self.address)
 
     def advance(self, model: Any, data: Any, nstep: int) -> None:
+        self._meet(data)
         advance(model._address, data._address, self.address, nstep)
 
     def _array(self, block: int, numbers: int) -> Array:
@@ -1070,6 +1133,7 @@ class Simulation:
             retain(self._model._address, self._data, self.address)
         if not self._head[TURNED]:  # what goes on from here does as what is restored
             convert(self._model._address, self.address, FOUND)
+            carry_on(self._model._address, self._data, self.address)
             self._head[TURNED], self._head[COUNT_FOUND] = 1, -1
         contacts = self._array(KEPT, W * self._head[COUNT]).reshape(-1, W)
         dry = self._array(DRY, self._head[COUNT_DRY])

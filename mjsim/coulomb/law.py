@@ -4,25 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-GEOMS, PLACE, NORMAL, GAP, LIFT, STATE, ERROR, SLIP, SEEN, LOAD, FORCE, WIDTH = (
-    0,
-    2,
-    8,
-    11,
-    12,
-    13,
-    14,
-    15,
-    16,
-    17,
-    22,
-    34,
-)
+GEOMS, PLACE, NORMAL, GAP, LIFT, STATE, ERROR, SLIP, SEEN, LOAD, FORCE, SPEED, WIDTH = (
+    0, 2, 8, 11, 12, 13, 14, 15, 16, 17, 22, 34, 37
+)  # fmt: skip
 """Where in the row of a contact stand: its geoms (2); its place on both, in their axes (6), m; its normal in the axes of
 the first (3); its gap, m; the distance that a servo holds, m; whether it was open, stuck or slid; by how much its slip
 was not foreseen, m s-2; its slip as foreseen and as found, times the coefficient of friction, m s-2; what its normal, or
 each pair of a pyramid's edges, bears (5), N; force and moment of friction in the axes of both geoms (geom; axis; force,
-moment; 12), N and N m."""
+moment; 12), N and N m; the velocity that its last Jacobian gives to the present speeds, in world axes (3), m s-1."""
 NEW, OPEN, STICKS, SLIDES = range(4)
 
 
@@ -46,3 +35,5 @@ class Law:
     """Acceleration below which the solver starts from none, m s-2 or rad s-2."""
     near: float = 0.01
     """Share of the larger radius up to which two points of contact count as one."""
+    fixed: float = 1e-4
+    """Share of the larger radius up to which a contact that has moved on its bodies is fixed on them."""

@@ -14,7 +14,7 @@ def both(run):
     return run(WAYS["plain"]), run(WAYS["soft"])
 
 
-def assert_no_worse(plain, memory):
+def assert_no_worse(plain, soft):
     """Nothing went wrong, nothing sinks in deeper, energy rises no higher."""
     assert not memory.wrong
     assert memory.depth <= WORSE * plain.depth
@@ -26,26 +26,26 @@ def assert_no_worse(plain, memory):
 def test_what_should_hold_still_does(name):
     """Its creep is at least a hundred times less."""
     plain, soft = both(SCENES[name].run)
-    assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
-    assert_no_worse(plain, memory)
+    assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
+    assert_no_worse(plain, soft)
 
 
 def test_a_castle_stands(monkeypatch):
     monkeypatch.setattr(small_scenes, "COURSES", 2)
     plain, soft = both(small_scenes.castle)
-    assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
-    assert_no_worse(plain, memory)
+    assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
+    assert_no_worse(plain, soft)
 
 
 def test_fallen_dominos_lie_still():
     plain, soft = (small_scenes.pushed(WAYS[name], push=3.0) for name in ("plain", "soft"))
-    assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
-    assert_no_worse(plain, memory)
+    assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
+    assert_no_worse(plain, soft)
 
 
 def test_a_shaken_grip_slips_less():
     plain, soft = both(small_scenes.mocap)
-    assert memory.values[SLIP] < 0.1 * plain.values[SLIP]
+    assert soft.values[SLIP] < 0.1 * plain.values[SLIP]
 
 
 @pytest.mark.xfail(reason="rows of contacts lack what turning bodies add to the acceleration: creep is omega^2 r/b")
@@ -57,14 +57,14 @@ def test_a_carousel_holds_what_stands_on_it():
 def test_nothing_brakes_what_rolls():
     """But a pose a pair of bodies does."""
     plain, soft = both(small_scenes.rolling)
-    assert memory.values == pytest.approx(plain.values, abs=1e-6)
+    assert soft.values == pytest.approx(plain.values, abs=1e-6)
     braked = small_scenes.rolling(WAYS["a pose a pair"])
     assert min(braked.values.values()) > 10 * max(plain.values.values())
 
 
 def test_blows_of_a_cradle_stay_as_they_are():
     plain, soft = both(small_scenes.cradle)
-    assert memory.values == pytest.approx(plain.values, abs=0.02)
+    assert soft.values == pytest.approx(plain.values, abs=0.02)
 
 
 def test_flexes_are_left_to_mujoco():
@@ -82,7 +82,7 @@ def test_flexes_are_left_to_mujoco():
 def test_robots_hold_still(package, name):
     pytest.importorskip(package, reason=f"the scene comes with {package}")
     plain, soft = both(SCENES[name].run)
-    assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
+    assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
     assert not memory.wrong
 
 
@@ -90,8 +90,8 @@ def test_robots_hold_still(package, name):
 def test_a_panda_lifts_and_lets_go():
     pytest.importorskip("robosuite", reason="the scene comes with robosuite")
     plain, soft = both(robot_scenes.lift)
-    assert memory.values[CREEP] < 1e-7
-    assert memory.values[SLIP] < plain.values[SLIP]
+    assert soft.values[CREEP] < 1e-7
+    assert soft.values[SLIP] < plain.values[SLIP]
     assert not memory.wrong
 
 
