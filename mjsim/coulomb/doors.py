@@ -31,7 +31,7 @@ class Coulomb:
     rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say. True: Moreau and
         Jean's time stepping, in which contacts have no depth to speak of and land within one step. Geoms get a `margin`
         in which contacts are seen ahead, but bear nothing: at least the way of a step at the speed of a fall through
-        the scene.
+        the scene, or a fifth of their radius.
     restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
     servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It needs geoms with a
         `margin`, more than bodies sink in, of which an open contact then takes no notice; and it must be slower than
@@ -208,7 +208,12 @@ def _check_number(name: str, value: float, unit: str, least: float, most: float)
 
 
 def _see_ahead(model: Any) -> None:
-    """Widen margins to the way of a step at the speed of a fall through the scene."""
+    """Widen margins to the way of a step at the speed of a fall through the scene, at most a fifth of a body's radius.
+
+    Colliders take a body that is smaller than the margin for one that overlaps.
+    """
     ahead = model.opt.timestep * math.sqrt(2 * np.linalg.norm(model.opt.gravity) * model.stat.extent)
-    for margin in (model.geom_margin, model.pair_margin):
-        np.maximum(margin, ahead, out=margin)
+    most = model.geom_rbound / 5
+    np.maximum(model.geom_margin, np.minimum(ahead, most), out=model.geom_margin)
+    pairs = [model.pair_geom1, model.pair_geom2]
+    np.maximum(model.pair_margin, np.minimum(ahead, most[np.array(pairs)].max(axis=0)), out=model.pair_margin)
