@@ -12,7 +12,7 @@ import json
 import os
 import socket
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -41,8 +41,8 @@ class WholeFile:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._temporary = _temporary(self.path)
         try:
+            self._temporary = _temporary(self.path)
             self._disk = _Disk(self._temporary, "w+b")
         except OSError as error:
             raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
@@ -52,11 +52,14 @@ class WholeFile:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         if not self._finished:
-            self.file.close()
+            with suppress(*_DAMAGE if self._disk.error else ()):  # HDF5 misses what could not be written
+                self.file.close()
             self._disk.close()
             self._temporary.unlink(missing_ok=True)
+            if kind and issubclass(kind, _DAMAGE):
+                self._check()
 
     def flush(self) -> None:
         """Bring what was written to the disk."""
@@ -83,23 +86,37 @@ class WholeFile:
 
 
 class _Disk(io.FileIO):
-    """A file that stores the first write error instead of raising it.
+    """A file that stores the first write error instead of raising it, and keeps what it could not write in memory.
 
-    HDF5 can't close a file that it could not write: it crashes the process (HDF5 1.14, disk full). So the error is
-    kept here, and `WholeFile` raises it after each flush.
+    HDF5 neither closes a file that it could not write nor bears that what it wrote isn't there: it crashes the process
+    (HDF5 1.14, disk full). So it is told that all is well, and `WholeFile` raises the error after each flush.
     """
 
     error: OSError | None = None
 
     def write(self, data: Any) -> int:
-        view = memoryview(data).cast("B")
-        done = 0
+        view, at, done = memoryview(data).cast("B"), self.tell(), 0
         try:
             while self.error is None and done < len(view):
                 done += super().write(view[done:])
         except OSError as error:
-            self.error = error
+            self.error, self._lost = error, list[tuple[int, bytes]]()
+        if done < len(view):
+            self._lost.append((at + done, bytes(view[done:])))
+            self.seek(at + len(view))
         return len(view)
+
+    def readinto(self, buffer: Any) -> int:
+        view, at = memoryview(buffer).cast("B"), self.tell()
+        count = super().readinto(view) or 0
+        if self.error:
+            view[count:] = bytes(len(view) - count)
+            for start, lost in self._lost:
+                first, last = max(start, at), min(start + len(lost), at + len(view))
+                if first < last:
+                    view[first - at : last - at] = lost[first - start : last - start]
+            count = len(view)
+        return count
 
     def truncate(self, size: int | None = None) -> int:
         try:
@@ -197,26 +214,42 @@ def make_directory(path: Path) -> None:
         raise StorageError(f"cannot write to {path}: Permission denied")
 
 
+def check_ours(path: Path, beside: Path) -> None:
+    """Raise `StorageError` if a file is there that this program has not written: it writes another `beside` it."""
+    if path.exists() and not beside.exists():
+        raise StorageError(f"{path} is not of this program: choose another directory with --output")
+
+
 def check_writable(path: str | Path) -> None:
     """Raise `StorageError` if a file of that name could not be written: better before a long run than after."""
     folder = Path(path).parent
-    if not folder.is_dir():
-        raise StorageError(f"cannot write {path}: there is no directory {folder}")
-    if Path(path).is_dir():
-        raise StorageError(f"cannot write {path}: it is a directory")
+    try:
+        if not folder.is_dir():
+            raise StorageError(f"cannot write {path}: there is no directory {folder}")
+        if Path(path).is_dir():
+            raise StorageError(f"cannot write {path}: it is a directory")
+    except OSError as error:  # as of a name that is too long
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise StorageError(f"cannot write {path}: Permission denied")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; raises `StorageError`."""
-    temporary = _temporary(path)
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all: a temporary name beside it becomes its own. Raises `StorageError`."""
     try:
-        temporary.write_text(text, "utf-8")
-        temporary.replace(path)
+        temporary = _temporary(path)
+        try:
+            temporary.write_bytes(content)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file as `write_bytes` does."""
+    write_bytes(path, text.encode())
 
 
 @contextmanager
@@ -250,4 +283,5 @@ def _temporary(path: Path) -> Path:
     """
     if path.exists() and not path.is_file():
         raise StorageError(f"cannot write {path}: it is not a file")
-    return path.with_name(f".{path.name}.{_HOST}.{os.getpid()}{_SUFFIX}")
+    end = path.name[-50:]  # what tells files of one program apart; a name has at most 255 bytes
+    return path.with_name(f".{end}.{_HOST}.{os.getpid()}{_SUFFIX}")

@@ -245,11 +245,10 @@ class Parameters:
             raise InputError(f"{path}: {error}") from error
 
     def save(self, path: str | Path) -> None:
-        """Write the values as TOML, exactly."""
-        try:
-            Path(path).write_text(tomli_w.dumps(dataclasses.asdict(self)), "utf-8")
-        except OSError as error:
-            raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
+        """Write the values as TOML, exactly; raises `StorageError`."""
+        from model.files import write_text  # here, because what only shows needs no HDF5
+
+        write_text(Path(path), tomli_w.dumps(dataclasses.asdict(self)))
 
 
 _table = ["Parameters", "----------"]

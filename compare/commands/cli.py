@@ -56,7 +56,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         args = _parser(words).parse_args(words)
         args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
-        return int(args.run(args))
+        with options.no_empty_directories(args):
+            return int(args.run(args))
     except InputError as error:
         print(f"dualball: error: {error}", file=sys.stderr)
         return 2
@@ -66,6 +67,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"dualball: error: {where}{error.strerror or error}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("dualball: interrupted; finished runs are kept, the same command goes on from there", file=sys.stderr)
         return 130

@@ -29,7 +29,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--time", type=options.seconds, default=10.0, help="duration")
     between = "time between samples (default: duration/1000)"
     command.add_argument("--sample-interval", type=options.seconds, help=between)
-    command.add_argument("-o", "--output", type=options.hdf5, help="HDF5 file to write (default: none)")
+    command.add_argument("-o", "--output", type=options.HDF5, help="HDF5 file to write (default: none)")
     options.outputs(command, shown="print the description as JSON")
 
     command = options.command(commands, "sweep", grid, "--vary omega_0=10:30:21")
@@ -49,7 +49,7 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "collect", collect, "sweep -o sweep.h5")
     command.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
-    command.add_argument("-o", "--output", type=options.hdf5, default=Path("sweep.h5"), help="HDF5 file to write")
+    command.add_argument("-o", "--output", type=options.HDF5, default=Path("sweep.h5"), help="HDF5 file to write")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -130,10 +130,12 @@ def collect(directory: Path, output: Path) -> int:
         raise StorageError(f"cannot read {directory}: there is no such directory")
     rows, problems, known = [], [], dict[str, Path]()
     for file in sorted(directory.rglob("*.h5")):
-        # The journal of a run that goes on, and the collection of the last time, are no runs.
-        if file.parent.suffix == ".journal" or file.resolve() == output.resolve():
+        if file.parent.suffix == ".journal":  # of a run that goes on
             continue
         try:
+            if output.exists() and file.samefile(output):
+                _check_collection(file)
+                continue
             runs = storage.load_runs(file)
         except StorageError as error:
             problems.append(str(error))
@@ -161,6 +163,13 @@ def collect(directory: Path, output: Path) -> int:
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
     return len(rows)
+
+
+def _check_collection(output: Path) -> None:
+    """Raise `StorageError` if what is to be overwritten isn't the collection of the last time."""
+    with reading(output) as file:
+        if file.attrs.get("schema") != SCHEMA:
+            raise StorageError("it holds runs to be gathered, and can't be the output, too")
 
 
 def _attributes() -> dict[str, dict[str, Any]]:

@@ -20,19 +20,9 @@ from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
+from tests.commands import COMMANDS, NEEDED, parser_of, refused
 
 ROOT = Path(cli.__file__).parents[2]
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """The one line in which a command refuses its arguments."""
-    code = cli.main([str(arg) for arg in argv])
-    captured = capsys.readouterr()
-    assert code == 2
-    assert captured.out == ""
-    assert captured.err.startswith("dualball: error: ")
-    assert captured.err.count("\n") == 1
-    return captured.err
 
 
 def test_predict_says_what_the_ball_does_and_what_ends_the_operating_range(capsys: pytest.CaptureFixture[str]) -> None:
@@ -265,13 +255,6 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(name in shown for name in ("prop-1", "prop-4"))
 
 
-def parser_of(command: str) -> options.Parser:
-    return cli._parser([command])._subparsers._group_actions[0].choices[command]
-
-
-COMMANDS = [name for group in cli.GROUPS.values() for name in group]
-
-
 def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_example(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -299,16 +282,6 @@ def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_exampl
     assert not lacking
 
 
-NEEDED = {
-    "basins": "--across y=0:1:2 --up h=0:0.01:2",
-    "collect": "runs",
-    "compare": "run.h5 run.h5",
-    "design": "meter.toml",
-    "inspect": "run.h5",
-    "render": "run.h5 -o film.gif",
-    "sweep": "--vary eta=0.1,0.2 --time 0.01 --workers 0",
-}
-"""What a command can't do without."""
 NUMBERS = ("x", "nan", "inf", "-1", "0", "1e300", "1e-300", "1" * 400)
 
 
@@ -326,9 +299,8 @@ def drawn(command: str) -> Iterator[list[str]]:
             bad += ["1e300"] if action.dest in ("ramp", "staircase", "sine") else []
             values += [[text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in bad]
         else:
-            values.append(
-                ["file/absent.h5" if action.type in (Path, options.written, options.hdf5) else "no such thing"]
-            )
+            of_file = action.type in (Path, options.results) or isinstance(action.type, options.Output)
+            values.append(["file/absent.h5" if of_file else "no such thing"])
         if action.dest == "start":
             values += [[f"omega_c={text}"] for text in ("x", "nan", "1e300", "")]
         yield from ([*option, *value] for value in values)
@@ -415,6 +387,10 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("search --range mu=2", "write mu=from:to"),
         ("search --range mu=-1:1", "mu = -1"),
         ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
+        ("basins --across y=0:1:2 --up h=0:99:2 -o new/map", "h = 99 m is out of range"),
+        ("grade -o card.md", "'card.md' would hold an HTML page: its name must end in .html or .htm"),
+        ("search --save found.toml", "'found.toml' would hold JSON: its name must end in .json"),
+        ("sweep --vary eta=1,2 -o all.h5", "'all.h5' would be a directory, but its name is that of a file"),
         ("league --engine mujco", "did you mean 'mujoco'?"),
         ("grade nowhere.xml", "there is no such file"),
         ("grade --engine event", "event has no time step"),
