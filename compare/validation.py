@@ -6,7 +6,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -23,7 +23,7 @@ from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.progress import Show, Whole, nowhere
 from compare.kit.record import Missing, Records, Testimony
-from compare.kit.workers import Spread, Workers, processes
+from compare.kit.workers import Spread, Workers, processes, threads
 from compare.report import results
 from compare.report.results import Summary
 from compare.witnesses import hear
@@ -90,7 +90,7 @@ def validate(
 
     whole = Whole(progress, {}, len(chosen))
     with (
-        ThreadPoolExecutor(1) as bench,  # judges while the next protocols' runs are on their way
+        threads(1) as bench,  # judges while the next protocols' runs are on their way
         Campaign(output / results.RUNS, workers, limit=limit, report=whole.measuring) as campaign,
     ):
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]

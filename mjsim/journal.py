@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from model.arrays import Array
-from model.files import WholeFile, make_directory, reading, remove_leftovers
+from model.files import make_directory, remove_leftovers
+from model.hdf5 import WholeFile, reading
 
 
 class Journal:

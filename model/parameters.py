@@ -16,6 +16,7 @@ import tomli_w
 
 from model import drag as laws
 from model.errors import InputError, StorageError, suggestion
+from model.files import write_text
 
 _SETS = resources.files("model") / "parameter_sets"
 
@@ -246,8 +247,6 @@ class Parameters:
 
     def save(self, path: str | Path) -> None:
         """Write the values as TOML, exactly; raises `StorageError`."""
-        from model.files import write_text  # here, because what only shows needs no HDF5
-
         write_text(Path(path), tomli_w.dumps(dataclasses.asdict(self)))
 
 

@@ -22,8 +22,8 @@ import numpy.typing as npt
 
 from model.cases import Case
 from model.errors import StorageError
-from model.files import WholeFile, dataset, reading
 from model.flow import Flow
+from model.hdf5 import WholeFile, dataset, reading
 from model.parameters import Parameters
 from model.trajectory import (
     AXES,

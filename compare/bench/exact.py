@@ -21,7 +21,8 @@ from compare.bench.case import TOLERANCE, VERSION, Body, Case, Surface
 from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
 from model import Parameters, State, Trajectory
 from model.arrays import Array
-from model.files import WholeFile, check_ours, make_directory, write_text
+from model.files import check_ours, make_directory, write_text
+from model.hdf5 import WholeFile
 from model.kinematics import to_world
 from model.trajectory import current_versions
 

@@ -18,6 +18,7 @@ from rich.console import Console
 from compare.kit.pages import readable
 from compare.kit.statistics import plain
 from model import InputError, Parameters, drag
+from model.files import check_writable
 from model.parameters import ANY, NOT_NEGATIVE, Range
 
 Commands = Any
@@ -104,8 +105,6 @@ class Output:
     suffixes: tuple[str, ...]
 
     def __call__(self, text: str) -> Path:
-        from model.files import check_writable  # here, because what only shows needs no HDF5
-
         if Path(text).suffix.lower() not in self.suffixes:
             ends = " or ".join(filter(None, [", ".join(self.suffixes[:-1]), self.suffixes[-1]]))
             raise argparse.ArgumentTypeError(f"{text!r} would hold {self.what}: its name must end in {ends}")

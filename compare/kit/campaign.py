@@ -204,6 +204,8 @@ class Campaign:
             wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)
+                if future.cancelled():
+                    raise StorageError("the workers' scheduler is gone; finished runs are kept")
                 error = future.exception()
                 if error is None:
                     yield batch, future.result()

@@ -25,7 +25,8 @@ from compare.kit import pages
 from compare.kit.statistics import settled_case, steady_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
-from model.files import WholeFile, check_writable, column, dataset, reading, write_columns
+from model.files import check_writable
+from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
 from model.parameters import ANY, Range, check_names, check_number, parse_number
 from model.trajectory import CONVENTIONS, attributes, columns

@@ -14,7 +14,7 @@ from compare.kit import sweep
 from compare.kit.campaign import Campaign
 from compare.kit.tasks import Task
 from model import Parameters, StorageError, storage
-from model.files import column, dataset, reading
+from model.hdf5 import column, dataset, reading
 
 P = Parameters.named("reference")
 OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)

@@ -19,7 +19,7 @@ from compare.kit.record import Missing, Records
 from compare.report import results
 from compare.view import inspection
 from model import InputError, Parameters, State, StorageError, storage
-from model.files import seal
+from model.hdf5 import seal
 from tests.measured import measured
 
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])

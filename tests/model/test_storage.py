@@ -12,7 +12,8 @@ import xarray
 
 import model.trajectory
 from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage
-from model.files import seal, write_text
+from model.files import write_text
+from model.hdf5 import seal
 from model.trajectory import SAMPLE, columns
 
 
