@@ -7,6 +7,7 @@ file opens in xarray with the dimension ``run``, along which the parameters that
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import itertools
 import json
 import math
@@ -123,13 +124,15 @@ def levels(axes: Sequence[Axis], direction: str) -> list[float]:
 def collect(directory: Path, output: Path) -> int:
     """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
 
+    One that is stored twice is taken once.
+
     Raises `StorageError` if there are none, the output can't be written, or, with their names, some can't be read or
     hold the same run twice.
     """
     check_writable(output)
     if not directory.is_dir():
         raise StorageError(f"cannot read {directory}: there is no such directory")
-    rows, problems, known = [], [], dict[str, Path]()
+    rows, problems, known = [], [], dict[bytes, tuple[Path, bytes]]()
     for file in sorted(directory.rglob("*.h5")):
         if file.parent.suffix == ".journal":  # of a run that goes on
             continue
@@ -144,10 +147,13 @@ def collect(directory: Path, output: Path) -> int:
         for name, run in runs.items():
             header = dataclasses.asdict(dataclasses.replace(run.header, created="", failure=""))
             header["flow"] = run.header.flow.to_mapping()
-            identity = json.dumps(header, sort_keys=True, default=dict)  # all that determines a run
-            if (first := known.setdefault(identity, file / name)) != file / name:
-                problems.append(f"{first} and {file / name} hold the same run")
-            rows.append(_row(run, (file / name).relative_to(directory)))
+            identity = _digest(json.dumps(header, sort_keys=True, default=dict).encode())  # all that determines a run
+            numbers = _digest(*(getattr(run, name).tobytes() for name in columns(Trajectory)))
+            first, same = known.setdefault(identity, (file / name, numbers))
+            if numbers != same:
+                problems.append(f"{first} and {file / name} hold the same run with different numbers")
+            if first == file / name:
+                rows.append(_row(run, first.relative_to(directory)))
     if problems:
         more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
         raise StorageError("; ".join(problems[:NAMED]) + more)
@@ -164,6 +170,13 @@ def collect(directory: Path, output: Path) -> int:
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
     return len(rows)
+
+
+def _digest(*parts: bytes) -> bytes:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
+    return digest.digest()
 
 
 def _check_collection(output: Path) -> None:

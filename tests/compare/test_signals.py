@@ -76,9 +76,10 @@ def catches(process: subprocess.Popen[str], number: int) -> bool:
 
 
 def end(command: str, number: signal.Signals, after: float, here: Path) -> None:
-    """Send a signal so many seconds after the first moment at which the program can answer, to all that belongs to it.
+    """Send a signal so many seconds after the first moment at which the program can answer.
 
-    That is what a terminal and a cluster do.
+    To all that belongs to it, as a terminal and a cluster do; but to it alone while it may be importing MuJoCo, whose
+    window library asks a Python of its own for its version.
     """
     before = set(here.rglob("*"))
     process = subprocess.Popen(
@@ -97,7 +98,7 @@ def end(command: str, number: signal.Signals, after: float, here: Path) -> None:
     time.sleep(after)
     running = process.poll() is None
     try:
-        os.killpg(process.pid, number)
+        (os.killpg if after > 2 else os.kill)(process.pid, number)
     except ProcessLookupError:
         running = False
     out, err = process.communicate(timeout=60)
