@@ -17,6 +17,14 @@ def main() -> NoReturn:
             os.write(2, b"dualball: interrupted\n")
         os._exit(128 + number)
 
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:  # closed: the next file would take its place, and what a library prints
+            os.open(os.devnull, os.O_RDWR)
+    if not sys.stdout or not sys.stderr:
+        nowhere = Path(os.devnull).open("w")  # noqa: SIM115  (for as long as the process lasts)
+        sys.stdout, sys.stderr = sys.stdout or nowhere, sys.stderr or nowhere
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, leave)

@@ -62,8 +62,8 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file as `write_bytes` does."""
-    write_bytes(path, text.encode())
+    """Write a text file as `write_bytes` does; a file name in it that is no UTF-8 stays as it is."""
+    write_bytes(path, text.encode("utf-8", "surrogateescape"))
 
 
 @contextmanager

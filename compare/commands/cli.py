@@ -7,8 +7,10 @@ Exit codes: 0 done and as expected, 1 a verdict failed, a run broke down or a de
 from __future__ import annotations
 
 import argparse
+import codecs
 import gc
 import importlib
+import io
 import os
 import re
 import sys
@@ -17,6 +19,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from compare.commands import options, signals
+from compare.kit import pages
 from model import InputError, SimulationError
 from model.files import leave
 from model.trajectory import current_versions
@@ -53,13 +56,36 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
 
 
 def program() -> NoReturn:
-    """This process as the program: ends with the exit code, and at once for a second signal."""
+    """This process as the program: ends with the exit code, and at once for a second signal.
+
+    What standard output can't show in its encoding is spelled.
+    """
+    codecs.register_error("spelled", pages.spelled)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="spelled")
+    os.environ["MPLBACKEND"] = "agg"  # figures go into files: that of a notebook would be looked for here, too
     with signals.answered(signals.end):
-        code = main()
+        try:
+            code = main()
+        except SystemExit as done:  # as of --help
+            code = int(done.code or 0)
+        code = _flushed(code)
         if code >= 128:  # threads may still be at what nobody wants any more
             gc.collect()  # lets go of what workers shared
             leave(code)
     sys.exit(code)
+
+
+def _flushed(code: int) -> int:
+    """The exit code, once what was printed has arrived, or if nobody wants to read it, as with `| head`."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if code == 0 and not isinstance(error, BrokenPipeError):
+            print(f"dualball: error: cannot write to standard output: {error.strerror}", file=sys.stderr)
+            return 2
+    return code
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -73,8 +99,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SimulationError as error:
         print(f"dualball: {error}", file=sys.stderr)
         return 1
-    except BrokenPipeError:  # the reader of our output has gone, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # `_flushed` sees to it
         return 0
     except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
         where = f"{error.filename}: " if error.filename else ""

@@ -188,12 +188,19 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
         raise
 
 
+class Terminal(Console):
+    """Leaves it to the program what to do where nobody reads on."""
+
+    def on_broken_pipe(self) -> NoReturn:
+        raise BrokenPipeError
+
+
 def show(data: Any, as_json: bool, *shown: Any) -> None:
     """Print data as JSON, numbers that are not finite as null; or what is shown of it, tables and lines."""
     if as_json:
         print(json.dumps(plain(data), indent=1))
     else:
-        Console(markup=False).print(*shown, sep="\n")
+        Terminal(markup=False).print(*shown, sep="\n")
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
