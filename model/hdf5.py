@@ -125,8 +125,8 @@ class _Disk(io.FileIO):
 
 
 @contextmanager
-def reading(path: str | Path, remedy: str = "") -> Iterator[h5py.File]:
-    """An HDF5 file that `WholeFile` wrote, open for reading.
+def reading(path: str | Path, remedy: str = "", sealed: bool = True) -> Iterator[h5py.File]:
+    """An HDF5 file that `WholeFile` wrote, open for reading; or any, if it need not be `sealed` by a checksum.
 
     Raises `StorageError`, in one line that names the file and what to do, the `remedy`, if it is missing, damaged, cut,
     changed, or foreign; an `InputError` or error of HDF5 within the context becomes one, too.
@@ -135,16 +135,10 @@ def reading(path: str | Path, remedy: str = "") -> Iterator[h5py.File]:
         if not Path(path).is_file():
             raise StorageError("there is no such file")
         with Path(path).open("rb") as content:
-            size = content.seek(0, os.SEEK_END) - _TRAILER
-            content.seek(0)
             if content.read(len(_SIGNATURE)) != _SIGNATURE:
                 raise StorageError("it is not an HDF5 file")
-            content.seek(max(size, 0))
-            trailer = content.read()
-            if not trailer.startswith(_SEAL):
-                raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
-            if trailer != _SEAL + _checksum(content, size):
-                raise StorageError("it is damaged (its content does not match its checksum)")
+            if sealed:
+                _check_seal(content)
         with h5py.File(path, "r") as file:
             yield file
     except _DAMAGE as error:
@@ -190,6 +184,17 @@ def write_columns(file: h5py.File, columns: Mapping[str, Sequence[Any]], scale: 
 def seal(content: BinaryIO) -> None:
     """Add its checksum to an HDF5 file, open for reading and writing, that has none."""
     content.write(_SEAL + _checksum(content, content.seek(0, os.SEEK_END)))
+
+
+def _check_seal(content: BinaryIO) -> None:
+    """Raise `StorageError` if a file is not what `seal` has left."""
+    size = content.seek(0, os.SEEK_END) - _TRAILER
+    content.seek(max(size, 0))
+    trailer = content.read()
+    if not trailer.startswith(_SEAL):
+        raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
+    if trailer != _SEAL + _checksum(content, size):
+        raise StorageError("it is damaged (its content does not match its checksum)")
 
 
 def _checksum(content: BinaryIO, size: int) -> bytes:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation.settings import Settings, sample_times, start_state
+from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
 from model import Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.kinematics import TURNING, VARIABLES
@@ -87,6 +87,7 @@ def simulate_many(
 
     def carry_out(k: int) -> None:
         fluid = flows[k] or Flow.steady(sets[k].omega_0)
+        check_duration(sets[k], fluid, t_end)
         ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
         end[k] = stepping.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k], over)
         if end[k] < 0:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation.motion import Recorder
-from analytic.simulation.settings import Settings, sample_times, start_state
+from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
 from analytic.stationary import solutions as stationary
 from model import Case, Flow, Header, InputError, Parameters, SimulationError, Trajectory
 from model.parameters import check_names, check_number
@@ -71,6 +71,7 @@ def simulate(
     flow = Flow.steady(p.omega_0) if flow is None else flow
     x = start_state(x0, p, settings)
     times = sample_times(t_end, sample_interval)
+    check_duration(p, flow, float(times[-1]))
     theta_0 = check_number("theta_0", theta_0, "rad")
     start, (first, second, *_) = {"x0": list(x), "theta_0": theta_0}, times.tolist()
     shown = dataclasses.asdict(settings) | start | {"t_end": float(times[-1]), "sample_interval": second - first}

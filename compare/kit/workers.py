@@ -28,6 +28,9 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 """A function that is called like `map`."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Ctrl-C, and what clusters send."""
+LONGEST = 120.0
+"""Processor time that judging a claim or drawing a figure may take, s: a hundred times what most take. What files say
+may be nonsense that takes years."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
 
@@ -210,3 +213,25 @@ def threads(count: int) -> Iterator[ThreadPoolExecutor]:
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     pool.shutdown()
+
+
+@contextmanager
+def at_most(limit: float) -> Iterator[None]:
+    """Raise `TimeoutError` once more than `limit` s of processor time have passed, and again where that is caught.
+
+    In the main thread of a process, where signals arrive; elsewhere, and on Windows, there is no limit.
+    """
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def late(*_: object) -> None:
+        raise TimeoutError(f"it took longer than {limit:g} s")
+
+    before = signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, limit, 0.1)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)

@@ -237,6 +237,19 @@ def test_a_run_that_progress_ends_carries_its_samples(method):
     assert np.all(np.diff(run.time) > 0)
 
 
+@pytest.mark.parametrize(("flow", "says"), [(None, "1/omega_0 = 1e-09 s"), (Flow.sine(5, 1, 1e9), "1/(2 pi f) = ")])
+def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
+    """It would take hours; the first moments of it don't."""
+    p = P.replace(omega_0=1e9)
+    for method in METHODS:
+        with pytest.raises(InputError, match="t_end = 1 s is out of range: ") as refused:
+            simulate(p, [0] * 6, 1.0, flow, method=method)
+        assert says in str(refused.value)
+        assert simulate(p, [0] * 6, 1e-8, flow, method=method).complete
+    with pytest.raises(InputError, match="t_end = 1 s is out of range: "):
+        simulate_many(p, [0] * 6, 1.0, flow)
+
+
 def test_interrupting_many_runs_ends_those_under_way():
     """Hours of them, and days without numba: the threads must not be waited for."""
     p, alarm = Parameters.named("hopping"), signal.getsignal(signal.SIGALRM)
