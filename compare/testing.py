@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 import analytic
 from compare.kit.settling import rotation_scale
-from model import Case, InputError, Parameters, StorageError, Trajectory, storage
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.arrays import Array
 from model.errors import suggestion
 from model.hdf5 import dataset, reading
@@ -101,8 +101,7 @@ def read(source: Source, name: str = "") -> Series:
 
 def _csv(path: Path) -> dict[str, Array]:
     try:
-        lines = [line.partition("#")[0] for line in path.read_text("utf-8-sig").splitlines()]
-        rows = [row for line in lines if (row := line.replace(";", " ").replace(",", " ").replace('"', "").split())]
+        rows = [row for line in path.read_text("utf-8-sig").splitlines() if any(row := table.fields(line))]
         head = rows.pop(0) if rows and {"time", "t"} & set(rows[0]) else ["time", "omega_c"]
         return dict(zip(head, np.array(rows, float).reshape(len(rows), len(head)).T, strict=True))
     except OSError as error:

@@ -262,7 +262,7 @@ Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", "\n    ".j
 def read_toml(path: str | Path) -> dict[str, Any]:
     """What a TOML file holds; raises `StorageError` if it can't be read."""
     try:
-        return tomllib.loads(Path(path).read_text("utf-8"))
+        return tomllib.loads(Path(path).read_text("utf-8-sig"))
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -73,8 +73,8 @@ class Number:
             raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number") from error
         if not math.isfinite(number) or number not in self.allowed:
             said = f"{number:g} {readable(self.unit)}".rstrip()
-            limits = "finite" if self.allowed == ANY else self.allowed
-            raise argparse.ArgumentTypeError(f"{said} is out of range: it must be {limits}")
+            limits = ["finite"] * (not math.isfinite(number)) + [str(self.allowed)] * (self.allowed != ANY)
+            raise argparse.ArgumentTypeError(f"{said} is out of range: it must be {' and '.join(limits)}")
         return int(number) if self.allowed.whole else number
 
     @property
