@@ -49,6 +49,8 @@ class Axis:
 
     name: str
     values: tuple[float, ...]
+    between: bool = False
+    """Whether no more than the two ends were given."""
 
     @classmethod
     def parse(cls, text: str, units: Mapping[str, str] = FIELDS, kind: str = "parameter", allowed: Range = ANY) -> Axis:
@@ -68,7 +70,7 @@ class Axis:
             given = f"{name} = {first:g}:{last:g} {units[name]}"
             raise InputError(f"{given} is in the wrong order: a range runs from low to high")
         if not count:
-            return cls(name, (first, last))
+            return cls(name, (first, last), between=True)
         points = int(parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True)))
         return cls(name, tuple(np.linspace(first, last, points).tolist()))
 
@@ -83,6 +85,13 @@ class Axis:
         return axes
 
     @property
+    def points(self) -> tuple[float, ...]:
+        """The values; raises `InputError` if only the ends of a range were given."""
+        if self.between:
+            raise InputError(f"here {self.name} needs values: write {self.name}=from:to:count or {self.name}=a,b,c")
+        return self.values
+
+    @property
     def ends(self) -> tuple[float, float]:
         """Of the range; raises `InputError` if there is none."""
         if len(self.values) != 2:
@@ -92,8 +101,8 @@ class Axis:
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
     """Every combination of the axes' values, the last axis fastest; `InputError` if there are more than `MOST`."""
-    check_number("the grid", math.prod(len(axis.values) for axis in axes), "runs", Range(1, MOST))
-    for values in itertools.product(*(axis.values for axis in axes)):
+    check_number("the grid", math.prod(len(axis.points) for axis in axes), "runs", Range(1, MOST))
+    for values in itertools.product(*(axis.points for axis in axes)):
         yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))
 
 
@@ -117,7 +126,7 @@ def levels(axes: Sequence[Axis], direction: str) -> list[float]:
     """omega_0 as one run visits it: up, down, or up and down again."""
     if len(axes) != 1 or axes[0].name != "omega_0":
         raise InputError(f"direction = {direction!r} sweeps omega_0 within one run: vary omega_0 and nothing else")
-    up = sorted(axes[0].values)
+    up = sorted(axes[0].points)
     return {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[direction]
 
 
