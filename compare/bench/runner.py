@@ -181,6 +181,7 @@ class EngineProcess:
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:
             if self._process.poll() is not None:
+                self.close()
                 self._start()
             self._pipe.send((case, step))
             answer = self._answer(self._limit)

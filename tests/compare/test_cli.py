@@ -190,6 +190,7 @@ import os, signal, sys
 from compare.commands import cli, simulate
 from compare.kit import tasks
 from mjsim.journal import Journal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts what runs in the background without
 tasks.LONG, stop_after = 1000, int(sys.argv[1])
 tasks.Journal = lambda directory: Journal(directory, interval=0.0)
 store, stored = tasks.store, 0
