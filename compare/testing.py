@@ -16,16 +16,17 @@ import numpy.typing as npt
 
 import analytic
 from compare.kit.settling import rotation_scale
-from model import Case, InputError, Parameters, StorageError, Trajectory, storage
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.arrays import Array
 from model.errors import suggestion
+from model.hdf5 import dataset, reading
 from model.parameters import POSITIVE, check_number
 from model.trajectory import AXES, columns
 
 SETTLED_PART = 0.25
 """Last part of a motion, in which it has to have settled."""
-FEWEST = 10
-"""Samples below which nothing is judged."""
+FEWEST, MOST = 10, 10_000_000
+"""Samples below which nothing is judged, and most that are read of another program's file."""
 _COLUMNS = {name: (AXES if meta["shape"] else ("",), meta["units"]) for name, meta in columns(Trajectory).items()}
 UNITS = {name + axis: unit for name, (axes, unit) in _COLUMNS.items() for axis in axes}
 """Units of what a motion may have, by name: the columns of a trajectory, of its forces each component."""
@@ -100,8 +101,7 @@ def read(source: Source, name: str = "") -> Series:
 
 def _csv(path: Path) -> dict[str, Array]:
     try:
-        lines = [line.partition("#")[0] for line in path.read_text("utf-8-sig").splitlines()]
-        rows = [row for line in lines if (row := line.replace(";", " ").replace(",", " ").replace('"', "").split())]
+        rows = [row for line in path.read_text("utf-8-sig").splitlines() if any(row := table.fields(line))]
         head = rows.pop(0) if rows and {"time", "t"} & set(rows[0]) else ["time", "omega_c"]
         return dict(zip(head, np.array(rows, float).reshape(len(rows), len(head)).T, strict=True))
     except OSError as error:
@@ -114,14 +114,25 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
     """A trajectory; or the columns of another program's file, which names no schema."""
     try:
         return storage.load(path)
-    except StorageError as ours:
-        try:
-            with h5py.File(path) as file:
-                if "schema" in file.attrs:
-                    raise
-                return {key: file[key][...] for key in ("t", *UNITS) if isinstance(file.get(key), h5py.Dataset)}
-        except (OSError, RuntimeError):
-            raise ours from None
+    except StorageError as error:
+        if not path.is_file():
+            raise
+        ours = error
+    with reading(path, sealed=False) as file:
+        if "schema" not in file.attrs:
+            names = [name for name in ("t", *UNITS) if file.get(name, getlink=True)]
+            return {name: _numbers(dataset(file, name)) for name in names}
+    raise ours
+
+
+def _numbers(stored: h5py.Dataset) -> Array:
+    """A column of another program; `StorageError` for what is no column of numbers, or too long."""
+    name = stored.name.removeprefix("/")
+    if stored.dtype.kind not in "fiu" or len(stored.shape or ()) != 1:
+        raise StorageError(f"{name!r} is no column of numbers")
+    if len(stored) > MOST:
+        raise StorageError(f"{name!r} has {len(stored):g} samples, and {MOST:g} are the most that are compared")
+    return np.asarray(stored[...], float)
 
 
 @dataclass(frozen=True)

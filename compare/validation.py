@@ -6,7 +6,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -23,7 +23,7 @@ from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.progress import Show, Whole, nowhere
 from compare.kit.record import Missing, Records, Testimony
-from compare.kit.workers import Spread, Workers, processes
+from compare.kit.workers import LONGEST, Spread, Workers, at_most, processes, threads
 from compare.report import results
 from compare.report.results import Summary
 from compare.witnesses import hear
@@ -90,7 +90,7 @@ def validate(
 
     whole = Whole(progress, {}, len(chosen))
     with (
-        ThreadPoolExecutor(1) as bench,  # judges while the next protocols' runs are on their way
+        threads(1) as bench,  # judges while the next protocols' runs are on their way
         Campaign(output / results.RUNS, workers, limit=limit, report=whole.measuring) as campaign,
     ):
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
@@ -149,8 +149,17 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
 
 def _judged(directory: Path, number: int) -> dict[str, Any]:
     """What there is to say of a claim; claims themselves don't go from process to process."""
-    judged = hear(CLAIMS[number], stored(directory))
+    judged = _in_time(CLAIMS[number], stored(directory))
     return {name: value for name, value in vars(judged).items() if name != "claim"}
+
+
+def _in_time(claim: Claim, testimony: Testimony) -> Verdict:
+    """The verdict on what is stored, or that it took too long."""
+    try:
+        with at_most(LONGEST):
+            return hear(claim, testimony)
+    except TimeoutError as error:
+        return Verdict(claim=claim, outcome=Outcome.ERROR, error=str(error))
 
 
 @cache
@@ -171,7 +180,7 @@ def stored_material(directory: Path) -> Material:
     if not (directory / results.SUMMARY).exists():
         return Material()
     testimony = stored(directory)
-    return material(directory, [hear(claim, testimony) for claim in CLAIMS], testimony)
+    return material(directory, [_in_time(claim, testimony) for claim in CLAIMS], testimony)
 
 
 def _write(

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from model.arrays import Array
-from model.files import WholeFile, make_directory, reading, remove_leftovers
+from model.files import make_directory, remove_leftovers
+from model.hdf5 import WholeFile, reading
 
 
 class Journal:
@@ -22,7 +23,7 @@ class Journal:
 
     Parameters
     ----------
-    directory : where they are; made if it doesn't exist
+    directory : where they are; made with the first of them
     interval : least time between two segments, s of real time
 
     Raises `StorageError` if it can't be read or written.
@@ -30,7 +31,6 @@ class Journal:
 
     def __init__(self, directory: Path, interval: float = 30.0) -> None:
         self._directory, self._interval = directory, interval
-        make_directory(directory)
         remove_leftovers(directory)
         self._count = len(list(directory.glob("*.h5")))
         self._waiting: list[Array] = []
@@ -53,6 +53,7 @@ class Journal:
         self._waiting.append(samples)
         if time.monotonic() - self._last < self._interval:
             return
+        make_directory(self._directory)
         with WholeFile(self._path(self._count)) as whole:
             whole.file["samples"] = np.concatenate(self._waiting)
             for name, values in state.items():
@@ -64,7 +65,8 @@ class Journal:
 
     def discard(self) -> None:
         """Remove all segments, when the run itself is stored."""
-        shutil.rmtree(self._directory)
+        if self._count:
+            shutil.rmtree(self._directory)
 
     def _path(self, k: int) -> Path:
         return self._directory / f"{k:06d}.h5"

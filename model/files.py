@@ -1,190 +1,21 @@
-"""Files that are either complete or absent, and that are read only if nothing in them has changed.
-
-Every HDF5 file of the program ends with the SHA-256 checksum of all that comes before, which HDF5 itself ignores. It is
-compared before HDF5 looks at the file: on damaged metadata the library may hang, and give wrong numbers.
-"""
+"""Files that are whole or not there: written under a temporary name beside theirs, which they get at the end."""
 
 from __future__ import annotations
 
-import hashlib
-import io
 import json
 import os
 import socket
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import Any, NoReturn
 
-import h5py
-import numpy as np
-import numpy.typing as npt
-
-from model.errors import InputError, StorageError
+from model.errors import StorageError
 
 _SUFFIX = ".part"
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_SEAL = b"\ndualball sha256 "
-_TRAILER = len(_SEAL) + 64
-_BLOCK = 1 << 20
 _HOST = socket.gethostname().replace(".", "-")
-_DAMAGE = OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError, MemoryError
-"""What reading a file that does not hold what it should may end in."""
-
-
-class WholeFile:
-    """An HDF5 file under construction; a context manager.
-
-    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file.
-    Raises `StorageError`, in one line, when it can't be written (no such directory, no permission, disk full).
-    """
-
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        self._temporary = _temporary(self.path)
-        try:
-            self._disk = _Disk(self._temporary, "w+b")
-        except OSError as error:
-            raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
-        self.file = h5py.File(self._disk, "w", track_order=True)
-        self._finished = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if not self._finished:
-            self.file.close()
-            self._disk.close()
-            self._temporary.unlink(missing_ok=True)
-
-    def flush(self) -> None:
-        """Bring what was written to the disk."""
-        self.file.flush()
-        self._check()
-
-    def finish(self, path: str | Path | None = None) -> None:
-        """Close the file, add its checksum and give it its name, or another in the same directory."""
-        self.file.close()
-        self._check()
-        try:
-            seal(self._disk)
-            self._check()
-            os.fsync(self._disk.fileno())
-            self._disk.close()
-            self._temporary.replace(path or self.path)
-        except OSError as error:
-            raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
-        self._finished = True
-
-    def _check(self) -> None:
-        if self._disk.error:
-            raise StorageError(f"cannot write {self.path}: {self._disk.error.strerror}") from self._disk.error
-
-
-class _Disk(io.FileIO):
-    """A file that stores the first write error instead of raising it.
-
-    HDF5 can't close a file that it could not write: it crashes the process (HDF5 1.14, disk full). So the error is
-    kept here, and `WholeFile` raises it after each flush.
-    """
-
-    error: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        view = memoryview(data).cast("B")
-        done = 0
-        try:
-            while self.error is None and done < len(view):
-                done += super().write(view[done:])
-        except OSError as error:
-            self.error = error
-        return len(view)
-
-    def truncate(self, size: int | None = None) -> int:
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.error = self.error or error
-            return size or 0
-
-
-@contextmanager
-def reading(path: str | Path, remedy: str = "") -> Iterator[h5py.File]:
-    """An HDF5 file that `WholeFile` wrote, open for reading.
-
-    Raises `StorageError`, in one line that names the file and what to do, the `remedy`, if it is missing, damaged, cut,
-    changed, or foreign; an `InputError` or error of HDF5 within the context becomes one, too.
-    """
-    try:
-        if not Path(path).is_file():
-            raise StorageError("there is no such file")
-        with Path(path).open("rb") as content:
-            size = content.seek(0, os.SEEK_END) - _TRAILER
-            content.seek(0)
-            if content.read(len(_SIGNATURE)) != _SIGNATURE:
-                raise StorageError("it is not an HDF5 file")
-            content.seek(max(size, 0))
-            trailer = content.read()
-            if not trailer.startswith(_SEAL):
-                raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
-            if trailer != _SEAL + _checksum(content, size):
-                raise StorageError("it is damaged (its content does not match its checksum)")
-        with h5py.File(path, "r") as file:
-            yield file
-    except _DAMAGE as error:
-        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
-        if isinstance(error, OSError):
-            reason = error.strerror or reason
-        elif not isinstance(error, InputError):
-            reason = f"it does not hold what it should ({reason})"
-        raise StorageError(f"cannot read {path}: {reason}{remedy and f'; {remedy}'}") from error
-
-
-def dataset(file: h5py.File, name: str) -> h5py.Dataset:
-    """The dataset of that name, stored in this very file: links out of it are not followed.
-
-    Raises `StorageError`, for `reading` to add the name of the file.
-    """
-    if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-        raise StorageError(f"it has no dataset {name!r} of its own")
-    stored = file[name]
-    if not isinstance(stored, h5py.Dataset) or stored.external or stored.is_virtual:
-        raise StorageError(f"{name!r} is not a dataset of its own")
-    return stored
-
-
-def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
-    """All of a dataset: numbers, or text as `str`."""
-    return np.asarray((stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...])
-
-
-def write_columns(file: h5py.File, columns: Mapping[str, Sequence[Any]], scale: str) -> dict[str, h5py.Dataset]:
-    """Write columns (n,) of numbers or of text, of which the first, `scale`, is the scale of their dimension."""
-    written = {}
-    for name, values in columns.items():
-        text = h5py.string_dtype() if len(values) and isinstance(values[0], str) else None
-        written[name] = file.create_dataset(name, data=values, dtype=text)
-        if name == scale:
-            written[name].make_scale(scale)
-        else:
-            written[name].dims[0].attach_scale(written[scale])
-    return written
-
-
-def seal(content: BinaryIO) -> None:
-    """Add its checksum to an HDF5 file, open for reading and writing, that has none."""
-    content.write(_SEAL + _checksum(content, content.seek(0, os.SEEK_END)))
-
-
-def _checksum(content: BinaryIO, size: int) -> bytes:
-    """Of the first `size` bytes."""
-    digest = hashlib.sha256()
-    content.seek(0)
-    for start in range(0, size, _BLOCK):
-        digest.update(content.read(min(_BLOCK, size - start)))
-    content.seek(size)
-    return digest.hexdigest().encode()
+_under_way: set[Path] = set()
+"""Temporary files of this process."""
 
 
 def make_directory(path: Path) -> None:
@@ -197,26 +28,42 @@ def make_directory(path: Path) -> None:
         raise StorageError(f"cannot write to {path}: Permission denied")
 
 
+def check_ours(path: Path, beside: Path) -> None:
+    """Raise `StorageError` if a file is there that this program has not written: it writes another `beside` it."""
+    if path.exists() and not beside.exists():
+        raise StorageError(f"{path} is not of this program: choose another directory with --output")
+
+
 def check_writable(path: str | Path) -> None:
     """Raise `StorageError` if a file of that name could not be written: better before a long run than after."""
     folder = Path(path).parent
-    if not folder.is_dir():
-        raise StorageError(f"cannot write {path}: there is no directory {folder}")
-    if Path(path).is_dir():
-        raise StorageError(f"cannot write {path}: it is a directory")
+    try:
+        if not folder.is_dir():
+            raise StorageError(f"cannot write {path}: there is no directory {folder}")
+        if Path(path).is_dir():
+            raise StorageError(f"cannot write {path}: it is a directory")
+    except OSError as error:  # as of a name that is too long
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise StorageError(f"cannot write {path}: Permission denied")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; raises `StorageError`."""
-    temporary = _temporary(path)
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all; raises `StorageError`."""
     try:
-        temporary.write_text(text, "utf-8")
-        temporary.replace(path)
+        made = temporary(path)
+        try:
+            made.write_bytes(content)
+            made.replace(path)
+        finally:
+            remove(made)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file as `write_bytes` does; a file name in it that is no UTF-8 stays as it is."""
+    write_bytes(path, text.encode("utf-8", "surrogateescape"))
 
 
 @contextmanager
@@ -243,11 +90,28 @@ def remove_leftovers(directory: Path) -> None:
                 continue  # it lives, and is somebody else's
 
 
-def _temporary(path: Path) -> Path:
-    """A name beside a file's, with the machine and process that write it; `StorageError` for what is no file.
+def temporary(path: Path) -> Path:
+    """A name beside a file's, with the machine and process that write it, to be given to `remove` in the end.
 
-    The new file takes the place of the old one: as the superuser that would replace /dev/null.
+    Raises `StorageError` for what is no file: the new file takes the place of the old one, and as the superuser that
+    would replace /dev/null.
     """
     if path.exists() and not path.is_file():
         raise StorageError(f"cannot write {path}: it is not a file")
-    return path.with_name(f".{path.name}.{_HOST}.{os.getpid()}{_SUFFIX}")
+    end = path.name[-50:]  # what tells files of one program apart; a name has at most 255 bytes
+    made = path.with_name(f".{end}.{_HOST}.{os.getpid()}{_SUFFIX}").absolute()
+    _under_way.add(made)
+    return made
+
+
+def remove(made: Path) -> None:
+    """Remove a temporary file, if it hasn't got its name."""
+    made.unlink(missing_ok=True)
+    _under_way.discard(made)
+
+
+def leave(code: int) -> NoReturn:
+    """End this process at once, whatever its threads do; no temporary file stays."""
+    for made in _under_way.copy():
+        made.unlink(missing_ok=True)
+    os._exit(code)

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from model import table
 from model.arrays import Array
 from model.errors import InputError, StorageError
 from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, REACH, Range, check_number, parse_number
@@ -17,6 +18,8 @@ from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, REACH, Range, check_nu
 GAP = 10.0
 """An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't measured there. A few
 samples lost, or knots written by hand at uneven times, stay below it."""
+_COLUMNS = {"time": ("s", ["t"]), "omega_0": ("rad s-1", ["omega0", "omega", "ω₀", "ω_0"])}
+"""Of a measured flow: units, and other names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,10 +111,12 @@ class Flow:
     def from_csv(cls, path: str | Path, longest_interval: float | None = None) -> Self:
         """A measured flow: lines of time in s and omega_0 in rad s-1, with linear interpolation between them.
 
-        Commas, semicolons or white space separate the two; a first line without numbers is taken as the header, and
-        what follows a # as a comment. Over more than `longest_interval`, in s, nothing is interpolated; `GAP` times the
-        median interval if None. Raises `StorageError` for a file that can't be read, `InputError` that names the line
-        where a field is missing or not a finite number, where times don't increase, or after a gap.
+        Commas, semicolons or white space separate the two; numbers may have decimal commas between semicolons or tabs.
+        A first line without numbers is the head: columns are found by their names in it, and may be more and in any
+        order; a unit in it must be that. What follows a # is a comment. Over more than `longest_interval`, in s,
+        nothing is interpolated; `GAP` times the median interval if None. Raises `StorageError` for a file that can't be
+        read, `InputError` that names the line where a field is missing or not a finite number, where times don't
+        increase, or after a gap.
         """
         try:
             lines = Path(path).read_text("utf-8-sig").rstrip().splitlines()
@@ -119,15 +124,21 @@ class Flow:
             raise StorageError(f"cannot read the flow from {path}: {error.strerror}") from error
         except UnicodeDecodeError as error:
             raise InputError(f"{path} is not a text file: {error.reason}") from error
-        rows = [(n, _fields(line)) for n, line in enumerate(lines, 1) if not line.lstrip().startswith("#")]
-        if rows and not any(_is_number(text) for text in rows[0][1]):
-            del rows[0]
-        samples: list[tuple[float, float]] = []
+        rows = [(n, table.fields(line)) for n, line in enumerate(lines, 1) if not line.lstrip().startswith("#")]
+        samples, place, width = list[tuple[float, float]](), {"time": 0, "omega_0": 1}, 2
+        if rows and not any(table.is_number(text) for text in rows[0][1]):
+            n, head = rows.pop(0)
+            try:
+                place, width = table.columns(head, _COLUMNS), len(head)
+            except InputError as error:
+                raise InputError(f"{path}, line {n}: {error}") from error
         for n, texts in rows:
             try:
-                if len(texts) != 2:
-                    raise InputError(f"needs two values, time and omega_0, but has {len(texts)}")
-                time, omega_0 = parse_number("time", texts[0], "s"), parse_number("omega_0", texts[1], "rad s-1")
+                if len(texts) != width:
+                    needed = "two values, time and omega_0" if width == 2 else f"{width} values, as the head"
+                    comma = "; with decimal commas, separate them by semicolons" if len(texts) == 2 * width else ""
+                    raise InputError(f"needs {needed}, but has {len(texts)}{comma}")
+                time, omega_0 = (parse_number(name, texts[place[name]], unit) for name, (unit, _) in _COLUMNS.items())
                 if samples and time <= samples[-1][0]:
                     raise InputError(f"times must increase, but {time:g} s comes after {samples[-1][0]:g} s")
                 samples.append((time, omega_0))
@@ -175,17 +186,3 @@ class Flow:
         if not flow.start.shape == flow.value.shape == flow.slope.shape or not np.all(np.isfinite(flow.slope)):
             raise InputError("not a flow: start, value and slope must be finite and of one length")
         return flow
-
-
-def _fields(line: str) -> list[str]:
-    """The fields of a line of text, without its comment."""
-    line = line.partition("#")[0].replace(";", ",")
-    return [text.strip(' "') for text in line.split(",")] if "," in line else line.split()
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

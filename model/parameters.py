@@ -16,6 +16,7 @@ import tomli_w
 
 from model import drag as laws
 from model.errors import InputError, StorageError, suggestion
+from model.files import write_text
 
 _SETS = resources.files("model") / "parameter_sets"
 
@@ -245,11 +246,8 @@ class Parameters:
             raise InputError(f"{path}: {error}") from error
 
     def save(self, path: str | Path) -> None:
-        """Write the values as TOML, exactly."""
-        try:
-            Path(path).write_text(tomli_w.dumps(dataclasses.asdict(self)), "utf-8")
-        except OSError as error:
-            raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
+        """Write the values as TOML, exactly; raises `StorageError`."""
+        write_text(Path(path), tomli_w.dumps(dataclasses.asdict(self)))
 
 
 _table = ["Parameters", "----------"]
@@ -264,7 +262,7 @@ Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", "\n    ".j
 def read_toml(path: str | Path) -> dict[str, Any]:
     """What a TOML file holds; raises `StorageError` if it can't be read."""
     try:
-        return tomllib.loads(Path(path).read_text("utf-8"))
+        return tomllib.loads(Path(path).read_text("utf-8-sig"))
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -12,6 +12,7 @@ import dataclasses
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,8 @@ import numpy.typing as npt
 
 from model.cases import Case
 from model.errors import StorageError
-from model.files import WholeFile, dataset, reading
 from model.flow import Flow
+from model.hdf5 import WholeFile, dataset, reading
 from model.parameters import Parameters
 from model.trajectory import (
     AXES,
@@ -61,15 +62,18 @@ class TrajectoryWriter(WholeFile):
 
     def __init__(self, path: str | Path, header: Header) -> None:
         super().__init__(path)
-        scales = _begin(self.file, SCHEMA, SCHEMA_VERSION)
         self._flow = header.flow
-        self.file.attrs.update(header.attributes())
-        self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
-        for of, time in ((Trajectory, "time"), (Events, "event_time")):
-            for meta in [*columns(of).values(), *([FLUID] if of is Trajectory else [])]:
-                shape = meta["shape"]
-                sizes = {"shape": (0, *shape), "maxshape": (None, *shape), "chunks": (1024, *shape)}
-                _create(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
+        with ExitStack() as begun:
+            begun.push(self)  # removes the file if this fails
+            scales = _begin(self.file, SCHEMA, SCHEMA_VERSION)
+            self.file.attrs.update(header.attributes())
+            self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
+            for of, time in ((Trajectory, "time"), (Events, "event_time")):
+                for meta in [*columns(of).values(), *([FLUID] if of is Trajectory else [])]:
+                    shape = meta["shape"]
+                    sizes = {"shape": (0, *shape), "maxshape": (None, *shape), "chunks": (1024, *shape)}
+                    _create(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
+            begun.pop_all()
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation.settings import Settings, sample_times, start_state
+from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
 from model import Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.kinematics import TURNING, VARIABLES
@@ -83,17 +83,24 @@ def simulate_many(
     shape = (count, len(times))
     x, case, landings = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
     x[:, 0], end, failure = states, np.zeros(count), [""] * count
+    over = np.zeros(1, bool)
 
     def carry_out(k: int) -> None:
         fluid = flows[k] or Flow.steady(sets[k].omega_0)
+        check_duration(sets[k], fluid, t_end)
         ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
-        end[k] = stepping.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k])
+        end[k] = stepping.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k], over)
         if end[k] < 0:
             end[k] *= -1
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
 
     with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(carry_out, range(count)))
+        try:
+            list(pool.map(carry_out, range(count)))
+        except BaseException:  # nobody wants the others any more
+            over[0] = True
+            pool.shutdown(cancel_futures=True)
+            raise
     return Ensemble(times, x, case, landings, end, tuple(failure))
 
 

@@ -15,6 +15,8 @@ from model.arrays import Array
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
 
 MAX_SAMPLES = 5e7
+HUGE, MAX_RADIANS = 1e3, 1e5
+"""Speed of a flow in units of sqrt(g/R), beyond which so many radians of it are simulated at most."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +60,18 @@ def fitting_step(steps: float, p: Parameters, flow: Flow, t_end: float) -> float
     """sqrt(R/g)/`steps`, or the longest step that the times of a run of t_end s allow if that is shorter; s."""
     shortest, _ = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
     return min(math.sqrt(p.R / p.g) / steps, shortest / 2)
+
+
+def check_duration(p: Parameters, flow: Flow, t_end: float) -> None:
+    """Raise `InputError` for more of a huge flow than can be computed.
+
+    That is `MAX_RADIANS`, of the orbit or of waves, where they are more than `HUGE` times as fast as sqrt(g/R).
+    """
+    shortest, name = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
+    if "omega_0" in name or "pi f" in name:
+        meaning = f"with {name} = {shortest:.3g} s, so much shorter than sqrt(R/g), it"
+        if shortest * HUGE < math.sqrt(p.R / p.g):
+            check_number("t_end", t_end, "s", Range(high=MAX_RADIANS * shortest), meaning)
 
 
 def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:

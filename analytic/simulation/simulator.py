@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation.motion import Recorder
-from analytic.simulation.settings import Settings, sample_times, start_state
+from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
 from analytic.stationary import solutions as stationary
 from model import Case, Flow, Header, InputError, Parameters, SimulationError, Trajectory
 from model.parameters import check_names, check_number
@@ -40,14 +40,14 @@ def simulate(
     settings : `Settings` if None
     sample_interval : time between samples, s; a thousandth of t_end if None. The end is always a sample.
     theta_0 : azimuth at the start, rad
-    progress : called with the fraction done, from time to time
+    progress : called with the fraction done, from time to time; ends the run where it raises `InterruptedError`
     changes : any field of `Settings` by name, in place of that in `settings`
 
     Returns
     -------
     Trajectory
         Its header has the largest error of the energy balance (``energy_residual`` in J, beside ``energy_scale``,
-        the largest energy in play). A run that is interrupted (Ctrl-C) returns what it has; the header says so.
+        the largest energy in play).
 
     Raises
     ------
@@ -55,7 +55,7 @@ def simulate(
         If an argument is out of range, or the ball starts inside floor or wall, or with a speed into one it touches
         (unless ``initial_impact``).
     SimulationError
-        If the run can't go on; it carries the samples so far.
+        If the run can't go on, or `progress` ends it; it carries the samples so far.
     """
     check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     settings = dataclasses.replace(settings or Settings(), **changes)
@@ -71,21 +71,18 @@ def simulate(
     flow = Flow.steady(p.omega_0) if flow is None else flow
     x = start_state(x0, p, settings)
     times = sample_times(t_end, sample_interval)
+    check_duration(p, flow, float(times[-1]))
     theta_0 = check_number("theta_0", theta_0, "rad")
     start, (first, second, *_) = {"x0": list(x), "theta_0": theta_0}, times.tolist()
     shown = dataclasses.asdict(settings) | start | {"t_end": float(times[-1]), "sample_interval": second - first}
     recorder = Recorder(p, times, progress)
-    failure, cause = "", None
+    header = Header(settings.method, p, flow, shown)
     try:
         run(x, theta_0, p, flow, settings, recorder)
-    except KeyboardInterrupt:
-        failure = f"interrupted at t = {recorder.time:g} s"
-    except ArithmeticError as error:
-        failure, cause = f"stopped at t = {recorder.time:g} s: {error}", error
-    trajectory = recorder.trajectory(Header(settings.method, p, flow, shown, failure=failure))
-    if cause:
-        raise SimulationError(failure, trajectory) from cause
-    return trajectory
+    except (ArithmeticError, InterruptedError) as error:
+        failure = f"stopped at t = {recorder.time:g} s: {error}"
+        raise SimulationError(failure, recorder.trajectory(dataclasses.replace(header, failure=failure))) from error
+    return recorder.trajectory(header)
 
 
 def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> Trajectory:

@@ -347,17 +347,19 @@ def follow(
     x: Array,
     case: npt.NDArray[np.int8],
     landings: npt.NDArray[np.int64],
+    over: npt.NDArray[np.bool_],
 ) -> float:
     """One run through stretches of steps, into the rows of an `Ensemble`; return its end, less than 0 if it failed.
 
-    Rows beyond the end of a run that has been quiet for long repeat its last state.
+    Rows beyond the end of a run that has been quiet for long repeat its last state. Once another thread sets `over`,
+    shape (1,), it ends where it is.
     """
     row, now, landed, known = 1, 0.0, 0.0, 0
     for s in range(len(starts)):
         for k in range(counts[s]):
             now = float(starts[s] + (k + 1) * dts[s])
             ball = step(ball, dts[s], _fluid(flow, now - dts[s] / 2), p)
-            if ball.residual != 0:
+            if ball.residual != 0 or over[0]:
                 return -now
             if ball.landings > known:
                 landings[row] += ball.landings - known

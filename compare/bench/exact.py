@@ -21,7 +21,8 @@ from compare.bench.case import TOLERANCE, VERSION, Body, Case, Surface
 from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
 from model import Parameters, State, Trajectory
 from model.arrays import Array
-from model.files import WholeFile, make_directory, write_text
+from model.files import check_ours, make_directory, write_text
+from model.hdf5 import WholeFile
 from model.kinematics import to_world
 from model.trajectory import current_versions
 
@@ -42,10 +43,10 @@ def cases() -> tuple[Case, ...]:
 def write(directory: Path) -> None:
     """JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises `StorageError`."""
     make_directory(directory)
+    check_ours(directory / "README.md", beside=directory / "cases.h5")
     count = [len(case.surfaces) for case in cases()]
     said = {"version": VERSION, "tolerance": TOLERANCE, "dualball": current_versions()["dualball"]}
     said |= {"count": len(count), "one": count.count(1), "two": count.count(2)}
-    write_text(directory / "README.md", README.read_text("utf-8").format(**said))
     with WholeFile(directory / "cases.h5") as whole:
         file = whole.file
         file.attrs.update({"schema": "dualball-cases", "version": VERSION, "tolerance": TOLERANCE})
@@ -60,6 +61,7 @@ def write(directory: Path) -> None:
             group["time"].attrs["units"] = "s"
             group["exact"].attrs["columns"] = "position (m), velocity (m s-1), spin (rad s-1)"
         whole.finish()
+    write_text(directory / "README.md", README.read_text("utf-8").format(**said))
 
 
 def _grooves() -> list[Case]:

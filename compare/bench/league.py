@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import statistics
+import threading
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from compare.bench.runner import FLOORS, Result, run_all
 from compare.kit.pages import Rows
 from compare.kit.progress import Show
 from compare.kit.statistics import plain
+from compare.kit.workers import threads
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,19 +66,22 @@ def measure(
 ) -> dict[str, list[Result]]:
     """Results by engine, one for each case; engines that can't be used have results that say why."""
     asked, done = cases(), 0
-    total = len(engines) * len(asked)
+    total, over = len(engines) * len(asked), threading.Event()
 
     def results(name: str) -> list[Result]:
         nonlocal done
         found = []
-        for result in run_all(asked, engines[name], steps):
+        for result in run_all(itertools.takewhile(lambda _: not over.is_set(), asked), engines[name], steps):
             found.append(result)
             done += 1
             show(f"{name}: {result.case}", done, total, 0)
         return found
 
-    with ThreadPoolExecutor(max(workers, 1)) as pool:
-        return dict(zip(engines, pool.map(results, engines), strict=True))
+    with threads(max(workers, 1)) as pool:
+        try:
+            return dict(zip(engines, pool.map(results, engines), strict=True))
+        finally:
+            over.set()
 
 
 def kind(case: Case) -> str:

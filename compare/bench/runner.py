@@ -21,6 +21,7 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
@@ -145,7 +146,9 @@ class EngineProcess:
             [sys.executable, "-c", f"from {__name__} import serve; serve({far.fileno()})"],
             env=os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)},
             pass_fds=[far.fileno()],
+            stdin=subprocess.PIPE,  # ends when we do
             stdout=subprocess.DEVNULL,  # engines are talkative
+            start_new_session=True,  # Ctrl-C is for us
         )
         far.close()
         self._pipe.send(self._engine)
@@ -165,8 +168,8 @@ class EngineProcess:
 
     def close(self) -> None:
         """End it."""
-        self._process.kill()
-        self._process.wait()
+        with self._process:
+            self._process.kill()
         self._pipe.close()
 
     def result(self, case: Case, steps: Sequence[float] | None = None) -> Result:
@@ -178,6 +181,7 @@ class EngineProcess:
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:
             if self._process.poll() is not None:
+                self.close()
                 self._start()
             self._pipe.send((case, step))
             answer = self._answer(self._limit)
@@ -246,7 +250,16 @@ def _line(error: Exception) -> str:
 
 
 def serve(handle: int) -> None:
-    """The process: an engine and then cases come in, what the engine makes of them goes out."""
+    """The process: an engine and then cases come in, what the engine makes of them goes out.
+
+    It ends with the one that started it.
+    """
+
+    def follow() -> None:
+        sys.stdin.read()
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
     pipe = Connection(handle)
     try:
         adapter, about = _load(pipe.recv())

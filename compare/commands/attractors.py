@@ -45,7 +45,7 @@ def add(commands: options.Commands) -> None:
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
     options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
-    command.add_argument("--page", type=options.written, help="write the tables as Markdown, too (default: don't)")
+    command.add_argument("--page", type=options.MARKDOWN, help="write the tables as Markdown, too (default: don't)")
     options.outputs(command, shown="print as JSON")
 
     command = options.command(commands, "search", searched, "--sets 200 --range mu=0.5:1")
@@ -55,8 +55,8 @@ def add(commands: options.Commands) -> None:
     options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
     command.add_argument("--kept", type=Path, nargs="+", help="show what --save wrote instead")
-    command.add_argument("--save", type=options.written, help="write the sets with hopping as JSON")
-    command.add_argument("--page", type=options.written, help="write the table as Markdown")
+    command.add_argument("--save", type=options.JSON, help="write the sets with hopping as JSON")
+    command.add_argument("--page", type=options.MARKDOWN, help="write the table as Markdown")
     options.outputs(command, "search", "print the sets with hopping as JSON")
 
     example = "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21"
@@ -70,7 +70,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
     command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
     running.add_workers(command)
-    command.add_argument("--save", type=options.written, help="write the map as JSON")
+    command.add_argument("--save", type=options.JSON, help="write the map as JSON")
     options.outputs(command, "basins", "print the shares as JSON")
 
 

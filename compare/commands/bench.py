@@ -8,7 +8,6 @@ import itertools
 import json
 import re
 import sys
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from compare.commands import options, running
 from compare.kit import engines, pages, progress
 from mjsim import ContactSettings
 from model import InputError
-from model.files import make_directory, write_text
+from model.files import check_ours, make_directory, write_text
 from model.parameters import POSITIVE, check_names
 
 LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
@@ -50,7 +49,7 @@ def add(commands: options.Commands) -> None:
         limit = options.Number(unit, POSITIVE)
         command.add_argument(f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured")
     command.add_argument("--try", dest="tries", action="store_true", help="follow the advice and measure again")
-    command.add_argument("-o", "--output", type=options.written, help="HTML page to write")
+    command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write")
     options.outputs(command)
 
     command = options.command(commands, "grade", graded, "mine.xml -o card.html")
@@ -65,13 +64,13 @@ def add(commands: options.Commands) -> None:
     for name, (count, metavar, meaning) in _PAIR.items():
         group.add_argument(f"--{name}", type=options.number, nargs=count, metavar=metavar, help=meaning)
     running.add_engine_name(command)
-    command.add_argument("-o", "--output", type=options.written, help="HTML page to write (default: none)")
+    command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write (default: none)")
     options.outputs(command)
 
     command = options.command(commands, "cases", listed, "-o cases")
     command.add_argument("name", nargs="?", metavar="NAME", help="show this case")
     files = "write JSON, HDF5, MJCF and the scoring rule (default: none)"
-    command.add_argument("-o", "--output", type=Path, metavar="DIR", help=files)
+    command.add_argument("-o", "--output", type=options.results, metavar="DIR", help=files)
     options.outputs(command)
 
     command = options.command(commands, "league", ranked, "--quick")
@@ -186,11 +185,10 @@ def ranked(args: argparse.Namespace) -> int:
     modules = {name for name in chosen if re.search(r"[.:]", name) or Path(f"{name}.py").exists()}
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
     make_directory(args.output)
+    check_ours(args.output / PAGE, beside=args.output / JSON)
     with progress.shown(quiet=args.json or args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
     if all(result.skipped for results in found.values() for result in results):
-        with suppress(OSError):  # it holds what was there before
-            args.output.rmdir()
         raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")
     data = league.to_mapping(found)
     write_text(args.output / JSON, json.dumps(data, indent=1))

@@ -1,21 +1,27 @@
 """The program ``dualball``: one command line for everything, one module a command.
 
 Exit codes: 0 done and as expected, 1 a verdict failed, a run broke down or a design doesn't reach its fastest flow,
-2 a mistake in what was asked, 130 interrupted.
+2 a mistake in what was asked, 130 interrupted by Ctrl-C, 143 by SIGTERM.
 """
 
 from __future__ import annotations
 
 import argparse
+import codecs
+import gc
 import importlib
+import io
 import os
 import re
 import sys
 import textwrap
 from collections.abc import Sequence
+from typing import NoReturn
 
-from compare.commands import options
+from compare.commands import options, signals
+from compare.kit import pages
 from model import InputError, SimulationError
+from model.files import leave
 from model.trajectory import current_versions
 
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
@@ -49,26 +55,71 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
 """The commands, as help groups them: the module of each, loaded for nothing else, and what it is for."""
 
 
+def program() -> NoReturn:
+    """This process as the program: ends with the exit code, and at once for a second signal.
+
+    What standard output can't show in its encoding is spelled.
+    """
+    codecs.register_error("spelled", pages.spelled)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="spelled")
+    os.environ["MPLBACKEND"] = "agg"  # figures go into files: that of a notebook would be looked for here, too
+    with signals.answered(signals.end):
+        try:
+            code = main()
+        except SystemExit as done:  # as of --help
+            code = int(done.code or 0)
+        code = _flushed(code)
+        if code >= 128:  # threads may still be at what nobody wants any more
+            gc.collect()  # lets go of what workers shared
+            leave(code)
+    sys.exit(code)
+
+
+def _flushed(code: int) -> int:
+    """The exit code, once what was printed has arrived, or if nobody wants to read it, as with `| head`."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if code == 0 and not isinstance(error, BrokenPipeError):
+            print(f"dualball: error: cannot write to standard output: {error.strerror}", file=sys.stderr)
+            return 2
+    return code
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the given arguments, the process's own for None; return its exit code."""
-    # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
-    words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in (sys.argv[1:] if argv is None else argv)]
+    args = argparse.Namespace(resumes=False)
     try:
-        args = _parser(words).parse_args(words)
-        args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
-        return int(args.run(args))
+        return _run(sys.argv[1:] if argv is None else argv, args)
     except InputError as error:
         print(f"dualball: error: {error}", file=sys.stderr)
         return 2
     except SimulationError as error:
         print(f"dualball: {error}", file=sys.stderr)
         return 1
-    except BrokenPipeError:  # the reader of our output has gone, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # `_flushed` sees to it
         return 0
-    except KeyboardInterrupt:
-        print("dualball: interrupted; finished runs are kept, the same command goes on from there", file=sys.stderr)
-        return 130
+    except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"dualball: error: {where}{error.strerror or error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt as error:
+        there = args.resumes and args.output.is_dir()
+        kept = f"; what is done is kept in {args.output}, the same command goes on from there" if there else ""
+        print(f"dualball: interrupted{kept}", file=sys.stderr)
+        return error.code if isinstance(error, signals.Interrupted) else 130
+
+
+def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
+    """Carry out a command, whose arguments are added to `args`."""
+    # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
+    words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in argv]
+    _parser(words).parse_args(words, args)
+    args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
+    with options.no_empty_directories(args), signals.raised():
+        return int(args.run(args))
 
 
 def _parser(words: Sequence[str]) -> options.Parser:
@@ -95,7 +146,3 @@ def _parser(words: Sequence[str]) -> options.Parser:
             listed.append(textwrap.fill(what, 100, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14))
     parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
     return parser
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -29,7 +29,7 @@ def add(commands: options.Commands) -> None:
     """Declare the command."""
     command = options.command(commands, "design", run, "meter.toml -o meter.html")
     command.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
-    command.add_argument("-o", "--output", type=options.written, help="HTML page to write (default: none)")
+    command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write (default: none)")
     command.add_argument("--seed", type=options.seed, default=0, help="seed of the random numbers of the search")
     options.outputs(command, shown="print JSON instead of tables")
 

@@ -23,26 +23,26 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "figures", figures, "--format pdf")
     command.add_argument(
-        "-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="directory to write to"
+        "-o", "--output", type=options.results, default=Path("figures"), metavar="DIR", help="directory to write to"
     )
     command.add_argument("--results", type=Path, metavar="DIR", help=f"{stored} (default results, if it is there)")
     command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
 
     command = options.command(commands, "inspect", inspect, "run.h5 --plot run.png")
     command.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
-    command.add_argument("--plot", type=Path, help="draw the run: png, svg or pdf (default: don't)")
+    command.add_argument("--plot", type=options.FIGURE, help="draw the run: png, svg or pdf (default: don't)")
     options.outputs(command)
 
     command = options.command(commands, "compare", compare, "mine.csv theory.h5 -o difference.png")
     what = "a run, or time and some of its quantities from CSV or any HDF5 file"
     command.add_argument("a", metavar="FILE", help=what)
     command.add_argument("b", metavar="OTHER", help="what it is compared with, the same")
-    command.add_argument("-o", "--output", type=Path, help="draw both (png, svg or pdf)")
+    command.add_argument("-o", "--output", type=options.FIGURE, help="draw both (png, svg or pdf)")
     options.outputs(command)
 
     command = options.command(commands, "render", render, "run.h5 -o film.gif --from 1 --seconds 10")
     command.add_argument("file", type=Path, help="a run")
-    command.add_argument("-o", "--output", type=Path, required=True, help="picture.png or film.gif")
+    command.add_argument("-o", "--output", type=options.FILM, required=True, help="picture.png or film.gif")
     second, radii = options.Number("s", POSITIVE), options.Number("radii", NOT_NEGATIVE)
     for option, kind, usual, meaning in (
         ("width", options.Number(allowed=Range(160, 1920, whole=True)), None, "pixels (default: 960, of a film 640)"),

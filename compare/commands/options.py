@@ -7,7 +7,8 @@ import dataclasses
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -17,6 +18,7 @@ from rich.console import Console
 from compare.kit.pages import readable
 from compare.kit.statistics import plain
 from model import InputError, Parameters, drag
+from model.files import check_writable
 from model.parameters import ANY, NOT_NEGATIVE, Range
 
 Commands = Any
@@ -24,10 +26,37 @@ Commands = Any
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises `InputError`, one line, where argparse would print the usage and exit."""
+    """Raises `InputError`, one line, where argparse would print the usage and exit, and for an output that is read."""
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message}; see '{self.prog} --help'")
+
+    def parse_known_args(self, *given: Any) -> tuple[argparse.Namespace, list[str]]:  # type: ignore[override]
+        """As argparse does; no output may be a file that another argument names, or a link to one."""
+        found, rest = super().parse_known_args(*given)
+        for action in (each for each in self._actions if isinstance(each.type, Output)):
+            output: Path | None = getattr(found, action.dest, None)
+            others = (value for name, value in vars(found).items() if name != action.dest)
+            if output and any(_same(output, path) for path in _files(others)):
+                self.error(f"argument {'/'.join(action.option_strings)}: {str(output)!r} is read and would be lost")
+        return found, rest
+
+
+def _files(values: Iterable[Any]) -> Iterator[Path]:
+    """Files that arguments may name; one run of a batch is named like a file in it."""
+    for value in values:
+        if isinstance(value, list):
+            yield from _files(value)
+        elif isinstance(value, str | Path):
+            yield from (Path(value), Path(value).parent)
+
+
+def _same(a: Path, b: Path) -> bool:
+    """Whether two names are those of one file that exists."""
+    try:
+        return a.samefile(b)
+    except OSError:  # one doesn't exist, or can't be a name
+        return False
 
 
 @dataclass(frozen=True)
@@ -44,8 +73,8 @@ class Number:
             raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number") from error
         if not math.isfinite(number) or number not in self.allowed:
             said = f"{number:g} {readable(self.unit)}".rstrip()
-            limits = "finite" if self.allowed == ANY else self.allowed
-            raise argparse.ArgumentTypeError(f"{said} is out of range: it must be {limits}")
+            limits = ["finite"] * (not math.isfinite(number)) + [str(self.allowed)] * (self.allowed != ANY)
+            raise argparse.ArgumentTypeError(f"{said} is out of range: it must be {' and '.join(limits)}")
         return int(number) if self.allowed.whole else number
 
     @property
@@ -65,22 +94,42 @@ seconds = Number("s", Range(1e-9, 1e9))
 moment = Number("s", NOT_NEGATIVE)
 
 
-def written(text: str) -> Path:
-    """A file to be written, for argparse; one that can't be written is refused before a long run, not after."""
-    from model.files import check_writable  # here, because what only shows needs no HDF5
+@dataclass(frozen=True)
+class Output:
+    """A file to be written, for argparse: its name must promise what it holds.
 
-    try:
-        check_writable(text)
-    except InputError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    One that can't be written is refused before a long run, not after; so is one that is also read (`Parser`).
+    """
+
+    what: str
+    suffixes: tuple[str, ...]
+
+    def __call__(self, text: str) -> Path:
+        if Path(text).suffix.lower() not in self.suffixes:
+            ends = " or ".join(filter(None, [", ".join(self.suffixes[:-1]), self.suffixes[-1]]))
+            raise argparse.ArgumentTypeError(f"{text!r} would hold {self.what}: its name must end in {ends}")
+        try:
+            check_writable(text)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+        return Path(text)
+
+
+HDF5 = Output("HDF5", (".h5", ".hdf5", ".nc"))
+JSON = Output("JSON", (".json",))
+MARKDOWN = Output("Markdown", (".md",))
+PAGE = Output("an HTML page", (".html", ".htm"))
+FIGURE = Output("a figure", (".png", ".svg", ".pdf"))
+FILM = Output("a picture or a film", (".png", ".gif"))
+SUFFIXES = {suffix for each in (HDF5, JSON, MARKDOWN, PAGE, FIGURE, FILM) for suffix in each.suffixes}
+"""Names of files end in these."""
+
+
+def results(text: str) -> Path:
+    """A directory to be filled, for argparse; a name that promises a file is refused."""
+    if Path(text).suffix.lower() in SUFFIXES and not Path(text).is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r} would be a directory, but its name is that of a file")
     return Path(text)
-
-
-def hdf5(text: str) -> Path:
-    """The same of a file to be written as HDF5: other names would promise another format."""
-    if Path(text).suffix not in (".h5", ".hdf5", ".nc"):
-        raise argparse.ArgumentTypeError(f"{text!r} would hold HDF5: its name must end in .h5, .hdf5 or .nc")
-    return written(text)
 
 
 class _Help(argparse.HelpFormatter):
@@ -89,7 +138,8 @@ class _Help(argparse.HelpFormatter):
     def _get_default_metavar_for_optional(self, action: argparse.Action) -> str:
         if isinstance(action.type, Number):
             return action.type.metavar
-        return "FILE" if action.type in (Path, written, hdf5) else super()._get_default_metavar_for_optional(action)
+        of_file = action.type is Path or isinstance(action.type, Output)
+        return "FILE" if of_file else super()._get_default_metavar_for_optional(action)
 
     _get_default_metavar_for_positional = _get_default_metavar_for_optional
 
@@ -118,9 +168,31 @@ def outputs(parser: Parser, directory: str = "", shown: str = "print JSON") -> N
     """``--json``; and what all commands have that fill a directory: its name, workers' progress or none."""
     if directory:
         where = "directory of the results; what it holds already is not computed again"
-        parser.add_argument("-o", "--output", type=Path, default=Path(directory), metavar="DIR", help=where)
+        parser.add_argument("-o", "--output", type=results, default=Path(directory), metavar="DIR", help=where)
         parser.add_argument("--quiet", action="store_true", help="no progress")
     parser.add_argument("--json", action="store_true", help=shown)
+
+
+@contextmanager
+def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
+    """Where a command fails, the directories that it made go again as far as there is nothing in them."""
+    output: Path | None = getattr(args, "output", None)
+    new = [each for each in (output, *output.parents) if not each.exists()] if output else []
+    try:
+        yield
+    except BaseException:
+        inner = (each for each in new[0].rglob("*") if each.is_dir()) if new else ()
+        for each in [*sorted(inner, reverse=True), *new]:
+            with suppress(OSError):  # it holds something, or was never made
+                each.rmdir()
+        raise
+
+
+class Terminal(Console):
+    """Leaves it to the program what to do where nobody reads on."""
+
+    def on_broken_pipe(self) -> NoReturn:
+        raise BrokenPipeError
 
 
 def show(data: Any, as_json: bool, *shown: Any) -> None:
@@ -128,7 +200,7 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
     if as_json:
         print(json.dumps(plain(data), indent=1))
     else:
-        Console(markup=False).print(*shown, sep="\n")
+        Terminal(markup=False).print(*shown, sep="\n")
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:

@@ -100,7 +100,8 @@ def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Options that say where runs are carried out."""
+    """Options that say where runs are carried out, of commands that go on where they were stopped."""
+    parser.set_defaults(resumes=True)
     group = parser.add_argument_group("workers")
     choice = group.add_mutually_exclusive_group()
     add_processes(choice)

@@ -9,10 +9,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from compare.commands import options, running
+from compare.commands import options, running, signals
 from compare.kit import campaign, sweep
 from compare.kit.tasks import failed_path, journal_path, store
-from compare.kit.workers import interrupts
 from compare.view import inspection
 from model import Flow, InputError, Parameters
 from model.files import reading_json, write_text
@@ -29,7 +28,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--time", type=options.seconds, default=10.0, help="duration")
     between = "time between samples (default: duration/1000)"
     command.add_argument("--sample-interval", type=options.seconds, help=between)
-    command.add_argument("-o", "--output", type=options.hdf5, help="HDF5 file to write (default: none)")
+    command.add_argument("-o", "--output", type=options.HDF5, help="HDF5 file to write (default: none)")
     options.outputs(command, shown="print the description as JSON")
 
     command = options.command(commands, "sweep", grid, "--vary omega_0=10:30:21")
@@ -49,7 +48,7 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "collect", collect, "sweep -o sweep.h5")
     command.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
-    command.add_argument("-o", "--output", type=options.hdf5, default=Path("sweep.h5"), help="HDF5 file to write")
+    command.add_argument("-o", "--output", type=options.HDF5, default=Path("sweep.h5"), help="HDF5 file to write")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,13 +56,10 @@ def run(args: argparse.Namespace) -> int:
     task = running.task(args, options.parameters(args), flow=running.flow(args), sample_interval=args.sample_interval)
     if args.sample_interval is not None:
         check_number("sample_interval", args.sample_interval, "s", Range(high=args.time), "with this --time it")
-    with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:
+    heard: list[int] = []  # the first signal ends the run with its samples, the second without
+    with tempfile.TemporaryDirectory() as scratch, signals.answered(heard.append):
         path = args.output or Path(scratch) / "run.h5"
-        try:
-            failure = store(task, path, stop=interrupted)
-        except KeyboardInterrupt:  # the second Ctrl-C
-            print("dualball: interrupted; no samples are kept", file=sys.stderr)
-            return 130
+        failure = store(task, path, stop=lambda: bool(heard))
         about = inspection.describe(failed_path(path) if failure else path)
         options.show(about, args.json, inspection.table(about))
         if args.output and not failure and not args.json:
@@ -75,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
                 if journal.exists():
                     kept += f", and the same command goes on from what {journal} holds"
             print(f"dualball: the simulation {failure}; {kept}", file=sys.stderr)
-        return 130 if interrupted() else 1 if failure else 0
+        return 128 + heard[0] if heard else 1 if failure else 0
 
 
 def grid(args: argparse.Namespace) -> int:

@@ -24,6 +24,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+from compare.kit.lock import Lock
 from compare.kit.progress import Show, nowhere
 from compare.kit.tasks import Task, carry_out, deadline, failed_path, store
 from compare.kit.workers import Workers, processes
@@ -55,7 +56,7 @@ class Failure:
 
 @dataclass
 class Campaign:
-    """A directory of runs and the workers that fill it; a context manager.
+    """A directory of runs, locked against other programs, and the workers that fill it; a context manager.
 
     Parameters
     ----------
@@ -83,6 +84,7 @@ class Campaign:
             check_number("limit", self.limit, "s", POSITIVE)
         self.directory = Path(self.directory).resolve()
         make_directory(self.directory)
+        self._owned = Lock(self.directory)
         remove_leftovers(self.directory)
         self._files: dict[str, Path] = dict(_stored(self.directory))
         self._failed: dict[str, Failure] = {}
@@ -96,6 +98,7 @@ class Campaign:
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         self._workers.close(at_once=kind is not None)
         remove_leftovers(self.directory)
+        self._owned.release()
 
     def under(self, label: str, doing: str) -> Campaign:
         """A part of the campaign with a label and runs of its own; parts may be carried out by several threads."""
@@ -204,6 +207,8 @@ class Campaign:
             wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)
+                if future.cancelled():
+                    raise StorageError("the workers' scheduler is gone; finished runs are kept")
                 error = future.exception()
                 if error is None:
                     yield batch, future.result()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from compare.kit.record import Check, Measurement, Records
 from model import Parameters, StorageError, Trajectory, storage
+from model.files import write_bytes
 
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
     from matplotlib.figure import Figure
@@ -80,12 +82,13 @@ def save(figure: Figure, path: Path) -> None:
 
     Raises `StorageError` if it can't be written or the name says no format.
     """
-    date = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix)
-    try:
-        figure.savefig(path, dpi=200, metadata={date: None} if date else {})
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
-        raise StorageError(f"cannot write {path}: {reason}") from error
+    suffix = path.suffix.lower()
+    date = {".svg": "Date", ".pdf": "CreationDate"}.get(suffix)
+    if suffix[1:] not in figure.canvas.get_supported_filetypes():
+        raise StorageError(f"cannot write {path}: a figure is a .png, .svg or .pdf")
+    out = io.BytesIO()
+    figure.savefig(out, format=suffix[1:], dpi=200, metadata={date: None} if date else {})
+    write_bytes(path, out.getvalue())
 
 
 Figures = dict[str, Drawing]

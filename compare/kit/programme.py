@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import KW_ONLY, asdict, dataclass, replace
 from functools import cache
 from graphlib import TopologicalSorter
@@ -22,6 +22,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.kit.tasks import sources
+from compare.kit.workers import threads
 from model import Parameters, StorageError
 from model.files import make_directory
 
@@ -167,7 +168,7 @@ def run(
     broken: dict[str, Exception] = {}
     running: dict[Future[Records], str] = {}
     campaign = jobs[0][1].campaign if jobs else None
-    with ThreadPoolExecutor(campaign.at_once if campaign else 1) as threads:
+    with threads(campaign.at_once if campaign else 1) as pool:
         try:
             while order.is_active():
                 for name in sorted(order.get_ready(), key=lambda name: (not known[name][0].first, -cost(known[name]))):
@@ -176,7 +177,7 @@ def run(
                         future.set_exception(lost[0])
                     else:
                         before = sum((found[other] for other in needs[name] if other in found), Records())
-                        future = threads.submit(carry_out, *known[name], chosen, before, results)
+                        future = pool.submit(carry_out, *known[name], chosen, before, results)
                     running[future] = name
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     name, error = running.pop(future), future.exception()
@@ -192,7 +193,6 @@ def run(
         except BaseException:
             assert campaign
             campaign.give_up()  # else the threads would wait for runs that nobody wants any more
-            threads.shutdown(cancel_futures=True)
             raise
 
 

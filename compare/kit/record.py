@@ -25,7 +25,7 @@ from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from model import Parameters, StorageError
 from model.arrays import Array
-from model.files import WholeFile, column, dataset, reading, write_columns
+from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
 from model.trajectory import current_commit, current_versions
 

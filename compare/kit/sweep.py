@@ -7,6 +7,7 @@ file opens in xarray with the dimension ``run``, along which the parameters that
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import itertools
 import json
 import math
@@ -25,7 +26,8 @@ from compare.kit import pages
 from compare.kit.statistics import settled_case, steady_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
-from model.files import WholeFile, check_writable, column, dataset, reading, write_columns
+from model.files import check_writable
+from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
 from model.parameters import ANY, Range, check_names, check_number, parse_number
 from model.trajectory import CONVENTIONS, attributes, columns
@@ -47,6 +49,8 @@ class Axis:
 
     name: str
     values: tuple[float, ...]
+    between: bool = False
+    """Whether no more than the two ends were given."""
 
     @classmethod
     def parse(cls, text: str, units: Mapping[str, str] = FIELDS, kind: str = "parameter", allowed: Range = ANY) -> Axis:
@@ -66,7 +70,7 @@ class Axis:
             given = f"{name} = {first:g}:{last:g} {units[name]}"
             raise InputError(f"{given} is in the wrong order: a range runs from low to high")
         if not count:
-            return cls(name, (first, last))
+            return cls(name, (first, last), between=True)
         points = int(parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True)))
         return cls(name, tuple(np.linspace(first, last, points).tolist()))
 
@@ -81,6 +85,13 @@ class Axis:
         return axes
 
     @property
+    def points(self) -> tuple[float, ...]:
+        """The values; raises `InputError` if only the ends of a range were given."""
+        if self.between:
+            raise InputError(f"here {self.name} needs values: write {self.name}=from:to:count or {self.name}=a,b,c")
+        return self.values
+
+    @property
     def ends(self) -> tuple[float, float]:
         """Of the range; raises `InputError` if there is none."""
         if len(self.values) != 2:
@@ -90,8 +101,8 @@ class Axis:
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
     """Every combination of the axes' values, the last axis fastest; `InputError` if there are more than `MOST`."""
-    check_number("the grid", math.prod(len(axis.values) for axis in axes), "runs", Range(1, MOST))
-    for values in itertools.product(*(axis.values for axis in axes)):
+    check_number("the grid", math.prod(len(axis.points) for axis in axes), "runs", Range(1, MOST))
+    for values in itertools.product(*(axis.points for axis in axes)):
         yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))
 
 
@@ -115,12 +126,14 @@ def levels(axes: Sequence[Axis], direction: str) -> list[float]:
     """omega_0 as one run visits it: up, down, or up and down again."""
     if len(axes) != 1 or axes[0].name != "omega_0":
         raise InputError(f"direction = {direction!r} sweeps omega_0 within one run: vary omega_0 and nothing else")
-    up = sorted(axes[0].values)
+    up = sorted(axes[0].points)
     return {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[direction]
 
 
 def collect(directory: Path, output: Path) -> int:
     """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
+
+    One that is stored twice is taken once.
 
     Raises `StorageError` if there are none, the output can't be written, or, with their names, some can't be read or
     hold the same run twice.
@@ -128,12 +141,14 @@ def collect(directory: Path, output: Path) -> int:
     check_writable(output)
     if not directory.is_dir():
         raise StorageError(f"cannot read {directory}: there is no such directory")
-    rows, problems, known = [], [], dict[str, Path]()
+    rows, problems, known = [], [], dict[bytes, tuple[Path, bytes]]()
     for file in sorted(directory.rglob("*.h5")):
-        # The journal of a run that goes on, and the collection of the last time, are no runs.
-        if file.parent.suffix == ".journal" or file.resolve() == output.resolve():
+        if file.parent.suffix == ".journal":  # of a run that goes on
             continue
         try:
+            if output.exists() and file.samefile(output):
+                _check_collection(file)
+                continue
             runs = storage.load_runs(file)
         except StorageError as error:
             problems.append(str(error))
@@ -141,10 +156,13 @@ def collect(directory: Path, output: Path) -> int:
         for name, run in runs.items():
             header = dataclasses.asdict(dataclasses.replace(run.header, created="", failure=""))
             header["flow"] = run.header.flow.to_mapping()
-            identity = json.dumps(header, sort_keys=True, default=dict)  # all that determines a run
-            if (first := known.setdefault(identity, file / name)) != file / name:
-                problems.append(f"{first} and {file / name} hold the same run")
-            rows.append(_row(run, (file / name).relative_to(directory)))
+            identity = _digest(json.dumps(header, sort_keys=True, default=dict).encode())  # all that determines a run
+            numbers = _digest(*(getattr(run, name).tobytes() for name in columns(Trajectory)))
+            first, same = known.setdefault(identity, (file / name, numbers))
+            if numbers != same:
+                problems.append(f"{first} and {file / name} hold the same run with different numbers")
+            if first == file / name:
+                rows.append(_row(run, first.relative_to(directory)))
     if problems:
         more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
         raise StorageError("; ".join(problems[:NAMED]) + more)
@@ -161,6 +179,20 @@ def collect(directory: Path, output: Path) -> int:
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
     return len(rows)
+
+
+def _digest(*parts: bytes) -> bytes:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
+    return digest.digest()
+
+
+def _check_collection(output: Path) -> None:
+    """Raise `StorageError` if what is to be overwritten isn't the collection of the last time."""
+    with reading(output) as file:
+        if file.attrs.get("schema") != SCHEMA:
+            raise StorageError("it holds runs to be gathered, and can't be the output, too")
 
 
 def _attributes() -> dict[str, dict[str, Any]]:

@@ -161,7 +161,7 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
         def interrupted() -> None:
             check()
             if stop():
-                raise KeyboardInterrupt
+                raise InterruptedError("interrupted")
 
         (run,) = carry_out([task], interrupted)
         failure = run.header.failure

@@ -5,25 +5,32 @@ Both are executors of `concurrent.futures`, and `Workers` says what else a campa
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
-from types import FrameType
 from typing import Any, Self, TypeVar
 
 from model import InputError, StorageError
+from model.files import leave
 from model.parameters import Range, check_number
 
 T = TypeVar("T")
 Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 """A function that is called like `map`."""
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""Ctrl-C, and what clusters send."""
+LONGEST = 120.0
+"""Processor time that judging a claim or drawing a figure may take, s: a hundred times what most take. What files say
+may be nonsense that takes years."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
 
@@ -112,7 +119,21 @@ class _Pool(ProcessPoolExecutor):
         super().__init__(count, mp_context=context, initializer=_follow, initargs=(self._end,))
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        return super().submit(_work, fn, *args, **kwargs)
+        with _deaf():  # as the workers are that it may start: they have no handlers before they have imported much
+            return super().submit(_work, fn, *args, **kwargs)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Signals that end a program wait, and processes started here never get to know of them."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 _between = threading.Lock()
@@ -137,9 +158,12 @@ def _follow(end: Connection) -> None:
         parent = parent_process()
         if parent and parent.is_alive():
             _between.acquire()
-        os._exit(1)
+        leave(1)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda number, frame: leave(1))  # by the pool, where another worker died
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     threading.Thread(target=wait, daemon=True).start()
 
 
@@ -161,6 +185,8 @@ def dask(address: str) -> Workers:
         from distributed import Client, KilledWorker
     except ImportError as error:
         raise InputError("--scheduler needs Dask: pip install distributed") from error
+    for name in ("distributed", "distributed.client"):  # what they log with a traceback we say in a line
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
@@ -178,17 +204,34 @@ def dask(address: str) -> Workers:
 
 
 @contextmanager
-def interrupts() -> Iterator[Callable[[], bool]]:
-    """A function that says whether Ctrl-C was pressed; only the second Ctrl-C raises `KeyboardInterrupt`."""
-    pressed = False
-
-    def press(number: int, frame: FrameType | None) -> None:
-        nonlocal pressed
-        pressed = True
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, press)
+def threads(count: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads that an error doesn't wait for: they end by themselves, and what they still do is of no use."""
+    pool = ThreadPoolExecutor(count)
     try:
-        yield lambda: pressed
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+@contextmanager
+def at_most(limit: float) -> Iterator[None]:
+    """Raise `TimeoutError` once more than `limit` s of processor time have passed, and again where that is caught.
+
+    In the main thread of a process, where signals arrive; elsewhere, and on Windows, there is no limit.
+    """
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def late(*_: object) -> None:
+        raise TimeoutError(f"it took longer than {limit:g} s")
+
+    before = signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, limit, 0.1)
+    try:
+        yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)

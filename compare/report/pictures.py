@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from compare.kit.drawing import Drawing, GapError
 from compare.kit.tasks import sources
+from compare.kit.workers import LONGEST, at_most
 from model import StorageError
 from model.files import write_text
 
@@ -40,11 +41,12 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
     """
     path, drawing, data = new
     try:
-        figure, caption = drawing.draw(data)
+        with at_most(LONGEST):
+            figure, caption = drawing.draw(data)
         picture = svg(figure)
         described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
         write_text(path, described + _mark(drawing, data))
-    except (GapError, StorageError) as error:
+    except (GapError, StorageError, TimeoutError) as error:
         return {"gap": str(error)}
     return {"picture": address(picture + _mark(drawing, data)), "caption": caption}
 

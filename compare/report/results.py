@@ -19,7 +19,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Records, Testimony
 from compare.kit.statistics import plain
 from model.errors import StorageError
-from model.files import make_directory, reading_json, write_text
+from model.files import check_ours, make_directory, reading_json, write_text
 from model.trajectory import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
@@ -110,6 +110,7 @@ def open_directory(directory: Path) -> None:
     Raises `StorageError` if the directory can't be written or holds results of another version of the program.
     """
     make_directory(directory)
+    check_ours(directory / REPORT, beside=directory / SUMMARY)
     make_directory(directory / RUNS)
     if (directory / SUMMARY).exists():
         load(directory)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import importlib
+import io
 import itertools
 import math
 import os
@@ -31,9 +32,9 @@ from scipy.spatial.transform import Rotation
 from compare.kit import style
 from compare.kit.style import BALL, FORCE, INK, SLIP
 from mjsim import ContactSettings, scene
-from model import Case, InputError, StorageError, Trajectory
+from model import Case, InputError, Trajectory
 from model.arrays import Array
-from model.files import check_writable
+from model.files import check_writable, write_bytes
 from model.kinematics import frame, slip_velocities, to_world
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
 from model.trajectory import columns
@@ -82,12 +83,13 @@ def write(
     Raises `InputError` for what can't be shown, or on a machine without OpenGL; `StorageError` if the file can't be
     written.
     """
-    if output.suffix not in (".png", ".gif"):
+    kind = output.suffix.lower()
+    if kind not in (".png", ".gif"):
         raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif")
     check_writable(output)
     if len(run.time) == 0:
         raise InputError("the run has no samples to show")
-    film, end = output.suffix == ".gif", float(run.time[-1])
+    film, end = kind == ".gif", float(run.time[-1])
     name, begin, width = ("from", start, width or 640) if film else ("time", end if at is None else at, width or 960)
     check_number(name, begin, "s", Range(float(run.time[0]), end), "to be within the run it")
     check_number("width", width, "pixels", WIDTHS)
@@ -114,10 +116,9 @@ def write(
         all_ = itertools.chain([first], images)
         first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in all_)
         options = {"save_all": True, "append_images": rest, "duration": round(1000 / rate), "loop": 0}
-    try:
-        first.save(output, **options)
-    except OSError as error:
-        raise StorageError(f"cannot write {output}: {error.strerror or error}") from error
+    out = io.BytesIO()
+    first.save(out, kind[1:], **options)
+    write_bytes(output, out.getvalue())
     return f"{output}: {len(times)} frames" if film else f"{output}: {width} × {first.height}"
 
 

@@ -5,15 +5,18 @@ import itertools
 import json
 import math
 import os
+import signal
+import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate, thresholds
+from analytic import Settings, simulate, simulate_many, thresholds
+from analytic.simulation.ensemble import random_starts
 from analytic.simulation.simulator import slip_perturbation
-from model import Case, Contact, InputError, Parameters
+from model import Case, Contact, Flow, InputError, Parameters, SimulationError
 
 P = Parameters.named("reference")
 METHODS = ("event", "time-stepping")
@@ -198,8 +201,8 @@ def test_bad_input_is_refused(arguments, message):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_interruption_keeps_what_there_is(method, monkeypatch):
-    """Ctrl-C in the middle of the equations: the samples so far, and a header that says where it stopped."""
+def test_interruption_is_raised(method, monkeypatch):
+    """Ctrl-C in the middle of the equations: no run that could be taken for a whole one comes back."""
     name = {
         "event": "analytic.mechanics.dynamics.newton_euler",
         "time-stepping": "analytic.simulation.stepping.advance",
@@ -215,11 +218,54 @@ def test_interruption_keeps_what_there_is(method, monkeypatch):
     wrapped = getattr(importlib.import_module(module), attribute)
     monkeypatch.setattr(name, stop)
     p = P.replace(omega_0=25.0)
-    run = simulate(p, [0, 0, 13.8, -4, 0.5, 10], 4.0, method=method, timestep=1e-3, sample_interval=1e-3)
-    assert not run.complete
-    assert run.header.failure.startswith("interrupted at t = ")
+    with pytest.raises(KeyboardInterrupt):
+        simulate(p, [0, 0, 13.8, -4, 0.5, 10], 4.0, method=method, timestep=1e-3, sample_interval=1e-3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_run_that_progress_ends_carries_its_samples(method):
+    def enough(done):
+        if done > 0.3:
+            raise InterruptedError("enough")
+
+    p, x0 = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10]
+    with pytest.raises(SimulationError, match=r"stopped at t = .* s: enough") as stopped:
+        simulate(p, x0, 40.0, Flow.sine(25, 1, 1), method=method, sample_interval=1e-2, progress=enough)
+    run = stopped.value.trajectory
+    assert run.header.failure == str(stopped.value)
     assert 0 < len(run.time) < 4001
     assert np.all(np.diff(run.time) > 0)
+
+
+@pytest.mark.parametrize(("flow", "says"), [(None, "1/omega_0 = 1e-09 s"), (Flow.sine(5, 1, 1e9), "1/(2 pi f) = ")])
+def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
+    """It would take hours; the first moments of it don't."""
+    p = P.replace(omega_0=1e9)
+    for method in METHODS:
+        with pytest.raises(InputError, match="t_end = 1 s is out of range: ") as refused:
+            simulate(p, [0] * 6, 1.0, flow, method=method)
+        assert says in str(refused.value)
+        assert simulate(p, [0] * 6, 1e-8, flow, method=method).complete
+    with pytest.raises(InputError, match="t_end = 1 s is out of range: "):
+        simulate_many(p, [0] * 6, 1.0, flow)
+
+
+def test_interrupting_many_runs_ends_those_under_way():
+    """Hours of them, and days without numba: the threads must not be waited for."""
+    p, alarm = Parameters.named("hopping"), signal.getsignal(signal.SIGALRM)
+    simulate_many(p, [0] * 8, 0.1, threads=1)  # is compiled
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            simulate_many(p, random_starts(p, 4, 0), 1e6, sample_interval=1e3, threads=2)
+    finally:
+        signal.signal(signal.SIGALRM, alarm)
+    assert threading.active_count() == 1
 
 
 @pytest.mark.parametrize(("flow", "grows"), [(1.2, False), (0.8, True)])

@@ -20,19 +20,9 @@ from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
+from tests.commands import COMMANDS, NEEDED, parser_of, refused
 
 ROOT = Path(cli.__file__).parents[2]
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """The one line in which a command refuses its arguments."""
-    code = cli.main([str(arg) for arg in argv])
-    captured = capsys.readouterr()
-    assert code == 2
-    assert captured.out == ""
-    assert captured.err.startswith("dualball: error: ")
-    assert captured.err.count("\n") == 1
-    return captured.err
 
 
 def test_predict_says_what_the_ball_does_and_what_ends_the_operating_range(capsys: pytest.CaptureFixture[str]) -> None:
@@ -200,6 +190,7 @@ import os, signal, sys
 from compare.commands import cli, simulate
 from compare.kit import tasks
 from mjsim.journal import Journal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts what runs in the background without
 tasks.LONG, stop_after = 1000, int(sys.argv[1])
 tasks.Journal = lambda directory: Journal(directory, interval=0.0)
 store, stored = tasks.store, 0
@@ -265,13 +256,6 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(name in shown for name in ("prop-1", "prop-4"))
 
 
-def parser_of(command: str) -> options.Parser:
-    return cli._parser([command])._subparsers._group_actions[0].choices[command]
-
-
-COMMANDS = [name for group in cli.GROUPS.values() for name in group]
-
-
 def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_example(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -299,16 +283,6 @@ def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_exampl
     assert not lacking
 
 
-NEEDED = {
-    "basins": "--across y=0:1:2 --up h=0:0.01:2",
-    "collect": "runs",
-    "compare": "run.h5 run.h5",
-    "design": "meter.toml",
-    "inspect": "run.h5",
-    "render": "run.h5 -o film.gif",
-    "sweep": "--vary eta=0.1,0.2 --time 0.01 --workers 0",
-}
-"""What a command can't do without."""
 NUMBERS = ("x", "nan", "inf", "-1", "0", "1e300", "1e-300", "1" * 400)
 
 
@@ -326,9 +300,8 @@ def drawn(command: str) -> Iterator[list[str]]:
             bad += ["1e300"] if action.dest in ("ramp", "staircase", "sine") else []
             values += [[text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in bad]
         else:
-            values.append(
-                ["file/absent.h5" if action.type in (Path, options.written, options.hdf5) else "no such thing"]
-            )
+            of_file = action.type in (Path, options.results) or isinstance(action.type, options.Output)
+            values.append(["file/absent.h5" if of_file else "no such thing"])
         if action.dest == "start":
             values += [[f"omega_c={text}"] for text in ("x", "nan", "1e300", "")]
         yield from ([*option, *value] for value in values)
@@ -379,7 +352,7 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("predict --j 0.7", "argument --j: 0.7 is out of range: it must be > 0 and <= 2/3"),
         ("predict --nu-f -1e-6", "argument --nu-f: -1e-06 m²/s is out of range: it must be >= 0"),
         ("predict --omega-0 1e155", "omega_0 = 1e+155 rad s-1 is out of range"),
-        ("predict --R -inf", "argument --R: -inf m is out of range: it must be > 0"),
+        ("predict --R -inf", "argument --R: -inf m is out of range: it must be finite and > 0"),
         ("simulate --ramp 1 -2e0 -1E-3", "duration = -0.001 s is out of range"),
         ("simulate --start slip=3", "unknown state variable 'slip' (did you mean 'slip_z'?)"),
         ("simulate --start omega_c=fast", "omega_c = 'fast' must be a number in rad s-1"),
@@ -390,11 +363,15 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("simulate --engine event --timestep 0.1", "drake-defaults, siconos, siconos-defaults, not for event"),
         ("simulate --restitution 0.5", "--restitution is for event, time-stepping, not for mujoco"),
         ("simulate --engine event --restitution 1.5", "restitution = 1.5 is out of range"),
-        ("simulate --flow broken.toml", "broken.toml has no line with a time and a value"),
+        ("simulate --flow broken.toml", "broken.toml, line 1: no column is called time; there are 'm', '='"),
         ("simulate --omega-0 5 --ramp 1 2 3", "--omega-0 is for a steady flow, and can't be given beside --ramp"),
         ("figures --results absent", "cannot read absent: there is no such directory"),
         ("simulate --longest-interval 3", "--longest-interval is for --flow"),
         ("sweep --vary omega_0=30:10:5", "omega_0 = 30:10 rad s-1 is in the wrong order"),
+        ("sweep --vary omega_0=10:30", "here omega_0 needs values: write omega_0=from:to:count or omega_0=a,b,c"),
+        ("sweep --vary omega_0=10:30 --direction up", "here omega_0 needs values"),
+        ("attractors --vary eta=0.1:0.2", "here eta needs values"),
+        ("basins --across y=0:1 --up h=0:0.01:2", "here y needs values"),
         ("sweep --vary omega0=10:30:5", "unknown parameter 'omega0' (did you mean 'omega_0'?)"),
         ("sweep --vary omega_0=10:30:2.5", "count of omega_0 = 2.5 points is out of range"),
         ("sweep --vary omega_0=1:2:1000000000", "count of omega_0 = 1e+09 points is out of range: must be a whole"),
@@ -415,6 +392,12 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("search --range mu=2", "write mu=from:to"),
         ("search --range mu=-1:1", "mu = -1"),
         ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
+        ("predict --mu inf", "argument --mu: inf is out of range: it must be finite and >= 0"),
+        ("basins --across y=0:1:2 --up y=0:1:3", "across and up are both y: a plane needs two state variables"),
+        ("basins --across y=0:1:2 --up h=0:99:2 -o new/map", "h = 99 m is out of range"),
+        ("grade -o card.md", "'card.md' would hold an HTML page: its name must end in .html or .htm"),
+        ("search --save found.toml", "'found.toml' would hold JSON: its name must end in .json"),
+        ("sweep --vary eta=1,2 -o all.h5", "'all.h5' would be a directory, but its name is that of a file"),
         ("league --engine mujco", "did you mean 'mujoco'?"),
         ("grade nowhere.xml", "there is no such file"),
         ("grade --engine event", "event has no time step"),

@@ -1,5 +1,6 @@
 """Collections: varied parameters as coordinates, and what can't be gathered is named."""
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -14,7 +15,7 @@ from compare.kit import sweep
 from compare.kit.campaign import Campaign
 from compare.kit.tasks import Task
 from model import Parameters, StorageError, storage
-from model.files import column, dataset, reading
+from model.hdf5 import column, dataset, reading
 
 P = Parameters.named("reference")
 OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
@@ -78,14 +79,17 @@ def test_theory_stands_beside_what_was_measured(tmp_path: Path) -> None:
         np.testing.assert_array_equal(np.isnan(data.y_theory), [False, True])
 
 
-def test_the_same_run_twice_is_refused_by_name(runs: Path, tmp_path: Path) -> None:
-    first = min(runs.glob("*.h5"))
-    (key,) = storage.load_runs(first)
-    (runs / "copies").mkdir()
-    shutil.copy(first, runs / "copies" / "copy.h5")
+def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ(runs: Path, tmp_path: Path) -> None:
+    first, copy = min(runs.glob("*.h5")), runs / "copies" / "copy.h5"
+    ((key, run),) = storage.load_runs(first).items()
+    copy.parent.mkdir()
+    shutil.copy(first, copy)
+    assert sweep.collect(runs, tmp_path / "all.h5") == 6
+    storage.save_batch({key: dataclasses.replace(run, y=run.y + 1e-300)}, copy)
+    (tmp_path / "all.h5").unlink()
     with pytest.raises(StorageError) as caught:
         sweep.collect(runs, tmp_path / "all.h5")
-    assert str(caught.value) == f"{runs / 'copies' / 'copy.h5' / key} and {first / key} hold the same run"
+    assert str(caught.value) == f"{copy / key} and {first / key} hold the same run with different numbers"
     assert not (tmp_path / "all.h5").exists()
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import analytic
+from compare import testing
 from compare.commands import cli
 from compare.kit import record, sweep
 from compare.kit.levels import Level
@@ -19,7 +20,7 @@ from compare.kit.record import Missing, Records
 from compare.report import results
 from compare.view import inspection
 from model import InputError, Parameters, State, StorageError, storage
-from model.files import seal
+from model.hdf5 import seal
 from tests.measured import measured
 
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
@@ -262,3 +263,72 @@ def test_nothing_in_a_file_is_followed(
         dict(outside(secret))[way](file)
     assert cli.main(["inspect", str(tmp_path / "run.h5")]) == 2
     assert "'y'" in capsys.readouterr().err
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    """A motion as another program keeps it, without a checksum."""
+    path = tmp_path / "foreign.h5"
+    with h5py.File(path, "w") as file:
+        file["time"], file["omega_c"] = np.linspace(0.0, 1.0, 51), np.linspace(10.0, 11.0, 51)
+    return path
+
+
+def compared(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """The line in which `compare` refuses a file."""
+    assert cli.main(["compare", str(path), str(path)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"dualball: error: cannot read {path}: ")
+    assert err.count("\n") == 1
+    return err
+
+
+@pytest.mark.parametrize("way", ["virtual", "link", "external"])
+def test_nothing_in_a_file_of_another_program_is_followed(
+    tmp_path: Path, foreign: Path, capsys: pytest.CaptureFixture[str], way: str
+) -> None:
+    secret = tmp_path / "secret.h5"
+    with h5py.File(secret, "w") as file:
+        file["x"] = np.arange(51.0)
+    assert cli.main(["compare", str(foreign), str(foreign)]) == 0
+    capsys.readouterr()
+    with h5py.File(foreign, "r+") as file:
+        dict(outside(secret))[way](file)
+    assert "'y'" in compared(foreign, capsys)
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (
+            {"shape": (4_000_000_000,), "dtype": float, "chunks": (1000,)},
+            "'y' has 4e+09 samples, and 1e+07 are the most",
+        ),
+        ({"data": ["a", "b"]}, "'y' is no column of numbers"),
+        ({"data": np.ones((51, 3))}, "'y' is no column of numbers"),
+        ({"data": 1.0}, "'y' is no column of numbers"),
+    ],
+)
+def test_what_is_no_column_is_said(
+    foreign: Path, capsys: pytest.CaptureFixture[str], made: dict[str, Any], says: str
+) -> None:
+    with h5py.File(foreign, "r+") as file:
+        file.create_dataset("y", **made)
+    assert foreign.stat().st_size < 20_000
+    assert says in compared(foreign, capsys)
+
+
+@ENOUGH
+def test_a_damaged_file_of_another_program_is_read_or_refused_in_a_line(
+    tmp_path: Path, foreign: Path, count: int
+) -> None:
+    good, rng, path, refused = foreign.read_bytes(), np.random.default_rng(5), tmp_path / "bad.h5", []
+    for _ in range(count):
+        path.write_bytes(mutated(good, rng))
+        try:
+            testing.read(path)
+        except InputError as error:
+            refused.append(str(error))
+    assert len(refused) > count / 10
+    assert all(str(path) in message and "\n" not in message for message in refused)

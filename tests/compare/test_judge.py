@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 import tests.measured
+from compare import validation
 from compare.claim import Bearing, Claim, Outcome, Text
 from compare.judge import judge, select, theory
 from compare.kit.quantities import quantity
@@ -125,3 +128,23 @@ def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
     assert mine.passed
     of_the_study = [replace(m, set="reference") for m in measured(P.omega_0, FINE).measurements]
     assert not judge([false], Records(tuple(of_the_study)))[0].passed
+
+
+def test_judging_a_claim_takes_no_longer_than_it_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the files say; what is asked of theory afterwards comes too late as well."""
+
+    def endless() -> None:
+        while True:
+            pass
+
+    def hear(of: Claim, testimony: object) -> None:
+        with pytest.raises(TimeoutError):
+            endless()
+        endless()
+
+    monkeypatch.setattr(validation, "LONGEST", 0.1)
+    monkeypatch.setattr(validation, "hear", hear)
+    monkeypatch.setattr(validation, "stored", lambda directory: {})
+    told = validation._judged(tmp_path, 0)
+    assert (told["outcome"], told["error"]) == (Outcome.ERROR, "it took longer than 0.1 s")
+    time.sleep(0.3)  # the clock has stopped

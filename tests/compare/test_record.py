@@ -11,7 +11,7 @@ import xarray
 from compare.kit import record
 from compare.kit.record import Measurement, Missing, Records
 from model import InputError, Parameters, StorageError
-from model.files import seal
+from model.hdf5 import seal
 from tests.measured import measured
 
 P = Parameters.named("reference")

@@ -83,8 +83,11 @@ def test_bad_flows(make, says: str) -> None:
         "t in s; omega_0\n0; 5\n1; 6\n4; 0\n\n",
         "# measured\n0 5\n1\t6  # late\n4 0",
         '\ufeff"time","omega_0"\r\n"0","5"\r\n1,6\r\n4,0\r\n',
+        "omega_0 [rad/s],time (s)\n5,0\n6,1\n0,4\n",
+        "no;ω₀ in rad/s;t;valve\n1;5,0;0,0;open\n2;6;1;open\n3;0,0;4,00;shut\n",
+        "0,0\t5,0\n1\t6\n4,0\t0\n",
     ],
-    ids=["plain", "semicolons", "white space", "spreadsheet"],
+    ids=["plain", "semicolons", "white space", "spreadsheet", "turned round", "decimal commas", "tabs"],
 )
 def test_measured(tmp_path: Path, text: str) -> None:
     (tmp_path / "flow.csv").write_text(text, "utf-8")
@@ -108,6 +111,12 @@ def test_measured(tmp_path: Path, text: str) -> None:
         ("0,5\nnan,6\n", "line 2: time = nan s must be finite"),
         ("# logger\n0,5\n1,6\n2,6\n2.5,5\n13,6\n", "line 6: a gap of 10.5 s from t = 2.5 s on; usual are 1 s, and"),
         ("time,omega_0\n", "no line with a time"),
+        ("time (ms),rpm\n0,5\n", r"line 1: 'time \(ms\)': time must be in s, not in ms"),
+        ("time,omega_0 [rpm]\n0,5\n", "line 1: .* must be in rad/s, not in rpm"),
+        ("time,speed\n0,5\n", "line 1: no column is called omega_0; there are 'time', 'speed'"),
+        ("t,omega_0,time\n0,5,0\n", "line 1: time is given twice"),
+        ("no,time,omega_0\n0,5\n", "line 2: needs 3 values, as the head, but has 2"),
+        ("time,omega_0\n0,5,12,3\n", "line 2: .* but has 4; with decimal commas, separate them by semicolons"),
         ("", "no line with a time"),
     ],
 )

@@ -1,6 +1,7 @@
 import dataclasses
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import xarray
 
 import model.trajectory
 from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage
-from model.files import seal, write_text
+from model.files import write_text
+from model.hdf5 import seal
 from model.trajectory import SAMPLE, columns
 
 
@@ -127,6 +129,30 @@ def test_a_run_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
 
     with pytest.raises(ZeroDivisionError):
         break_off()
+    assert list(tmp_path.iterdir()) == []
+
+
+FULL = """
+import resource, sys
+from tests.model.test_storage import make
+from model import StorageError, storage
+path, hard = sys.argv[1], resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+for size in (0, 40, 900, 3000, 20_000, 60_000, 90_000):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    for write in (lambda: storage.save(make(2000), path), lambda: storage.save_batch({"a": make(400)}, path)):
+        try:
+            write()
+        except StorageError as error:
+            print(error)
+"""
+
+
+def test_a_disk_that_fills_at_any_moment(tmp_path: Path) -> None:
+    """In a process of its own, since HDF5 might crash it; a limit on the size of files plays the disk."""
+    program, here = [sys.executable, "-c", FULL, str(tmp_path / "run.h5")], Path(__file__).parents[2]
+    answer = subprocess.run(program, cwd=here, capture_output=True, text=True, check=True)
+    assert answer.stderr == ""
+    assert answer.stdout.splitlines() == [f"cannot write {tmp_path / 'run.h5'}: File too large"] * 14
     assert list(tmp_path.iterdir()) == []
 
 

@@ -220,7 +220,7 @@ def simulate(
                     keep(done - NOTED, last=False)
                     told = done
                     progress(done / total)
-        except BreakdownError as error:
+        except (BreakdownError, InterruptedError) as error:
             failure = f"{error} by t = {done * settings.timestep:g} s"
     keep(told, last=True)
     given = {"t_end": float(t_end), "sample_interval": every * settings.timestep, "x0": list(x), "theta_0": 0.0}

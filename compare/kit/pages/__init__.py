@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,6 +23,21 @@ def readable(unit: str) -> str:
     for written, read in (" s-2", "/s²"), (" s-1", "/s"), (" m-3", "/m³"), ("s-1", "1/s"), ("rad-1", "1/rad"):
         unit = unit.replace(written, read)
     return unit.replace("m2", "m²").replace("rad2", "rad²")
+
+
+_SIGNS = {"√": "sqrt ", "±": "+-", "×": "x", "–": "-", "—": "-", "·": "*", "≈": "~", "≤": "<=", "≥": ">="}
+
+
+def spelled(error: UnicodeError) -> tuple[str, int]:
+    """An error handler of `codecs`: Greek letters as their names, digits and letters without what sets them apart."""
+    assert isinstance(error, UnicodeEncodeError)
+    shown = []
+    for letter in error.object[error.start : error.end]:
+        name = unicodedata.name(letter, "?").split()
+        greek = name[-1].capitalize() if "CAPITAL" in name else name[-1].lower()
+        plain = _SIGNS.get(letter) or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
+        shown.append(greek if name[0] == "GREEK" else plain or "?" * (not unicodedata.combining(letter)))
+    return "".join(shown), error.end
 
 
 def render(package: str, template: str, **values: Any) -> str:

@@ -269,9 +269,11 @@ def basins(
     Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
     """
     check_names((*start, across.name, up.name), VARIABLES, "state variable")
+    if across.name == up.name:
+        raise InputError(f"across and up are both {up.name}: a plane needs two state variables")
     if p.c == 0:
         raise InputError("c = 0 1/s: without drag a ball doesn't settle, and there are no basins")
-    x, y, lasts = np.array(across.values), np.array(up.values), 10.0 / p.c
+    x, y, lasts = np.array(across.points), np.array(up.points), 10.0 / p.c
     base = np.array(State(**start))
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]

@@ -1,0 +1,32 @@
+"""The commands as tests draw from them: their parsers, what they need, and how they refuse."""
+
+import pytest
+
+from compare.commands import cli, options
+
+COMMANDS = [name for group in cli.GROUPS.values() for name in group]
+NEEDED = {
+    "basins": "--across y=0:1:2 --up h=0:0.01:2",
+    "collect": "runs",
+    "compare": "run.h5 run.h5",
+    "design": "meter.toml",
+    "inspect": "run.h5",
+    "render": "run.h5 -o film.gif",
+    "sweep": "--vary eta=0.1,0.2 --time 0.01 --workers 0",
+}
+"""What a command can't do without."""
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
+    """The one line in which a command refuses its arguments."""
+    code = cli.main([str(arg) for arg in argv])
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.out == ""
+    assert captured.err.startswith("dualball: error: ")
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def parser_of(command: str) -> options.Parser:
+    return cli._parser([command])._subparsers._group_actions[0].choices[command]

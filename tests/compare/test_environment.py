@@ -1,0 +1,113 @@
+"""The program in environments that are not a developer's: encodings, backends, closed and full outputs, no home."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import analytic
+from compare.kit import pages
+from model import Parameters, storage
+
+ROOT = Path(__file__).parents[2]
+SCENE = """<mujoco><worldbody><geom name="Tür" type="plane" size="1 1 .1"/>
+<body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with a run, whose name has a space and letters beyond ASCII."""
+    made = tmp_path_factory.mktemp("mit Öl ω")
+    storage.save(analytic.simulate(Parameters.named("reference"), [0] * 6, 0.1), made / "run é.h5")
+    return made
+
+
+def dualball(where: Path, *words: str, before: str = "", **environment: str) -> subprocess.CompletedProcess[bytes]:
+    """The program in a shell, after redirections; without what pytest's own environment says of output."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "LC_", "LANG"))}
+    shell = ["bash", "-c", f'"$@" {before}', "bash", sys.executable, "-m", "compare", *words]
+    done = subprocess.run(
+        shell, cwd=where, env=kept | {"PYTHONPATH": str(ROOT)} | environment, capture_output=True, timeout=120
+    )
+    assert b"Traceback" not in done.stdout + done.stderr, done.stderr
+    assert b"Exception ignored" not in done.stderr
+    return done
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-16"])
+def test_any_encoding(here: Path, encoding: str) -> None:
+    done = dualball(here, "predict", PYTHONIOENCODING=encoding)
+    assert done.returncode == 0
+    shown = done.stdout.decode(encoding)
+    assert ("omega01" in shown) is (encoding != "utf-16")
+
+
+def test_what_cannot_be_shown_is_spelled() -> None:
+    def shown(text: str, encoding: str) -> str:
+        return "".join(pages.spelled(UnicodeEncodeError(encoding, text, k, k + 1, ""))[0] for k in range(len(text)))
+
+    assert shown("ω₀₁Ωω̃²√±…é", "ascii") == "omega01Omegaomega2sqrt +-...e"
+    assert shown("\udcff✓", "ascii") == "??"
+
+
+@pytest.mark.parametrize("backend", ["nonsense", "module://matplotlib_inline.backend_inline", "tkagg"])
+def test_any_backend(here: Path, backend: str) -> None:
+    done = dualball(here, "inspect", "run é.h5", "--plot", "run ü.png", MPLBACKEND=backend)
+    assert done.returncode == 0
+    assert (here / "run ü.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("words", ["predict", "--help", "--version"])
+def test_a_full_output_is_said(here: Path, words: str) -> None:
+    done = dualball(here, words, before=">/dev/full")
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert done.stderr.startswith(b"dualball: error: ")
+    assert done.stderr.endswith(b"No space left on device\n")
+    assert done.stderr.count(b"\n") == 1
+
+
+def test_a_reader_that_has_gone_is_no_error(here: Path) -> None:
+    done = dualball(here, "predict", before="| true; exit ${PIPESTATUS[0]}")
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
+def test_closed_outputs_take_nothing_with_them(here: Path, closed: str) -> None:
+    """A file that is opened next would have their numbers, and what a library prints would go into it."""
+    path = here / "closed.h5"
+    assert dualball(here, "simulate", "--time", "0.05", "-o", str(path), before=closed).returncode == 0
+    assert storage.load(path).complete
+    assert dualball(here, "predict", "--nonsense", before=closed).returncode == 2
+
+
+@pytest.mark.parametrize("home", [{"HOME": "/nonexistent"}, {"HOME": ""}])
+def test_no_home(here: Path, home: dict[str, str]) -> None:
+    assert dualball(here, "inspect", "run é.h5", "--plot", "home.svg", **home).returncode == 0
+
+
+def test_a_directory_in_which_nothing_can_be_written() -> None:
+    """Not even by the superuser."""
+    where = Path("/proc")
+    assert dualball(where, "simulate", "--start", "omega_c=1e9", "--time", "0.05").returncode == 1
+    for words in ("sweep --vary eta=0.1,0.2", "simulate -o run.h5", "figures"):
+        done = dualball(where, *words.split())
+        assert done.returncode == 2
+        assert done.stderr.startswith(b"dualball: error: ")
+        assert b"cannot write" in done.stderr
+        assert done.stderr.count(b"\n") == 1
+
+
+def test_names_beyond_ascii_in_the_c_locale(here: Path) -> None:
+    (here / "Würfel.xml").write_text(SCENE, "utf-8")
+    done = dualball(here, "forecast", "Würfel.xml", "-o", "Würfel.html", LC_ALL="C")
+    assert done.returncode == 0, done.stderr
+    assert "Würfel.xml" in (here / "Würfel.html").read_text("utf-8")
+    strict = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}  # as Python takes it only if it is told to
+    for words in ("simulate --time 0.05 -o läuft.h5", "inspect läuft.h5"):
+        done = dualball(here, *words.split(), **strict)
+        assert done.returncode == 0, done.stderr
+    assert storage.load(here / "läuft.h5").complete
+    done = dualball(here, "inspect", "weg ä.h5", **strict)
+    assert (done.returncode, done.stderr.count(b"\n")) == (2, 1)

@@ -1,0 +1,139 @@
+"""Nothing of a user's is overwritten, and what can't be written leaves nothing behind: drawn over all commands."""
+
+import resource
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import analytic
+from compare.commands import cli, options
+from compare.kit import sweep
+from compare.kit.campaign import Campaign
+from compare.kit.tasks import Task
+from model import Parameters, StorageError, storage
+from tests.commands import COMMANDS, NEEDED, parser_of, refused
+
+P = Parameters.named("reference")
+
+
+def outputs() -> Iterator[tuple[str, str, options.Output]]:
+    """Every command with each of its options that names a file to be written."""
+    for command in COMMANDS:
+        for action in parser_of(command)._actions:
+            if isinstance(action.type, options.Output):
+                yield command, action.option_strings[-1], action.type
+
+
+def reading(command: str, file: Path) -> list[str]:
+    """A command line that reads a file."""
+    dests = [action.dest for action in parser_of(command)._actions]
+    for option in ("kept", "parameters"):
+        if option in dests:
+            return [command, *NEEDED.get(command, "").split(), f"--{option}", str(file)]
+    return [command, str(file), *NEEDED.get(command, "run.h5").split()[1:]]
+
+
+OUTPUTS = pytest.mark.parametrize(("command", "option", "kind"), list(outputs()))
+
+
+@OUTPUTS
+def test_an_output_that_is_read_is_refused(
+    command: str, option: str, kind: options.Output, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By its own name, by one that leads elsewhere, or by a link."""
+    for suffix in kind.suffixes:
+        mine, soft, hard = (tmp_path / f"{name}{suffix}" for name in ("mine", "soft", "hard"))
+        mine.write_text("mine")
+        soft.symlink_to(mine)
+        hard.hardlink_to(mine)
+        for output in (mine, tmp_path / ".." / tmp_path.name / mine.name, soft, hard):
+            assert "is read and would be lost" in refused(capsys, *reading(command, mine), option, output)
+        assert {path.read_text() for path in (mine, soft, hard)} == {"mine"}
+        assert soft.is_symlink()
+
+
+@OUTPUTS
+def test_an_output_whose_name_promises_something_else_is_refused(
+    command: str, option: str, kind: options.Output, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A model, a set, a program, or what another option writes."""
+    names = {f"mine{suffix}" for suffix in {".xml", ".toml", ".csv", ".py", "", *options.SUFFIXES} - {*kind.suffixes}}
+    for name in names:
+        (tmp_path / name).write_text("mine")
+        said = refused(capsys, *reading(command, tmp_path / "other"), option, tmp_path / name)
+        assert f"would hold {kind.what}: its name must end in {kind.suffixes[0]}" in said
+        assert (tmp_path / name).read_text() == "mine"
+    assert {path.name for path in tmp_path.iterdir()} == names
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with a run, and one of two runs."""
+    made = tmp_path_factory.mktemp("whole")
+    storage.save(analytic.simulate(P, [0] * 6, 0.1), made / "run.h5")
+    with Campaign(made / "runs", workers=0, batch=1) as campaign:
+        campaign.complete(Task(engine="event", parameters=p, x0=[0] * 6, t_end=0.1) for p in (P, P.replace(mu=0.3)))
+    return made
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "simulate --engine event --time 0.1 -o new.h5",
+        "collect runs -o new.h5",
+        "inspect run.h5 --plot new.png",
+        "inspect run.h5 --plot new.pdf",
+        "inspect run.h5 --plot run.svg",
+        "compare run.h5 run.h5 -o new.svg",
+        "attractors --set hopping --start omega_c=20 --time 0.1 --page new.md",
+        "basins --across omega_c=1:2:2 --up y=0:0.01:2 --workers 0 --quiet -o new/map --save new.json",
+        "cases -o new/cases",
+        "sweep --vary eta=0.1,0.2 --time 0.01 --workers 0 --quiet -o new/runs",
+        "search --sets 1 --starts 1 --workers 0 --quiet -o new",
+    ],
+)
+def test_a_full_disk_leaves_nothing_behind(
+    words: str, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nor does it touch what was there; a limit on the size of files plays the disk that is full."""
+    monkeypatch.chdir(shutil.copytree(whole, tmp_path / "here"))
+    Path("run.svg").write_text("mine")
+    before = {path: path.is_file() and path.read_bytes() for path in Path().rglob("*")}
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
+    try:
+        assert "File too large" in refused(capsys, *words.split())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert {path: path.is_file() and path.read_bytes() for path in Path().rglob("*")} == before
+
+
+def test_runs_are_not_gathered_into_one_of_themselves(whole: Path, tmp_path: Path) -> None:
+    runs = shutil.copytree(whole / "runs", tmp_path / "runs")
+    one, link = min(runs.glob("*.h5")), tmp_path / "link.h5"
+    before = one.read_bytes()
+    link.symlink_to(one)
+    for output in (one, link):
+        with pytest.raises(StorageError, match="can't be the output, too"):
+            sweep.collect(runs, output)
+    assert one.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [("cases", "README.md"), ("league --engine event --workers 1", "league.html"), ("validate", "report.html")],
+)
+def test_a_page_of_somebody_else_is_left_alone(
+    command: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).write_text("mine")
+    assert f"{name} is not of this program" in refused(capsys, *command.split(), "-o", tmp_path)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_cases_are_written_again(tmp_path: Path) -> None:
+    for _ in range(2):
+        assert cli.main(["cases", "-o", str(tmp_path)]) == 0
+    assert (tmp_path / "README.md").exists()

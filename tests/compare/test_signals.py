@@ -1,0 +1,141 @@
+"""Ctrl-C and SIGTERM end every command at any moment, with one line, and leave nothing that is half written."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import analytic
+from compare.kit import record
+from compare.kit.levels import Level
+from compare.kit.record import Records
+from compare.report import results
+from model import Parameters, storage
+from tests.commands import COMMANDS
+from tests.measured import measured
+
+ROOT = Path(__file__).parents[2]
+LONG = {
+    "validate": "--quick --set reference --claim prop-1",
+    "figures": "--format svg --format png --format pdf",
+    "simulate": "--omega-0 25 --time 2e4 -o new.h5",
+    "inspect": "run.h5 --plot new.png",
+    "compare": "run.h5 run.h5 -o new.png",
+    "sweep": "--vary eta=0.1:0.5:20 --time 1e3 --workers 2",
+    "collect": "runs -o new.h5",
+    "attractors": "--set hopping --starts 1000",
+    "basins": "--across omega_c=0:150:21 --up slip_x=-900:900:21 --workers 2",
+    "search": "--workers 2",
+    "design": "meter.toml -o new.html",
+    "render": "run.h5 -o new.gif",
+    "forecast": "scene.xml --try",
+    "grade": "-o new.html",
+    "cases": "-o cases",
+    "league": "--engine event --engine mujoco --workers 2",
+}
+"""What takes each command long."""
+METER = """
+fluid = {nu_f = 1e-6, rho_f = 1000}
+flow = {slowest = 2, fastest = 40}
+bounds = {r = [2e-3, 8e-3], R = [2e-2, 8e-2], mu = 0.1, eta = 0.1, rho_b = 7800}
+"""
+SCENE = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
+<body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with what commands read."""
+    made = tmp_path_factory.mktemp("whole")
+    for name in ("runs", "results/measurements"):
+        (made / name).mkdir(parents=True)
+    storage.save(analytic.simulate(Parameters.named("reference").replace(omega_0=25.0), [0] * 6, 5.0), made / "run.h5")
+    shutil.copy(made / "run.h5", made / "runs" / "run.h5")
+    (made / "meter.toml").write_text(METER)
+    (made / "scene.xml").write_text(SCENE)
+    file = made / "results" / "measurements" / "settled.h5"
+    record.save(Records((measured("settled", "omega_c", 11.9, 1e-9, case="RR"),)), file, {})
+    summary = results.Summary.of(made / "results", [], Level.QUICK, {"mujoco": {1: [file]}})
+    results.save(summary, made / "results")
+    return made
+
+
+def catches(process: subprocess.Popen[str], number: int) -> bool:
+    """Whether it has a handler for a signal, or has ended."""
+    try:
+        status = Path(f"/proc/{process.pid}/status").read_text()
+    except FileNotFoundError:
+        return True
+    caught = next((line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), "f" * 16)
+    return bool(int(caught, 16) >> (number - 1) & 1)
+
+
+def end(command: str, number: signal.Signals, after: float, here: Path) -> None:
+    """Send a signal so many seconds after the first moment at which the program can answer.
+
+    To all that belongs to it, as a terminal and a cluster do; but to it alone while it may be importing MuJoCo, whose
+    window library asks a Python of its own for its version.
+    """
+    before = set(here.rglob("*"))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "compare", command, *LONG.get(command, "").split()],
+        cwd=here,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # a shell starts what it runs in the background with SIGINT ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    while not catches(process, signal.SIGTERM):
+        time.sleep(0.001)
+    time.sleep(after)
+    running = process.poll() is None
+    try:
+        (os.killpg if after > 2 else os.kill)(process.pid, number)
+    except ProcessLookupError:
+        running = False
+    out, err = process.communicate(timeout=60)
+    said = [line for line in err.splitlines() if line.startswith("dualball")]
+    assert "Traceback" not in out + err, err
+    assert "leaked" not in err
+    if running and process.returncode not in (0, -number):  # it may just have been done
+        assert process.returncode == 128 + number, (command, err)
+        assert len(said) == 1, err
+        assert "interrupted" in said[0] or "was stopped at t =" in said[0]
+        assert not out or command in ("simulate", "validate", "figures", "judge"), out
+    new = set(here.rglob("*")) - before
+    assert not [path for path in new if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))]
+
+
+BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+
+
+@BOTH
+def test_every_command_ends_while_it_begins(whole: Path, tmp_path: Path, number: signal.Signals) -> None:
+    """Python and packages are being loaded: no traceback of theirs."""
+    here = shutil.copytree(whole, tmp_path / "here")
+    for command in COMMANDS:
+        end(command, number, 0.0, here)
+
+
+@BOTH
+@pytest.mark.parametrize("command", ["attractors", "search"])
+def test_work_ends(whole: Path, tmp_path: Path, command: str, number: signal.Signals) -> None:
+    end(command, number, 3.0, shutil.copytree(whole, tmp_path / "here"))
+
+
+@pytest.mark.slow
+@BOTH
+@pytest.mark.parametrize("after", [0.2, 0.5, 1.5, 4.0, 10.0])
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "view"])
+def test_every_command_ends_at_any_moment(
+    whole: Path, tmp_path: Path, command: str, after: float, number: signal.Signals
+) -> None:
+    end(command, number, after, shutil.copytree(whole, tmp_path / "here"))
