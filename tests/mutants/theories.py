@@ -200,6 +200,8 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "ω₀₂ 0.5 % high": answer(entries(omega_02=times(1.005))),
         "ω₀₃ 0.5 % high": answer(entries(omega_03=times(1.005))),
         "ω₀₄ 0.5 % high": answer(entries(omega_04=times(1.005))),
+        "ω₀₃ doubled": answer(entries(omega_03=times(2.0))),
+        "ω₀₄ doubled": answer(entries(omega_04=times(2.0))),
         "a fold below η_cr": answer(_fold_everywhere),
         "ω₀₄ as under Stokes' drag": given(_by_stokes),
     },
@@ -218,7 +220,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
             lambda p: {name: w / np.sqrt(1 - p.density_ratio) for name, w in vars(bifurcation.thresholds(p)).items()}
         )
     },
-    "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04)},
+    "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04), "η_cr four times as large": scaled(4.0)},
     "bifurcation.diagram.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
     "bifurcation.diagram.wall_spin": {
         "spin on the wall about the ball's own radius": lambda right: lambda x, p: right(x, p) - x.omega_c,
