@@ -366,6 +366,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "simulation.transitions.collide": {
         "landings rebound by a tenth": lambda right: lambda at, p, w, e, *rest: right(at, p, w, 0.1, *rest),
         "landings with 5 % more floor friction": given(other(mu=1.05)),
+        "rebounds with nine tenths of the restitution": lambda right: (
+            lambda at, p, w, e, *rest: right(at, p, w, 0.9 * e, *rest)
+        ),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
     "simulation.charts._at_wall": {
