@@ -18,7 +18,8 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
+from operator import or_
 from statistics import median
 
 import numpy as np
@@ -115,19 +116,18 @@ def _heard(
         limits = [(_allowed(check, by.allowance), math.nan) for check in found[max(found)]]
     else:
         limits = [limit for row in _aligned(found, finest) if (limit := _limit(row, ends))]
-    wanted = Counter(n for n, _ in shared) | Counter({check.bearing for check in trial})
-    for own in found.values():
-        wanted |= rows(own)
+    most = reduce(or_, map(rows, found.values()))
+    wanted = most | Counter(n for n, _ in shared) | Counter({check.bearing for check in trial})
     checks, orders = tuple(check for check, _ in limits), [order for _, order in limits if math.isfinite(order)]
-    usual = (c for n, own in found.items() for c in own if by.allowance or _step(c, n) == USUAL_STEP)
+    measured = [(c, coarse_step(c.measurement.parameters) / n) for n, own in found.items() for c in own]
     return Witness(
         engine=by.name,
         outcome=outcome(claim, checks, wanted),
         reason=_too_few(claim, checks, wanted, missing),
         checks=checks,
         order=median(orders) if orders else math.nan,
-        deviations=_deviations(usual),
-        left_out=sum(each.rows for each in missing) + wanted.total() - len(checks),
+        deviations=_deviations(c for c, step in measured if by.allowance or step == USUAL_STEP),
+        left_out=sum(each.rows for each in missing) + most.total() - len(checks),
     )
 
 
@@ -139,11 +139,6 @@ def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missin
     counts = {f"{quantity(bearing.quantity).symbol} {count}" for bearing, count in few.items()}
     gone = [str(each) for each in missing if each.protocol in {bearing.protocol for bearing in few}]
     return "; ".join([f"too few numbers can tell: {', '.join(sorted(counts))}", *gone[:3]])
-
-
-def _step(check: Check, refine: int) -> float:
-    """The time step with which a number was measured, s."""
-    return coarse_step(check.measurement.parameters) / refine
 
 
 def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
