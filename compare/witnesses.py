@@ -133,12 +133,14 @@ def _heard(
 
 def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]) -> str:
     """Of which bearings too few numbers can tell, and what was not measured of these; empty if it is so of none."""
-    few = {claim.bearings[n]: f"{told} of {wanted[n]}" for n, told in sorted(lacking(checks, wanted).items())}
-    if not few:
+    if not (few := lacking(checks, wanted)):
         return ""
-    counts = {f"{quantity(bearing.quantity).symbol} {count}" for bearing, count in few.items()}
-    gone = [str(each) for each in missing if each.protocol in {bearing.protocol for bearing in few}]
-    return "; ".join([f"too few numbers can tell: {', '.join(sorted(counts))}", *gone[:3]])
+    symbols: dict[str, list[str]] = {}
+    for n, told in sorted(few.items()):
+        symbols.setdefault(f"{told} of {wanted[n]}", []).append(quantity(claim.bearings[n].quantity).symbol)
+    counts = " and ".join(f"{count} in {', '.join(dict.fromkeys(those))}" for count, those in symbols.items())
+    gone = [str(each) for each in missing if each.protocol in {claim.bearings[n].protocol for n in few}]
+    return "; ".join([f"too few numbers can tell: {counts}", *gone[:3]])
 
 
 def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:

@@ -129,7 +129,7 @@ def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
     steps = {n: seen(0.0, "mujoco-plain", slip_x=100.0 * (n == 1), slip_y=100.0 * (n == 2)) for n in (1, 2, 3)}
     (plain,) = hear(CLAIM, {"mujoco-plain": steps}).witnesses
     assert (plain.outcome, plain.left_out) == (Outcome.INCONCLUSIVE, 1)
-    assert plain.reason == "too few numbers can tell: ω_c 0 of 1"
+    assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c"
 
 
 @pytest.mark.parametrize(("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)])
@@ -145,7 +145,7 @@ def test_who_was_asked_and_measured_nothing_is_undecided_and_says_why():
     assert said.outcome is Outcome.CONFIRMED
     _, plain, defaults = said.witnesses
     assert (plain.outcome, defaults.outcome) == (Outcome.INCONCLUSIVE, Outcome.NOT_ASKED)
-    assert plain.reason == "too few numbers can tell: ω_c 0 of 1; mine: nothing settles"
+    assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c; mine: nothing settles"
     assert defaults.reason == "at this level nothing that bears on the claim was asked of it; another: nothing settles"
 
 
