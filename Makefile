@@ -26,7 +26,7 @@ help:
 mutants: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet
 	$(BIN)/dualball validate --quiet -o results/default
-	$(BIN)/python -m tests.mutants results results/default --whole --engines --least 0.95 --page docs/mutants.md
+	$(BIN)/python -m tests.mutants results results/default --whole --engines --witness mujoco-plain --least 0.95 --page docs/mutants.md
 
 test: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist loadfile

@@ -8,9 +8,10 @@ the paper's text had to be corrected, or holds formally only, is another matter:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
+from statistics import median
 from typing import Any
 
 from compare.kit.levels import Level
@@ -77,6 +78,11 @@ class Bearing:
     def __post_init__(self) -> None:
         quantity(self.quantity)
 
+    @property
+    def number(self) -> bool:
+        """Whether it predicts a number, and not a case, a count, or on which side of a bound something is."""
+        return quantity(self.quantity).resolves > 0 and self.relation is Relation.EQUAL
+
 
 @dataclass(frozen=True)
 class Claim:
@@ -123,18 +129,31 @@ class Witness:
     engine: str
     outcome: Outcome
     reason: str = ""
-    """Why it was not asked, or could not be judged."""
+    """Why it was not asked, or leaves the claim undecided."""
     checks: tuple[Check, ...] = ()
     """In the limit of no time step, where the engine is judged so."""
     order: float = math.nan
     """Median of the orders in the time step with which the numbers converge; nan where the step shows nothing."""
-    typical: float = math.nan
-    """Median of the deviations divided by their scales at MuJoCo's own step of 2 ms, or of an engine that is judged at
-    one step at that; nan where none was measured so."""
-    worst: float = math.nan
-    """The largest of these."""
+    deviations: tuple[float, ...] = ()
+    """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them: at MuJoCo's own step
+    of 2 ms, or of an engine that is judged at one step at that."""
     left_out: int = 0
-    """Measurements that its protocols left out, or that it has not with every time step."""
+    """Measurements that its protocols left out, or that have no limit."""
+
+    @property
+    def typical(self) -> float:
+        """Median of the deviations; nan where there are none."""
+        return median(self.deviations) if self.deviations else math.nan
+
+    @property
+    def worst(self) -> float:
+        """The largest deviation; nan where there are none."""
+        return max(self.deviations, default=math.nan)
+
+    @property
+    def resolving_power(self) -> Mapping[str, float]:
+        """As that of a verdict."""
+        return resolving_power(self.checks)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,15 +188,23 @@ class Verdict:
     @property
     def resolving_power(self) -> Mapping[str, float]:
         """By quantity, the smallest relative error of theory that every conclusive check would notice."""
-        power: dict[str, float] = {}
-        fine = {check.measurement.quantity for check in self.checks if check.conclusive}
-        for check in self.checks:
-            name = check.measurement.quantity
-            if name not in ("case", "cases") and (check.conclusive or name not in fine):
-                power[name] = max(power.get(name, 0.0), check.resolves)
-        return power
+        return resolving_power(self.checks)
 
     @property
     def worst(self) -> float:
         """Largest deviation divided by its tolerance; inf where theory knows no such state."""
         return max((check.share for check in self.checks), default=math.nan)
+
+
+def resolving_power(checks: Sequence[Check]) -> dict[str, float]:
+    """By quantity, the smallest relative error of theory that every conclusive check would notice.
+
+    That of all checks where none is conclusive.
+    """
+    power: dict[str, float] = {}
+    fine = {check.measurement.quantity for check in checks if check.conclusive}
+    for check in checks:
+        name = check.measurement.quantity
+        if name not in ("case", "cases") and (check.conclusive or name not in fine):
+            power[name] = max(power.get(name, 0.0), check.resolves)
+    return power

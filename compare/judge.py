@@ -61,8 +61,9 @@ def forget() -> None:
 def verdict(claim: Claim, records: Records) -> Verdict:
     """Predict, compare, and say what the numbers say.
 
-    Refuted if one check deviates beyond its tolerance; else inconclusive if of a quantity fewer than half of the checks
-    are fine enough to tell; else confirmed. A check that is too coarse confirms nothing, and is counted apart.
+    Refuted if one check deviates beyond its tolerance; else inconclusive if of a bearing fewer than half of the checks
+    are fine enough to tell; else not run if the claim predicts numbers and has none, since counts confirm no number;
+    else confirmed. A check that is too coarse confirms nothing, and is counted apart.
     Whatever a prediction raises makes the verdict an error of this claim alone.
     """
     left_out = Counter[Missing]()
@@ -71,31 +72,42 @@ def verdict(claim: Claim, records: Records) -> Verdict:
             left_out[replace(each, rows=0)] += each.rows
     missing = tuple(replace(each, rows=rows) for each, rows in left_out.most_common())
     try:
-        checks = tuple(claim.algebra()) if claim.algebra else tuple(check for _, check in checks_of(claim, records))
+        checks = tuple(claim.algebra() if claim.algebra else checks_of(claim, records))
     except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
     if not checks and not missing and (known := {m.protocol for m in records.measurements} & claim.protocols):
         missing = tuple(Missing(name, "all", "no number bears on the claim", 0) for name in sorted(known))
-    return Verdict(claim=claim, outcome=outcome(checks), checks=checks, missing=missing)
+    return Verdict(claim=claim, outcome=outcome(claim, checks, rows(checks)), checks=checks, missing=missing)
 
 
-def outcome(checks: Sequence[Check]) -> Outcome:
-    """What checks come to, see `verdict`; nothing is run where there are none."""
-    told = Counter(check.measurement.quantity for check in checks if check.conclusive)
-    if not checks:
-        return Outcome.NOT_RUN
+def outcome(claim: Claim, checks: Sequence[Check], wanted: Counter[int]) -> Outcome:
+    """What checks come to, see `verdict`, of so many as are wanted of each bearing."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
-    if any(2 * told[name] < count for name, count in Counter(c.measurement.quantity for c in checks).items()):
+    if lacking(checks, wanted):
         return Outcome.INCONCLUSIVE
+    numbers = {n for n, bearing in enumerate(claim.bearings) if bearing.number}
+    if not checks or (numbers and numbers.isdisjoint(rows(checks))):
+        return Outcome.NOT_RUN
     return Outcome.CONFIRMED
 
 
-def checks_of(claim: Claim, records: Records) -> list[tuple[int, Check]]:
-    """Every measurement that bears on a claim beside its prediction, with the number of its bearing."""
+def rows(checks: Iterable[Check]) -> Counter[int]:
+    """How many checks there are of each bearing, by its number."""
+    return Counter(check.bearing for check in checks)
+
+
+def lacking(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
+    """Bearings of which fewer than half of the checks that are wanted can tell, and how many can."""
+    told = rows(check for check in checks if check.conclusive)
+    return {n: told[n] for n, count in wanted.items() if 2 * told[n] < count}
+
+
+def checks_of(claim: Claim, records: Records) -> list[Check]:
+    """Every measurement that bears on a claim beside its prediction."""
     return [
-        (n, check(bearing, m))
+        replace(check(bearing, m), bearing=n)
         for n, bearing in enumerate(claim.bearings)
         for m in records.select(bearing.protocol, bearing.quantity, bearing.when)
     ]

@@ -107,8 +107,9 @@ def validate(
             elif lab.engine is engines[0]:  # a protocol that breaks down takes its own claims with it, and no others
                 broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
             else:
-                why = Missing(protocol.name, "all", f"{name}: {type(found).__name__}: {found}")
-                testimony[lab.engine.name][lab.refine] += Records(missing=(why,))
+                why = f"{name}: {type(found).__name__}: {found}"
+                lost = tuple(Missing(protocol.name, each, why) for each in sets or protocol.measures(lab))
+                testimony[lab.engine.name][lab.refine] += Records(missing=lost)
             judge_what_is_there()
     verdicts = {name: future.result() for name, future in judged.items()}
     files = {

@@ -15,19 +15,22 @@ its scale, `Engine.allowance`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
+from functools import partial, reduce
+from operator import or_
 from statistics import median
 
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
 from compare.claim import Claim, Outcome, Verdict, Witness
-from compare.judge import checks_of, outcome, verdict
+from compare.judge import checks_of, lacking, outcome, rows, verdict
 from compare.kit.engines import Engine, engine
 from compare.kit.lab import coarse_step, time_unit
 from compare.kit.quantities import quantity
-from compare.kit.record import Check, Measurement, Records, Relation, Testimony
+from compare.kit.record import Check, Measurement, Missing, Records, Relation, Testimony
 from compare.kit.statistics import COVERAGE, Measured
 from model.arrays import Array
 from model.kinematics import VARIABLES, state_units
@@ -59,7 +62,6 @@ LOWEST_ORDER = 0.75
 as the root of the step. (Chosen after that had been seen, at one threshold of 115.)"""
 LEAST_STEPS = 3
 """Time steps with which a number must have been measured to have a limit."""
-NO_LIMIT = f"nothing was measured with three time steps, and more than {MARGIN:.0%} from any threshold"
 Step = tuple[int, Check]
 """A check, and the time steps in one that its protocol asks for."""
 
@@ -67,74 +69,85 @@ Step = tuple[int, Check]
 def hear(claim: Claim, testimony: Testimony) -> Verdict:
     """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
     (name, steps), *others = testimony.items()
-    measured = steps[max(steps)].select("thresholds", where=lambda m: m.quantity.startswith("omega_0"))
-    ends = {(m.set, m.value) for m in measured}
-    beside = [_heard(claim, engine(other), own, ends) for other, own in others]
+    measured = steps[max(steps)]
+    if claim.algebra:
+        formal = partial(Witness, outcome=Outcome.NOT_ASKED, reason="formal: theory against theory")
+        return replace(verdict(claim, measured), witnesses=tuple(formal(engine=each) for each in testimony))
+    thresholds = measured.select("thresholds", where=lambda m: m.quantity.startswith("omega_0"))
+    ends = {(m.set, m.value) for m in thresholds}
     if len(steps) == 1 and not engine(name).allowance:
-        said = verdict(claim, next(iter(steps.values())))
-        return replace(said, witnesses=(_heard(claim, engine(name), steps, ends, said), *beside))
-    first = _heard(claim, engine(name), steps, ends)
-    said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
+        said = verdict(claim, measured)
+        first = Witness(
+            engine=name,
+            outcome=Outcome.NOT_ASKED if said.outcome is Outcome.NOT_RUN else said.outcome,
+            reason=said.error,
+            checks=said.checks,
+            deviations=_deviations(said.checks),
+            left_out=said.left_out,
+        )
+    else:
+        first = _heard(claim, engine(name), steps, ends)
+        said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
+    beside = (_heard(claim, engine(other), own, ends, first.checks) for other, own in others)
     return replace(said, witnesses=(first, *beside))
 
 
 def _heard(
-    claim: Claim, by: Engine, steps: Mapping[int, Records], ends: Set[tuple[str, float]], said: Verdict | None = None
+    claim: Claim, by: Engine, steps: Mapping[int, Records], ends: Set[tuple[str, float]], trial: Sequence[Check] = ()
 ) -> Witness:
-    """What an engine says, from its verdict where it has one of its own; `ends` are thresholds measured on sets."""
-    if said and said.error:
-        return Witness(engine=by.name, outcome=Outcome.ERROR, reason=said.error)
+    """What an engine says; `ends` are thresholds measured on sets, `trial` the checks of the engine on trial.
+
+    Of a bearing it should have as many numbers as with any of its steps, and where the engine on trial has some, one,
+    or one for each set that was asked of both.
+    """
+    asked = [(each, n) for n, own in sorted(steps.items()) for each in own.rows if each.protocol in claim.protocols]
+    finest = {each.protocol: n for each, n in asked}
+    missing = [each for each, n in asked if isinstance(each, Missing) and finest[each.protocol] == n]
     try:
-        if claim.algebra:
-            found = {}
-        elif said:
-            found = {max(steps): [(0, check) for check in said.checks]}
-        else:
-            found = {refine: checks_of(claim, records) for refine, records in steps.items()}
+        found = {n: checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
         return Witness(engine=by.name, outcome=Outcome.ERROR, reason=f"{type(error).__name__}: {error}")
-    asked = [
-        ({each.protocol for rows in (own.measurements, own.missing) for each in rows}, n) for n, own in steps.items()
-    ]
-    last = {name: max((n for names, n in asked if name in names), default=0) for name in claim.protocols}
-    missing = [each for n, own in steps.items() for each in own.missing if last.get(each.protocol) == n]
-    if not found or not any(found.values()):
-        reason = "formal: theory against theory" if claim.algebra else ""
-        dear = f"{', '.join(sorted(claim.protocols))} cost more than this level spends on it (the default one may)"
-        dear = "only settled states are asked of an engine as it comes" if by.allowance else dear
-        reason = reason or next((f"nothing measured: {each}" for each in missing), dear)
-        return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason)
-    usual = [
-        abs(check.deviation / check.scale)
-        for refine, own in found.items()
-        for _, check in own
-        if quantity(check.measurement.quantity).resolves and check.relation is Relation.EQUAL
-        if check.scale > 10 * check.tolerance
-        if by.allowance
-        or len(steps) == 1
-        or math.isclose(coarse_step(check.measurement.parameters) / refine, USUAL_STEP)
-    ]
-    usual = [each for each in usual if math.isfinite(each)]
-    order, left_out = math.nan, sum(each.rows for each in missing)
+    places = {(each.protocol, each.set) for each, _ in asked}
+    shared = {(c.bearing, c.measurement.set) for c in trial if (c.measurement.protocol, c.measurement.set) in places}
+    if not shared and not any(found.values()):
+        reasons = ["at this level nothing that bears on the claim was asked of it", *map(str, missing[:3])]
+        return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason="; ".join(reasons))
     if by.allowance:
-        checks = [_allowed(check, by.allowance) for _, check in found[max(found)]]
-    elif len(steps) == 1:
-        checks = [check for _, check in found[max(found)]]
+        limits = [(_allowed(check, by.allowance), math.nan) for check in found[max(found)]]
     else:
-        every = [None if _marginal(row[-1][1].measurement, ends) else _limit(row) for row in _aligned(found, last)]
-        limits = [limit for limit in every if limit]
-        checks, orders = [check for check, _ in limits], [p for _, p in limits if math.isfinite(p)]
-        order, left_out = median(orders) if orders else math.nan, left_out + len(every) - len(limits)
+        limits = [limit for row in _aligned(found, finest) if (limit := _limit(row, ends))]
+    most = reduce(or_, map(rows, found.values()))
+    wanted = most | Counter(n for n, _ in shared) | Counter({check.bearing for check in trial})
+    checks, orders = tuple(check for check, _ in limits), [order for _, order in limits if math.isfinite(order)]
+    measured = [(c, coarse_step(c.measurement.parameters) / n) for n, own in found.items() for c in own]
     return Witness(
         engine=by.name,
-        outcome=outcome(checks) if checks else Outcome.INCONCLUSIVE,
-        reason="" if checks else "; ".join([NO_LIMIT, *map(str, missing[:3])]),
-        checks=tuple(checks),
-        order=order,
-        typical=median(usual) if usual else math.nan,
-        worst=max(usual, default=math.nan),
-        left_out=left_out,
+        outcome=outcome(claim, checks, wanted),
+        reason=_too_few(claim, checks, wanted, missing),
+        checks=checks,
+        order=median(orders) if orders else math.nan,
+        deviations=_deviations(c for c, step in measured if by.allowance or step == USUAL_STEP),
+        left_out=sum(each.rows for each in missing) + most.total() - len(checks),
     )
+
+
+def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]) -> str:
+    """Of which bearings too few numbers can tell, and what was not measured of these; empty if it is so of none."""
+    if not (few := lacking(checks, wanted)):
+        return ""
+    symbols: dict[str, list[str]] = {}
+    for n, told in sorted(few.items()):
+        symbols.setdefault(f"{told} of {wanted[n]}", []).append(quantity(claim.bearings[n].quantity).symbol)
+    counts = " and ".join(f"{count} in {', '.join(dict.fromkeys(those))}" for count, those in symbols.items())
+    gone = [str(each) for each in missing if each.protocol in {claim.bearings[n].protocol for n in few}]
+    return "; ".join([f"too few numbers can tell: {counts}", *gone[:3]])
+
+
+def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
+    """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them."""
+    numbers = (c for c in checks if quantity(c.measurement.quantity).resolves and c.relation is Relation.EQUAL)
+    off = (abs(c.deviation / c.scale) for c in numbers if c.scale > 10 * c.tolerance)
+    return tuple(each for each in off if math.isfinite(each))
 
 
 def _allowed(check: Check, share: float) -> Check:
@@ -143,12 +156,13 @@ def _allowed(check: Check, share: float) -> Check:
     return check if exact else replace(check, tolerance=share * check.scale, ceiling=2 * share)
 
 
-def _aligned(found: Mapping[int, Sequence[tuple[int, Check]]], last: Mapping[str, int]) -> Iterator[list[Step]]:
-    """The checks with the finest step of their protocol, `last`, each after those of the same with coarser ones."""
+def _aligned(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) -> Iterator[list[Step]]:
+    """The checks with the finest step of their protocol, each after those of the same with coarser ones."""
 
-    def kind(bearing: int, m: Measurement) -> tuple[object, ...]:
+    def kind(check: Check) -> tuple[object, ...]:
+        m = check.measurement
         texts = sorted((k, v) for k, v in m.conditions.items() if isinstance(v, str))
-        return m.protocol, bearing, m.set, m.quantity, *texts
+        return m.protocol, check.bearing, m.set, *texts
 
     def place(m: Measurement) -> dict[str, float]:
         numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
@@ -157,16 +171,16 @@ def _aligned(found: Mapping[int, Sequence[tuple[int, Check]]], last: Mapping[str
 
     groups: dict[int, dict[tuple[object, ...], list[Check]]] = {n: {} for n in sorted(found)}
     for n, group in groups.items():
-        for bearing, check in found[n]:
-            group.setdefault(kind(bearing, check.measurement), []).append(check)
-    for n, key, finest in [(n, key, own) for n, group in groups.items() for key, own in group.items()]:
-        p, names = finest[0].measurement.parameters, sorted(place(finest[0].measurement))
-        if n != last[finest[0].measurement.protocol]:
+        for check in found[n]:
+            group.setdefault(kind(check), []).append(check)
+    for n, key, last in [(n, key, own) for n, group in groups.items() for key, own in group.items()]:
+        p, names = last[0].measurement.parameters, sorted(place(last[0].measurement))
+        if n != finest[last[0].measurement.protocol]:
             continue
         natural = dict(zip(VARIABLES, state_units(p), strict=True))
         natural |= dict.fromkeys(("frequency", "decay_rate"), 1 / time_unit(p))
-        here = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in finest])
-        rows: list[list[Step]] = [[] for _ in finest]
+        here = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in last])
+        steps: list[list[Step]] = [[] for _ in last]
         for coarser, others in [(m, group[key]) for m, group in groups.items() if m < n and key in group]:
             there = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in others])
             largest = np.maximum(np.abs(here).max(axis=0), np.abs(there).max(axis=0))
@@ -174,33 +188,29 @@ def _aligned(found: Mapping[int, Sequence[tuple[int, Check]]], last: Mapping[str
             apart = np.abs((here[:, None] - there[None]) / size).max(axis=2)
             for i, k in zip(*linear_sum_assignment(apart), strict=True):
                 if apart[i, k] <= NEAR:
-                    rows[i].append((coarser, others[k]))
-        yield from ([*row, (n, check)] for row, check in zip(rows, finest, strict=True))
+                    steps[i].append((coarser, others[k]))
+        yield from ([*row, (n, check)] for row, check in zip(steps, last, strict=True))
 
 
-def _marginal(m: Measurement, ends: Set[tuple[str, float]]) -> bool:
-    """Whether a settled state is so near a threshold that the step may decide on its case."""
-    flow = m.parameters.omega_0
-    return m.protocol in ("settled", "hysteresis") and any(
-        abs(flow - end) < MARGIN * end for name, end in ends if name == m.set
-    )
-
-
-def _limit(there: Sequence[Step]) -> tuple[Check, float] | None:
+def _limit(there: Sequence[Step], ends: Set[tuple[str, float]] = frozenset()) -> tuple[Check, float] | None:
     """A check in the limit of no step, and the order found, nan where the step shows nothing.
 
-    None where it wasn't measured with three steps.
+    None where it wasn't measured with three steps, or of a state so near a threshold that the step may decide on its
+    case.
     """
     last = there[-1][1]
-    m, scale = last.measurement, last.scale or 1.0
+    m, scale, p = last.measurement, last.scale or 1.0, last.measurement.parameters
     wanted = quantity(m.quantity).resolves
+    if m.protocol in ("settled", "hysteresis") and any(
+        abs(p.omega_0 - end) < MARGIN * end for name, end in ends if name == m.set
+    ):
+        return None
     if wanted == 0 or (math.isnan(last.predicted) and len(there) >= LEAST_STEPS):
         return last, math.nan  # what is counted, or unknown to theory, has no limit but what the finest step says
     errors = np.array([(each.measurement.value - each.predicted) / (each.scale or 1.0) for _, each in there])
     own = np.array([each.measurement.uncertainty / (each.scale or 1.0) for _, each in there])
     if len(there) < LEAST_STEPS or not np.all(np.isfinite(errors)):
         return None
-    p = m.parameters
     shortest = min(time_unit(p), 1 / abs(p.omega_0) if p.omega_0 else math.inf)
     value, order = extrapolated(coarse_step(p) / shortest / np.array([n for n, _ in there], float), errors, own)
     ceiling = max(wanted, min(CEILING * wanted, COARSEST))

@@ -110,17 +110,18 @@ def line(verdict: Verdict) -> Text:
         parts.append(Text(str(verdict.missing[0]), "dim"))
     for each in (witness for witness in verdict.witnesses[1:] if witness.outcome is not Outcome.NOT_ASKED):
         kind, mark = wording.MARKS[each.outcome]
-        parts.append(Text.assemble(f"{each.engine} ", (f"{mark} {each.outcome}", _STYLES[kind])))
+        parts.append(Text.assemble(f"{each.engine} ", (f"{mark} {wording.said(each)}", _STYLES[kind])))
     return shown.append(Text("; ").join(parts))
 
 
 def summary(verdicts: Sequence[Verdict]) -> Text:
     """How many claims and numbers came out how."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
-    said = "; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))])
-    shown = Text(f"{said}. {wording.missing(ran)}".strip(), "bold")
+    counts = "; ".join(map(" ".join, wording.totals(ran)))
+    shown = Text(f"{wording.headline(ran)}: {counts}. {wording.missing(ran)}".strip(), "bold")
     for each in (each for each in wording.witnesses(ran) if each["asked"] != "0"):
-        counts = f"{each['confirmed']} of {each['asked']} claims confirmed, {len(each['refuted'])} refuted"
+        counts = f"{each['confirmed']} of {each['asked']} claims confirmed (to {each['to']}), "
+        counts += f"{len(each['refuted'])} refuted, {each['open']} undecided"
         off = f"typical deviation {each['typical']}, worst {each['worst']}"
         shown.append(f"\n{each['engine']} ({each['title']}): {counts}; {off}", "not bold")
     return shown

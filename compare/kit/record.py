@@ -130,6 +130,8 @@ class Check:
     relation: Relation = Relation.EQUAL
     ceiling: float | None = None
     """What it may overlook, where that isn't what its quantity says."""
+    bearing: int = 0
+    """Number of the bearing of its claim that chose it."""
 
     @property
     def deviation(self) -> float:
@@ -195,6 +197,11 @@ class Records:
 
     def __add__(self, other: Records) -> Records:
         return Records(self.measurements + other.measurements, self.missing + other.missing)
+
+    @property
+    def rows(self) -> tuple[Measurement | Missing, ...]:
+        """All of it."""
+        return (*self.measurements, *self.missing)
 
     def select(
         self, protocol: str, quantity: str | None = None, where: Callable[[Measurement], bool] = lambda m: True

@@ -94,7 +94,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
     return pages.render(
         "compare.report",
         "report.html",
-        title=f"{sum(verdict.passed for verdict in ran)} of {len(ran)} claims as expected",
+        title=f"{len(ran)} claims: {', '.join(map(' '.join, wording.kinds(ran)))}",
         headline=wording.headline(ran),
         missing=wording.missing(ran),
         lead=f"A ball rolls and slips round inside a cylinder. {lead}",

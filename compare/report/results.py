@@ -97,6 +97,7 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
     about["witnesses"] = {
         each.engine: {name: getattr(each, name) for name in ("outcome", "reason", "order", "left_out")}
         | {"checks": len(each.checks), "worst": max((check.share for check in each.checks), default=math.nan)}
+        | {"resolving_power": dict(each.resolving_power)}
         | {"deviation_at_2ms": {"typical": each.typical, "worst": each.worst}}
         for each in verdict.witnesses
     }

@@ -82,18 +82,36 @@ def findings(verdict: Verdict) -> dict[str, str]:
         found = {"Largest deviation": "none: all equal" if check.agrees else f"not equal: {where}"}
     elif math.isnan(check.predicted):
         found = {"Largest deviation": f"theory knows no such state: {where}"}
-    alike: dict[str, list[str]] = {}
-    for name, power in verdict.resolving_power.items():
-        if quantity(name).resolves:
-            alike.setdefault(f"{power:.1g}", []).append(SYMBOLS[name])
-    if alike:
-        powers = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
-        found["Would notice"] = f"a relative error of {powers}"
+    if errors := noticed(verdict.resolving_power):
+        found["Would notice"] = errors
     if coarse := sum(not each.conclusive for each in verdict.checks):
         found["Too coarse to tell"] = str(coarse)
     if verdict.left_out:
         found["Left out by its protocols"] = str(verdict.left_out)
     return found
+
+
+def noticed(powers: Mapping[str, float]) -> str:
+    """Which errors of theory would be noticed, from the resolving power by quantity; empty where all are counts."""
+    alike: dict[str, list[str]] = {}
+    for name, power in powers.items():
+        if quantity(name).resolves:
+            alike.setdefault(f"{power:.1g}", []).append(SYMBOLS[name])
+    errors = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
+    return f"a relative error of {errors}" if errors else ""
+
+
+def coarsest(witness: Witness) -> float:
+    """The coarsest resolving power of a quantity; nan where all are counts."""
+    return max((power for name, power in witness.resolving_power.items() if quantity(name).resolves), default=math.nan)
+
+
+def said(witness: Witness) -> str:
+    """The outcome of an engine beside the one on trial, and to what relative error it confirms."""
+    if witness.outcome is not Outcome.CONFIRMED:
+        return witness.outcome
+    power = coarsest(witness)
+    return f"{witness.outcome} to {power:.0e}" if math.isfinite(power) else f"{witness.outcome} by counts"
 
 
 def heard(witness: Witness) -> str:
@@ -104,7 +122,9 @@ def heard(witness: Witness) -> str:
     at = f"; at 2 ms typically off by {percent(witness.typical)}, at most {percent(witness.worst)}"
     left_out = f"; {witness.left_out} not measured" if witness.left_out else ""
     numbers = f" on {len(witness.checks)} numbers" if witness.checks else ""
-    return f"{witness.outcome}{numbers}{order}{at if math.isfinite(witness.worst) else ''}{left_out}"
+    errors = f"; would notice {found}" if (found := noticed(witness.resolving_power)) else ""
+    off, why = at if math.isfinite(witness.worst) else "", f"; {witness.reason}" if witness.reason else ""
+    return f"{witness.outcome}{numbers}{order}{errors}{off}{left_out}{why}"
 
 
 def percent(share: float) -> str:
@@ -120,12 +140,16 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
         counts = Counter(each.outcome for _, each in own)
         refuted = {v.claim.id: v.claim.expected is Outcome.REFUTED for v, w in own if w.outcome is Outcome.REFUTED}
         off = [each for _, each in own if math.isfinite(each.typical)]
+        powers = [coarsest(each) for _, each in own if each.outcome is Outcome.CONFIRMED]
+        known = [power for power in powers if math.isfinite(power)]
         row = {
             "engine": name,
             "title": ENGINES[name].title or name,
             "about": ENGINES[name].about,
             "asked": str(len(own) - counts[Outcome.NOT_ASKED]),
             "confirmed": f"{counts[Outcome.CONFIRMED]}",
+            "counted": str(len(powers) - len(known)),
+            "to": f"{median(known):.0e}, at worst {max(known):.0e}" if known else "–",
             "refuted": refuted,
             "open": str(counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]),
             "typical": percent(median(each.typical for each in off)) if off else "–",
@@ -143,12 +167,20 @@ def headline(ran: Sequence[Verdict]) -> str:
         return f"{len(failed)} of {len(ran)} claims did not come out as expected: {', '.join(failed[:4])}{more}"
     if not ran:
         return "Nothing has been checked yet"
-    asked = [v for v in ran if not v.claim.algebra]
-    counts = Counter(f"{v.outcome} as expected" if v.outcome is not Outcome.CONFIRMED else "confirmed" for v in asked)
     name = next((each.engine for verdict in ran for each in verdict.witnesses), "")
-    said = [f"{n} claim{'s' * (n > 1)} {what}" for what, n in counts.most_common()]
-    said += [f"{len(ran) - len(asked)} hold formally"] * (len(asked) < len(ran))
-    return f"{ENGINES[name].title or name if name else 'The engine'} agrees with the paper: {', '.join(said)}"
+    return f"{ENGINES[name].title or name if name else 'The engine'} agrees with the paper"
+
+
+def kinds(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
+    """How many claims came out as expected, by kind, and how many didn't: counts with what they count."""
+    passed = [verdict for verdict in ran if verdict.passed]
+    counts = {
+        "confirmed by measurement": sum(v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed),
+        "refuted as expected": sum(v.outcome is Outcome.REFUTED for v in passed),
+        "formal, theory against theory": sum(bool(v.claim.algebra) for v in passed),
+        "not as expected": len(ran) - len(passed),
+    }
+    return [(str(n), what) for what, n in counts.items() if n]
 
 
 def missing(ran: Sequence[Verdict]) -> str:
@@ -163,10 +195,7 @@ def missing(ran: Sequence[Verdict]) -> str:
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims and numbers came out how: counts with what they count."""
     checks = [check for verdict in ran for check in verdict.checks]
-    counts = [
-        (f"{sum(verdict.passed for verdict in ran)}/{len(ran)}", "claims as expected"),
-        (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance"),
-    ]
+    counts = [*kinds(ran), (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance")]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
         counts.append(
             (str(corrected), f"claim{'s hold' if corrected > 1 else ' holds'} in a corrected form, see the errata")

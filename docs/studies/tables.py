@@ -1,4 +1,4 @@
-"""Write the measured tables of a page: ``python -m docs.studies.tables docs/mujoco-settings.md`` or engines.md.
+"""Write the measured tables of a page, as in ``python -m docs.studies.tables docs/mujoco-settings.md``; or of another.
 
 Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are kept in a results
 directory and not computed again.
@@ -24,7 +24,7 @@ from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import newcomer
 from compare.kit.pages import Rows
-from docs.studies import accuracy, confirmation, settings, states, witnesses
+from docs.studies import accuracy, confirmation, extrapolation, settings, states, witnesses
 from docs.studies.states import Entry
 from mjsim import ContactSettings
 from model import InputError
@@ -71,6 +71,8 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "witnesses": lambda campaign: witnesses.counted(campaign.directory.parent),
     "limits": lambda campaign: witnesses.limits(campaign.directory.parent),
     "not-confirmed": lambda campaign: witnesses.not_confirmed(campaign.directory.parent),
+    "chosen": lambda campaign: witnesses.chosen(campaign.directory.parent),
+    "misses": lambda campaign: extrapolation.misses(),
     "landings": lambda campaign: settings.landings(settings.STEP),
     "formulas": lambda campaign: confirmation.table(),
     "reached": accuracy.reached,
@@ -116,7 +118,12 @@ LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
     "league-defaults": lambda campaign: _errors(True, campaign.directory),
     "league-about": lambda campaign: league.about(_league(campaign.directory)),
 }
-PAGES = {"mujoco-settings.md": ("settings", TABLES), "engines.md": ("league", LEAGUE)}
+VERDICTS = {"witnesses": TABLES["witnesses"]}
+PAGES = {
+    "mujoco-settings.md": ("settings", TABLES),
+    "engines.md": ("league", LEAGUE),
+    "README.md": ("settings", VERDICTS),
+}
 """Directory of the runs, and tables of each page."""
 
 

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
+from unittest import mock
 
+from compare import witnesses
 from compare.catalogue import CLAIMS
 from compare.claim import Outcome, Verdict
+from compare.kit import quantities
 from compare.kit.engines import PLAIN
 from compare.kit.pages import Rows
 from compare.kit.record import Relation
@@ -19,7 +25,7 @@ QUANTITIES = {
     "angular velocity ω_c": ("omega_c",),
     "slip": ("slip_",),
     "forces": ("force_",),
-    "thresholds ω₀₁, ω₀₂, ω₀₄": ("omega_0",),
+    "thresholds": ("omega_0",),
     "decay rates and frequencies": ("decay_rate", "slowest_decay", "frequency"),
     "accelerations and forces in motion": ("rate_", "moving_force_"),
     "where motions end": ("end_",),
@@ -34,12 +40,14 @@ def verdicts(results: Path) -> list[Verdict]:
 
 def counted(results: Path) -> Rows:
     """How many claims each witness was asked, and how they came out, with its deviations at a step of 2 ms."""
-    told = wording.witnesses(verdicts(results))
-    head = ["witness", "asked", "confirmed", "refuted", "undecided", "typical deviation", "worst"]
+    said = verdicts(results)
+    told, formal = wording.witnesses(said), str(sum(bool(verdict.claim.algebra) for verdict in said))
+    head = ["witness", "asked", "confirmed", "to", "refuted", "undecided", "typical deviation", "worst"]
     for row in told:
         expected = sum(row["refuted"].values())
         row["refuted"] = f"{len(row['refuted'])}" + (f" ({expected} as expected)" if expected else "")
-    return [head, *([row[name] for name in ("engine", *head[1:4], "open", "typical", "worst")] for row in told)]
+    rows = [[row[name] for name in ("engine", *head[1:5], "open", "typical", "worst")] for row in told]
+    return [head, *rows, ["theory against theory", formal, formal, *["–"] * 5]]
 
 
 def limits(results: Path) -> Rows:
@@ -62,9 +70,43 @@ def not_confirmed(results: Path) -> Rows:
     for verdict in verdicts(results):
         for said in verdict.witnesses:
             if said.engine == PLAIN.name and said.outcome not in (Outcome.CONFIRMED, Outcome.NOT_ASKED):
-                coarse = [c for c in said.checks if not c.conclusive]
-                wrong = [c for c in said.checks if not c.agrees]
-                of = f"{len(wrong)} of {len(said.checks)} numbers disagree" if wrong else ""
-                of = of or (f"{len(coarse)} of {len(said.checks)} numbers are too coarse" if coarse else "")
-                rows.append([verdict.claim.id, said.outcome, of or said.reason.split(";")[0]])
+                wrong = sum(not check.agrees for check in said.checks)
+                why = f"{wrong} of {len(said.checks)} numbers disagree" if wrong else said.reason.split(";")[0]
+                rows.append([verdict.claim.id, said.outcome, why])
+    return rows
+
+
+@contextmanager
+def _ceilings(times: float) -> Iterator[None]:
+    """All ceilings of quantities multiplied."""
+    known = quantities.QUANTITIES
+    with mock.patch.dict(known, {name: replace(q, resolves=times * q.resolves) for name, q in known.items()}):
+        yield
+
+
+def _constant(name: str) -> Callable[[float], AbstractContextManager[None]]:
+    """A constant of `compare.witnesses` multiplied."""
+    return lambda times: mock.patch.object(witnesses, name, times * getattr(witnesses, name))
+
+
+CHOSEN = {
+    name: _constant(name) for name in ("SAFETY", "SAME", "CEILING", "COARSEST", "MARGIN", "FAR_OFF", "LOWEST_ORDER")
+} | {"all ceilings of quantities": _ceilings}
+"""What was chosen after a first measurement and can be changed without measuring anew."""
+
+
+def chosen(results: Path) -> Rows:
+    """The verdicts, by any witness, that change where a constant is half or twice as large."""
+
+    def said() -> dict[str, Outcome]:
+        return {f"{v.claim.id} by {w.engine}": w.outcome for v in verdicts(results) for w in v.witnesses}
+
+    rows, now = [["constant", "value", "half of it", "twice of it"]], said()
+    for name, multiplied in CHOSEN.items():
+        cells = []
+        for times in (0.5, 2.0):
+            with multiplied(times):
+                changed = {who: outcome for who, outcome in said().items() if outcome is not now[who]}
+            cells.append("; ".join(f"{who}: {outcome}" for who, outcome in changed.items()) or "none")
+        rows.append([name, f"{getattr(witnesses, name, '')}", *cells])
     return rows

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import pytest
 from matplotlib.figure import Figure
 
-from compare.claim import Bearing, Claim, Outcome, Text, Verdict
+from compare.claim import Bearing, Claim, Outcome, Text, Verdict, Witness
 from compare.commands import validate
 from compare.gallery import FIGURES
 from compare.kit.drawing import Drawing, GapError, Material
@@ -200,6 +200,20 @@ def test_wording() -> None:
     assert wording.value(dataclasses.replace(m, quantity="cases"), float(1 << Case.RR | 1 << Case.NS)) == "RR NS"
 
 
+def test_what_a_witness_confirms_is_said_with_how_well() -> None:
+    fine, coarse = checks(1)[0], checks(1, tolerance=0.24)[0]
+    count = dataclasses.replace(fine, measurement=dataclasses.replace(fine.measurement, quantity="case"), tolerance=0.0)
+    witness = Witness(
+        engine="mujoco-plain", outcome=Outcome.CONFIRMED, checks=(dataclasses.replace(coarse, ceiling=0.1),)
+    )
+    assert wording.said(witness) == "confirmed to 2e-02"
+    assert "would notice a relative error of 0.02 in ω_c" in wording.heard(witness)
+    assert wording.said(dataclasses.replace(witness, checks=(count,))) == "confirmed by counts"
+    assert wording.said(dataclasses.replace(witness, outcome=Outcome.REFUTED)) == "refuted"
+    verdict = dataclasses.replace(RAN[0], witnesses=(witness, witness))
+    assert "mujoco-plain ✓ confirmed to 2e-02" in validate.line(verdict).plain
+
+
 def test_ranking_puts_failures_first() -> None:
     near, far = checks(1, 2e-9)[0], checks(1, 1.0)[0]
     unknown = dataclasses.replace(near, predicted=math.nan, tolerance=1.0, scale=1.0)
@@ -312,7 +326,10 @@ SORT = "document.querySelector('[data-sort=id]').click()"
 EVERY = sum(len(verdict.checks) for verdict in RAN)
 FILTERED = (
     (f"{ROWS}.length", len(RAN)),
-    ("document.title", "dualball: 2 of 5 claims as expected"),
+    (
+        "document.title",
+        "dualball: 5 claims: 1 confirmed by measurement, 1 refuted as expected, 3 not as expected",
+    ),
     (f"find.value = 'slip PROP. bro'; find.dispatchEvent(new Event('input')); {SHOWN}", ["broken"]),
     ("document.getElementById('shown').textContent", "1 of 5 shown"),
     ("find.value = ''; outcome.value = 'inconclusive'; outcome.dispatchEvent(new Event('change'))", True),

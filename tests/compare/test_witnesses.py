@@ -8,13 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import analytic
 import tests.measured
+from analytic.bifurcation.diagram import critical_drag
+from compare.catalogue import CLAIMS
 from compare.claim import Bearing, Claim, Outcome
+from compare.judge import forget
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
 from compare.witnesses import CEILING, COARSEST, _limit, extrapolated, hear
 from model import Parameters
+from tests.mutants.exchange import Fault, WrongTheory, answer, believed, entries, scaled, times
 
 P = Parameters.named("reference")
 RATIOS = 1 / np.array([1.0, 2.0, 3.0, 4.0])
@@ -124,7 +129,7 @@ def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
     steps = {n: seen(0.0, "mujoco-plain", slip_x=100.0 * (n == 1), slip_y=100.0 * (n == 2)) for n in (1, 2, 3)}
     (plain,) = hear(CLAIM, {"mujoco-plain": steps}).witnesses
     assert (plain.outcome, plain.left_out) == (Outcome.INCONCLUSIVE, 1)
-    assert "three time steps" in plain.reason
+    assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c"
 
 
 @pytest.mark.parametrize(("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)])
@@ -133,11 +138,96 @@ def test_an_engine_as_it_comes_may_be_off_by_its_allowance(error, outcome):
     assert (said.outcome, said.worst) == (outcome, pytest.approx(error))
 
 
-def test_who_measured_nothing_was_not_asked_and_says_why():
+def test_who_was_asked_and_measured_nothing_is_undecided_and_says_why():
     none = {1: Records((), (Missing("settled", "mine", "nothing settles"),))}
-    said = hear(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": none, "mujoco-defaults": {2: Records()}})
+    other = {2: Records((), (Missing("settled", "another", "nothing settles"),))}
+    said = hear(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": none, "mujoco-defaults": other})
     assert said.outcome is Outcome.CONFIRMED
     _, plain, defaults = said.witnesses
-    assert {plain.outcome, defaults.outcome} == {Outcome.NOT_ASKED}
-    assert plain.reason == "nothing measured: mine: nothing settles"
-    assert defaults.reason == "only settled states are asked of an engine as it comes"
+    assert (plain.outcome, defaults.outcome) == (Outcome.INCONCLUSIVE, Outcome.NOT_ASKED)
+    assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c; mine: nothing settles"
+    assert defaults.reason == "at this level nothing that bears on the claim was asked of it; another: nothing settles"
+
+
+@pytest.mark.parametrize(("near", "outcome"), [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE)])
+def test_what_has_no_limit_counts_as_too_coarse(near: int, outcome: Outcome) -> None:
+    """Of three states, one or two so near a threshold that the step may decide on their case."""
+    ends = Records((tests.measured.measured("thresholds", "omega_01", 2 * P.omega_0, 1e-6, P, "mine"),))
+    flows = [P.omega_0] * (3 - near) + [2 * P.omega_0] * near
+    rows = [
+        tests.measured.measured("settled", "omega_c", flow, 1e-12, P.replace(omega_0=flow), "mine", start=f"{k}")
+        for k, flow in enumerate(flows)
+    ]
+    own = Records(tuple(rows))
+    _, plain = hear(CLAIM, {"mujoco": {1: own + ends}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
+    assert (plain.outcome, plain.left_out) == (outcome, near)
+
+
+@pytest.mark.parametrize(
+    ("lost", "outcome"), [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE), (3, Outcome.INCONCLUSIVE)]
+)
+def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost: int, outcome: Outcome) -> None:
+    """The engine on trial has a count and a flow on three sets, the witness all counts, but not all flows."""
+    flow = Bearing("thresholds", "omega_03", lambda m: m.parameters.omega_0)
+    claim = replace(CLAIM, bearings=(Bearing("thresholds", "lifts", lambda m: 1.0), flow))
+    sets = ("one", "another", "third")
+    counts = tuple(tests.measured.measured("thresholds", "lifts", 1.0, 0.0, P, name) for name in sets)
+    flows = tuple(tests.measured.measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)
+    trial, own = Records(counts + flows), Records(counts + flows[lost:])
+    _, plain = hear(claim, {"mujoco": {1: trial}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
+    assert plain.outcome is outcome
+    assert hear(claim, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN  # counts confirm no number
+
+
+SETS = {name: Parameters.named(name).replace(omega_0=1.0) for name in ("reference", "high-wall-friction")}
+FLOWS = "omega_01", "omega_02", "omega_03", "omega_04"
+
+
+def flows(engine: str, error: float, *lost: str) -> Records:
+    """Thresholds of two sets, of which one lifts off, and of the first the drag at which its fold is born."""
+    rows = [
+        tests.measured.measured("birth", "critical_drag", critical_drag(SETS["reference"]), 1e-6, SETS["reference"])
+    ]
+    for name, p in SETS.items():
+        known = analytic.thresholds(p)
+        place = {"p": p, "set": name, "by": "", "side": ""}
+        rows.append(tests.measured.measured("thresholds", "lifts", p.eta > p.j, **place))
+        if p.eta < p.j:
+            rows.append(tests.measured.measured("thresholds", "folds", math.isfinite(known.omega_04), **place))
+        values = {flow: getattr(known, flow) * (1 + error) for flow in FLOWS if math.isfinite(getattr(known, flow))}
+        rows += [
+            tests.measured.measured("thresholds", flow, value, 1e-8, **place | {"p": p.replace(omega_0=value)})
+            for flow, value in values.items()
+        ]
+    return Records(tuple(replace(m, engine=engine) for m in rows if m.quantity not in lost))
+
+
+@pytest.mark.parametrize(
+    ("function", "wrong", "lost", "named"),
+    [
+        ("bifurcation.diagram.threshold_curves", answer(entries(omega_03=times(2.0))), "omega_03", "table-5-NT1"),
+        ("bifurcation.diagram.threshold_curves", answer(entries(omega_04=times(2.0))), "omega_04", "table-5-F"),
+        ("bifurcation.diagram.threshold_curves", answer(entries(omega_02=times(1.01))), "omega_02", "table-5-P2"),
+        ("stationary.slipping_branch.eta_critical", scaled(4.0), "critical_drag", "eta-critical"),
+    ],
+    ids=["ω₀₃ doubled", "ω₀₄ doubled", "ω₀₂ + 1 %", "η_cr × 4"],
+)
+def test_no_claim_that_a_fault_refutes_stays_confirmed_by_a_witness(
+    function: str, wrong: Fault, lost: str, named: str
+) -> None:
+    """Whether it measured what the fault is about, with errors of first order in the step, or not."""
+    trial, steps = {"mujoco": {1: flows("mujoco", 0.0)}}, (1, 2, 3, 4)
+    whole = trial | {"mujoco-plain": {n: flows("mujoco-plain", 1e-3 / n) for n in steps}}
+    part = trial | {"mujoco-plain": {n: flows("mujoco-plain", 1e-3 / n, lost) for n in steps}}
+    right = {claim.id: hear(claim, whole) for claim in CLAIMS}
+    assert right[named].witnesses[1].outcome is Outcome.CONFIRMED
+    forget()
+    module, _, name = f"analytic.{function}".rpartition(".")
+    with believed(WrongTheory("", module, name, wrong)):
+        for testimony, said in ((whole, Outcome.REFUTED), (part, Outcome.INCONCLUSIVE)):
+            heard = {claim.id: hear(claim, testimony) for claim in CLAIMS}
+            about = [each for each in heard if heard[each].outcome is not right[each].outcome]
+            assert named in about
+            assert heard[named].witnesses[1].outcome is said
+            assert not [each for each in about if heard[each].witnesses[1].outcome is Outcome.CONFIRMED]
+    forget()

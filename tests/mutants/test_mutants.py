@@ -12,6 +12,7 @@ import analytic
 from analytic.mechanics import dynamics
 from analytic.stationary import solutions as stationary
 from compare.catalogue import CLAIMS
+from compare.judge import verdict
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO
 from compare.kit.lab import Lab
@@ -111,7 +112,7 @@ def test_a_prediction_that_hangs_is_no_breakdown(monkeypatch: pytest.MonkeyPatch
     formal = next(claim for claim in CLAIMS if claim.algebra)
     claim = dataclasses.replace(formal, algebra=lambda: (None for _ in itertools.count()))
     with pytest.raises(trial.HangError):
-        trial._patiently(claim, Records())
+        trial._patiently(lambda: verdict(claim, Records()))
 
 
 def test_functions_that_nothing_tries_are_found() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
-from analytic.mechanics import rolling_forces
+from analytic.mechanics import drag, rolling_forces
 from analytic.orbits.orbit_branch import Place
 from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
@@ -119,6 +119,16 @@ def _ramped(right: Function) -> Function:
     return function
 
 
+def _leads(right: Function) -> Function:
+    """Two-point rolling as far ahead of a ramp as it should be behind."""
+
+    def function(t: Any, at: Any, p: Parameters, omega_0: Any) -> Any:
+        k, tau = p.c / (1 + 2 * p.j), np.asarray(t) - at.time
+        return right(t, at, p, omega_0) - 2 * omega_0.slope * k * tau**2 * drag.ramp_lag(k * tau)
+
+    return function
+
+
 _FAULTS: dict[str, dict[str, Fault]] = {
     # Forces and equations of motion, (20)-(29)
     "mechanics.dynamics._rs": {
@@ -159,6 +169,12 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "SS lags 0.5 % too little": _of(Case.SS, fields(x=times(1.005, 2))),
         "spin of SS on the floor 1 % large": _of(Case.SS, fields(x=times(1.01, 3))),
         "NS sinks 2 % too fast": _of(Case.NS, fields(x=times(1.02, 1))),
+        "in a flow the other way round the ball spins as before": where(
+            lambda p: p.omega_0 < 0, _of(None, fields(x=times(-1.0, 3)))
+        ),
+        "in a flow the other way round friction along the orbit is as before": where(
+            lambda p: p.omega_0 < 0, _of(None, fields(force_A=times(-1.0, 2)))
+        ),
         "RR is unstable": _of(Case.RR, fields(slip_stability=lambda s: type(s).UNSTABLE)),
     },
     "stationary.solutions._ss": {
@@ -200,6 +216,8 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "ω₀₂ 0.5 % high": answer(entries(omega_02=times(1.005))),
         "ω₀₃ 0.5 % high": answer(entries(omega_03=times(1.005))),
         "ω₀₄ 0.5 % high": answer(entries(omega_04=times(1.005))),
+        "ω₀₃ doubled": answer(entries(omega_03=times(2.0))),
+        "ω₀₄ doubled": answer(entries(omega_04=times(2.0))),
         "a fold below η_cr": answer(_fold_everywhere),
         "ω₀₄ as under Stokes' drag": given(_by_stokes),
     },
@@ -218,7 +236,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
             lambda p: {name: w / np.sqrt(1 - p.density_ratio) for name, w in vars(bifurcation.thresholds(p)).items()}
         )
     },
-    "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04)},
+    "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04), "η_cr four times as large": scaled(4.0)},
     "bifurcation.diagram.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
     "bifurcation.diagram.wall_spin": {
         "spin on the wall about the ball's own radius": lambda right: lambda x, p: right(x, p) - x.omega_c,
@@ -277,6 +295,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "Schiller and Naumann's drag at any Reynolds number": answer(
             lambda law: law._replace(blunt=0.0) if law.wake else law
         ),
+        "the quadratic law's C_D is always 0.44": given(lambda p: p.replace(C_D=0.44)),
         "C_D = 0.47 beyond Schiller and Naumann": answer(
             lambda law: law._replace(blunt=law.blunt * 0.47 / 0.44) if law.wake else law
         ),
@@ -347,6 +366,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "simulation.transitions.collide": {
         "landings rebound by a tenth": lambda right: lambda at, p, w, e, *rest: right(at, p, w, 0.1, *rest),
         "landings with 5 % more floor friction": given(other(mu=1.05)),
+        "rebounds with nine tenths of the restitution": lambda right: (
+            lambda at, p, w, e, *rest: right(at, p, w, 0.9 * e, *rest)
+        ),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
     "simulation.charts._at_wall": {
@@ -363,7 +385,13 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "flight with 5 % more drag": in_case(Case.NN, given(other(c=1.05))),
         "flight with 1 % less weight": in_case(Case.NN, given(other(g=0.99))),
     },
-    "simulation.two_point_rolling.omega_c": {"two-point rolling with 5 % more drag": given(other(c=1.05))},
+    "simulation.two_point_rolling.omega_c": {
+        "two-point rolling with 5 % more drag": given(other(c=1.05)),
+        "rolling at both points takes a ramp to begin with the run": lambda right: (
+            lambda t, at, p, omega_0: right(t, at, p, replace(omega_0, start=0.0))
+        ),
+        "rolling at both points leads a ramp": _leads,
+    },
     "simulation.two_point_rolling.end": {"two-point rolling ends with 5 % more floor friction": given(other(mu=1.05))},
     "mechanics.rolling_forces.margin": {"forces admit rolling with 5 % more wall friction": given(other(eta=1.05))},
     "mechanics.rolling_forces.slip_margin": {"slip begins with 3 % more floor friction": given(other(mu=1.03))},

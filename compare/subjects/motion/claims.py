@@ -15,6 +15,7 @@ from compare.kit.record import Condition, Measurement, state
 from compare.kit.settling import forces
 from compare.subjects.motion.measure.laws import FLUIDS
 from compare.subjects.motion.measure.motions import LANDED
+from compare.subjects.motion.measure.runs import late_ramp
 from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -36,7 +37,8 @@ def _sinking(m: Measurement) -> float:
 
 def _end(m: Measurement) -> float:
     """A column of theory's motion where the measured one ends."""
-    motion = simulated(m.parameters, state(m), m.at("time"))
+    flow = late_ramp(m.parameters, m.at("rate"), m.at("time")) if "rate" in m.conditions else None
+    motion = simulated(m.parameters, state(m), m.at("time"), flow=flow)
     return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
 
 
@@ -127,7 +129,8 @@ LAW_CLAIMS = (
     claim(
         "sliding",
         "(20), (23)-(29)",
-        "A ball that slips or rolls at one contact or both moves on from case to case as the equations say.",
+        "A ball that slips or rolls at one contact or both moves on from case to case as the equations say, also while "
+        "the flow rises or falls.",
         *_ends("slips", "rolls", "sinks"),
     ),
     claim(

@@ -240,6 +240,7 @@ CLAIMS = (
                     ("lifts", lambda m: slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0),
                     ("lift_onset", lambda m: slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)),
                 )
+                if quantity == "lifts" or inner is not Case.RS
             ),
         )
         for inner, outer in slip_stability.LIFT_ARROWS

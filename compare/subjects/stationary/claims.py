@@ -54,14 +54,16 @@ def _exists(case: Case, m: Measurement) -> bool:
     return any(s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters))
 
 
-def bearings(quantities: Iterable[str], when: When, by: str, of: Case | None = None) -> tuple[Bearing, ...]:
+def bearings(
+    quantities: Iterable[str], when: When, by: str, of: Case | None = None, protocol: str = "settled"
+) -> tuple[Bearing, ...]:
     """Bearings of settled states on a claim, one a quantity; predicted by the state of a case, or of that detected."""
 
     def predict(m: Measurement) -> float:
         state = theory(analytic.solution, m.parameters, of) if of else reached(m)
         return number(m.quantity, state, m.parameters)
 
-    return tuple(Bearing("settled", quantity, predict, when=when, by=by) for quantity in quantities)
+    return tuple(Bearing(protocol, quantity, predict, when=when, by=by) for quantity in quantities)
 
 
 def _cases(when: When) -> Bearing:
@@ -203,6 +205,14 @@ CLAIMS = (
         _cases(_SINKS),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
+    ),
+    claim(
+        "mirrored",
+        "Props. 1, 4 and 5",
+        "In a flow the other way round the ball settles in the mirror images of the same states.",
+        *bearings(_STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"),
+        *bearings((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
+        Bearing("mirrored", "case", case, by="analytic.stable_solutions"),
     ),
 )
 

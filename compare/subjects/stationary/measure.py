@@ -20,6 +20,8 @@ from model import Parameters, State
 from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
+MIRRORED = ("rest", 0.62), ("rest", 1.4), ("on the wall", 4.2)
+"""Starts and flows, in units of sqrt(g/R), of those that are measured the other way round, too."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -81,16 +83,33 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                     yield _record(lab, fine, n, Measured(fine.values[n].value, uncertainty))
 
 
-def _unsettled(each: Settled, rows: int) -> Missing:
+def mirrored(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Case and values to which a ball settles in a flow the other way round."""
+    starts = [
+        begin(name, p.replace(omega_0=-flow / time_unit(p)), how) for name, p in sets.items() for how, flow in MIRRORED
+    ]
+    for state in settle(lab, starts):
+        if state.failure:
+            yield _unsettled(state, 1 + len(state.values), "mirrored")
+            continue
+        yield _record(lab, state, "case", state.case, "mirrored")
+        for quantity, value in state.values.items():
+            yield _record(lab, state, quantity, value, "mirrored")
+
+
+def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
     """That a start did not settle, and what it did last."""
     p = each.start.p
     at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
-    return Missing(PROTOCOL, each.start.set, f"not settled at {at} (start: {each.start.name}): {each.failure}", rows)
+    return Missing(protocol, each.start.set, f"not settled at {at} (start: {each.start.name}): {each.failure}", rows)
 
 
-def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> Measurement:
+def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float, protocol: str = PROTOCOL) -> Measurement:
     start, at = each.start, {"case": each.case.name, "start": each.start.name}
-    return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [each.task], **at)
+    return measurement(lab, protocol, start.set, start.p, quantity, value, [each.task], **at)
 
 
-PROTOCOLS = (Protocol("settled", measure, plain=FOUR, steps=(4, 4), defaults=ONE, cost=11),)
+PROTOCOLS = (
+    Protocol("settled", measure, plain=FOUR, steps=(4, 4), defaults=ONE, cost=11),
+    Protocol("mirrored", mirrored, quick=ONE),
+)

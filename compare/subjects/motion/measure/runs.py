@@ -2,10 +2,12 @@
 
 Each start is carried out with two time steps; what the step changes is the uncertainty of the finer run.
 
-* *Thrown*: the ball flies past the axis of the vessel without touching anything, long enough for drag to show.
+* *Thrown*: the ball flies past the axis of the vessel without touching anything, long enough for drag to show; by the
+  quadratic law with another drag coefficient, too.
 * *Pulled off*: beside the wall, with a slip on the floor that drives it away from there; its wall contact carries
   nothing, or almost nothing, and opens.
 * *Slips*, *rolls*, *sinks*: at one contact, at both, or off the wall, for a while, through whatever cases follow.
+* *Rolls while the flow rises, falls*: at both points, in a flow that is steady at first.
 * *Smooth wall*: the ball goes round with the fluid, rolls on the floor and spins against a wall without friction, in
   faster and faster flows. Does the floor hold it?
 * *Rough floor*, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster flows. It may jam
@@ -26,7 +28,8 @@ from compare.kit.record import Condition, Measurement, Missing, Records, state_o
 from compare.kit.settling import PRESSES, reading
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start, Trial, carry_out
-from model import Parameters, State
+from model import Flow, Parameters, State
+from model.drag import QUADRATIC
 from model.kinematics import VARIABLES, state_units
 
 STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
@@ -42,6 +45,15 @@ STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
     "sinks along the wall": (1.0, 1.0, (5.0, -0.3, 0.7, 0.5, 0.6, 0.8, 0.0, 0.0)),
 }
 """omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+RAMPS = {"rolls while the flow rises": 0.2, "rolls while the flow falls": -0.2}
+"""Rates in units of g/R of flows that change in the second half of a run."""
+BLUNTER = 1.1
+"""The other drag coefficient: of a disk instead of a sphere."""
+
+
+def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
+    """A flow that is steady for half of a time in s, and then changes at a rate in rad/s^2."""
+    return Flow.ramp(p.omega_0, p.omega_0 + rate * time / 2, time / 2, time / 2)
 
 
 def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -79,16 +91,22 @@ def _trials(name: str, p: Parameters) -> Iterator[Trial]:
     """All starts of a set."""
     unit = time_unit(p)
 
-    def trial(how: str, p: Parameters, x: State, lasts: float, rows: int = 1) -> Trial:
+    def trial(how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None) -> Trial:
         count = round(lasts * unit / coarse_step(p))
-        at: dict[str, Condition] = {"start": how, **state_of(x.stacked())}
-        return Trial(
-            name, p, how, x.stacked(), count * coarse_step(p), (8, 16), samples=count, conditions=at, rows=rows
-        )
+        t_end, at = count * coarse_step(p), dict[str, Condition](start=how, **state_of(x.stacked()))
+        flow = None
+        if rate is not None:
+            flow, at = late_ramp(p, rate, t_end), at | {"rate": rate}
+        return Trial(name, p, how, x.stacked(), t_end, (8, 16), count, flow=flow, conditions=at, rows=rows)
 
     for how, (flow, lasts, x) in STARTS.items():
-        start = State(*(np.array(x) * state_units(p)))
-        yield trial(how, p.replace(omega_0=flow / unit), start, lasts, rows=len(VARIABLES))
+        start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)
+        yield trial(how, q, start, lasts, rows=len(VARIABLES))
+        if how == "thrown" and p.drag == QUADRATIC:
+            yield trial("thrown, blunter", q.replace(C_D=BLUNTER), start, lasts, rows=len(VARIABLES))
+    for how, rate in RAMPS.items():
+        q = p.replace(omega_0=0.5 / unit)
+        yield trial(how, q, State(omega_c=q.omega_0), 2.0, len(VARIABLES), rate / unit**2)
     for flow in (0.5, 0.7, 0.9, 1.1, 1.3):
         going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
         yield trial("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0)
