@@ -152,8 +152,8 @@ plt.show()
 # ## What slides
 #
 # The same box on a slope of 30°, where friction cannot hold it any more: it slides down
-# with $g(\\sin 30° - 0.25\\cos 30°)$. In plain MuJoCo slip lifts it; it hovers, lands and
-# hovers again. Under the law it keeps its contact, and its acceleration.
+# with $g(\\sin 30° - 0.25\\cos 30°)$. In plain MuJoCo slip lifts it; it hovers, lands
+# and hovers again. Under the law it keeps its contact, and its acceleration.
 
 # %%
 SLIDE = SLOPE.replace("0 15 0", "0 30 0").replace("0.6", "0.25")
@@ -168,12 +168,13 @@ for name, color in {"plain": "#D55E00", "Coulomb's law": "#0072B2"}.items():
     rows = []
     for _ in range(500):
         step(data)
-        pressed = data.efc_force[: 3 * data.ncon : 3].sum()  # rows: normal, two of friction
+        pressed = data.efc_force[: 3 * data.ncon : 3].sum()  # of three rows a contact
         rows.append((data.time, pressed, np.linalg.norm(data.qvel[:3])))
     time, load, speed = np.transpose(rows)
     loads.plot(time, load, color=color, label=name, lw=0.8)
     speeds.plot(time, speed - exact * time, color=color, lw=0.8)
-    print(f"{name}: without contact in {np.mean(load[100:] == 0):.0%} of the steps after 0.2 s")
+    lost = np.mean(load[100:] == 0)
+    print(f"{name}: without contact in {lost:.0%} of the steps after 0.2 s")
 loads.set(xlabel="time (s)", ylabel="normal force (N)", ylim=(0, 40))
 speeds.set(xlabel="time (s)", ylabel="speed less exact speed (m/s)")
 loads.legend()

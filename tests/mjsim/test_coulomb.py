@@ -3,6 +3,7 @@
 Closed forms are of one rigid body. MuJoCo's step is of first order: what moves is wrong by h/2 times its speed.
 """
 
+import itertools
 import math
 import threading
 from pathlib import Path
@@ -175,7 +176,7 @@ def test_a_rigid_body_bounces_with_its_restitution(cone, geom, restitution):
         heights.append(data.qpos[2] - 0.05)
     tops = [b for a, b, c in zip(heights, heights[1:], heights[2:], strict=False) if a < b >= c and b > 0.02]
     assert math.sqrt(tops[0] / 0.2) == pytest.approx(restitution, abs=1e-3)
-    assert all(math.sqrt(b / a) == pytest.approx(restitution, abs=1e-3) for a, b in zip(tops, tops[1:], strict=False))
+    assert all(math.sqrt(b / a) == pytest.approx(restitution, abs=1e-3) for a, b in itertools.pairwise(tops))
 
 
 @CONES
@@ -221,7 +222,7 @@ def test_states_threads_and_neighbours(rigid):
 @CONES
 @WAYS
 def test_every_door_leads_to_the_same_bits(cone, rigid):
-    """`step`, its halves, those of MuJoCo under the callback in both orders, and `mj_step` under it, of two simulations."""
+    """`step`, its halves; `mj_step`, of two simulations in turn, and its halves in either order under the callback."""
     model, data = scene(0.3, mu=0.25, cone=cone, boxes=2)
     Coulomb(model, rigid=rigid).step(data, 100)
     halves, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
@@ -268,7 +269,7 @@ def test_forward_under_the_callback_changes_nothing():
 
 
 def test_other_models_and_other_callbacks():
-    """What isn't installed is MuJoCo's own, to the bit; a callback of somebody else's is refused, and always restored."""
+    """What isn't installed is MuJoCo's own, to the bit; somebody else's callback is refused, and always restored."""
     model, data = scene(np.radians(15))
     plain, copied = mujoco.MjData(model), scene(np.radians(15))
     mujoco.mj_step(model, plain, 100)
@@ -289,7 +290,7 @@ def test_other_models_and_other_callbacks():
     assert mujoco.get_mjcb_control() is None
     mujoco.set_mjcb_control(lambda model, data: None)
     try:
-        with pytest.raises(ValueError, match="mjcb_control is taken by .*lambda"), Coulomb(model).installed():
+        with pytest.raises(ValueError, match=r"mjcb_control is taken by .*lambda"), Coulomb(model).installed():
             pass
     finally:
         mujoco.set_mjcb_control(None)
@@ -303,12 +304,12 @@ def test_what_is_refused():
         Coulomb(scene(option='integrator="discrete"')[0])
     with pytest.raises(ValueError, match="noslip_iterations = 5"):
         Coulomb(scene(option='noslip_iterations="5"')[0])
-    with pytest.raises(ValueError, match="restitution = 0.5 needs rigid"):
+    with pytest.raises(ValueError, match=r"restitution = 0\.5 needs rigid"):
         Coulomb(model, restitution=0.5)
     for wrong in (-0.1, 1.1, math.nan, "half"):
-        with pytest.raises(ValueError, match="restitution = .* must be from 0 to 1"):
+        with pytest.raises(ValueError, match=r"restitution = .* must be from 0 to 1"):
             Coulomb(model, rigid=True, restitution=wrong)
-    with pytest.raises(ValueError, match="servo = 0.001 s must be at least 0.002 s"):
+    with pytest.raises(ValueError, match=r"servo = 0\.001 s must be at least 0\.002 s"):
         Coulomb(model, servo=1e-3)
     with pytest.raises(ValueError, match="model is a MjData"):
         Coulomb(data)

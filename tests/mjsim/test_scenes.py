@@ -10,16 +10,16 @@ from docs.studies.ways import CREEP, SLIP, WAYS
 
 
 def both(run):
-    """What a scene comes to in plain MuJoCo, and with a memory."""
+    """What a scene comes to in plain MuJoCo, and with a soft."""
     return run(WAYS["plain"]), run(WAYS["soft"])
 
 
 def assert_no_worse(plain, soft):
     """Nothing went wrong, nothing sinks in deeper, energy rises no higher."""
-    assert not memory.wrong
-    assert memory.depth <= WORSE * plain.depth
+    assert not soft.wrong
+    assert soft.depth <= WORSE * plain.depth
     if plain.rise is not None:
-        assert memory.rise <= WORSE * plain.rise + 1e-3
+        assert soft.rise <= WORSE * plain.rise + 1e-3
 
 
 @pytest.mark.parametrize("name", ["treadmill", "nut", "tactile", "mocap", "tendon", "sleeping"])
@@ -83,7 +83,7 @@ def test_robots_hold_still(package, name):
     pytest.importorskip(package, reason=f"the scene comes with {package}")
     plain, soft = both(SCENES[name].run)
     assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
-    assert not memory.wrong
+    assert not soft.wrong
 
 
 @pytest.mark.slow
@@ -92,7 +92,7 @@ def test_a_panda_lifts_and_lets_go():
     plain, soft = both(robot_scenes.lift)
     assert soft.values[CREEP] < 1e-7
     assert soft.values[SLIP] < plain.values[SLIP]
-    assert not memory.wrong
+    assert not soft.wrong
 
 
 def test_a_scene_says_what_failed():
