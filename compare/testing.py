@@ -25,7 +25,7 @@ from model.trajectory import AXES, columns
 
 SETTLED_PART = 0.25
 """Last part of a motion, in which it has to have settled."""
-FEWEST, MOST = 10, 10_000_000
+FEWEST, SAMPLES = 10, 10_000_000
 """Samples below which nothing is judged, and most that are read of another program's file."""
 _COLUMNS = {name: (AXES if meta["shape"] else ("",), meta["units"]) for name, meta in columns(Trajectory).items()}
 UNITS = {name + axis: unit for name, (axes, unit) in _COLUMNS.items() for axis in axes}
@@ -130,8 +130,8 @@ def _numbers(stored: h5py.Dataset) -> Array:
     name = stored.name.removeprefix("/")
     if stored.dtype.kind not in "fiu" or len(stored.shape or ()) != 1:
         raise StorageError(f"{name!r} is no column of numbers")
-    if len(stored) > MOST:
-        raise StorageError(f"{name!r} has {len(stored):g} samples, and {MOST:g} are the most that are compared")
+    if len(stored) > SAMPLES:
+        raise StorageError(f"{name!r} has {len(stored):g} samples, and {SAMPLES:g} are the most that are compared")
     return np.asarray(stored[...], float)
 
 

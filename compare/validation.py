@@ -23,7 +23,7 @@ from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.progress import Show, Whole, nowhere
 from compare.kit.record import Missing, Records, Testimony
-from compare.kit.workers import LONGEST, Spread, Workers, at_most, processes, threads
+from compare.kit.workers import JUDGING, Spread, Workers, at_most, processes, threads
 from compare.report import results
 from compare.report.results import Summary
 from compare.witnesses import hear
@@ -157,7 +157,7 @@ def _judged(directory: Path, number: int) -> dict[str, Any]:
 def _in_time(claim: Claim, testimony: Testimony) -> Verdict:
     """The verdict on what is stored, or that it took too long."""
     try:
-        with at_most(LONGEST):
+        with at_most(JUDGING):
             return hear(claim, testimony)
     except TimeoutError as error:
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=str(error))

@@ -22,9 +22,9 @@ from compare.bench.contact_law import LARGEST, Array, Contacts, contacts, replac
 from compare.bench.measured import borne, meet, rebound, slips, watched
 from compare.bench.settled import (
     WINDOW,
+    Advance,
     Control,
-    Settled,
-    Step,
+    Rest,
     UnsettledError,
     awake,
     few,
@@ -36,7 +36,7 @@ from model import InputError
 
 CREEP, DEPTH = 1e-5, 0.01
 """What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller body."""
-LONG, CHECKED = 1.0, 3.0
+SECOND, CHECKED = 1.0, 3.0
 """What still moves is measured for so long, s; and a changed model must settle within so many to be advised."""
 SHOWN = 12
 """The worst pairs, which are shown, and let fall anew for their bounce."""
@@ -95,7 +95,7 @@ class Forecast:
     timestep: float
     largest_step: float
     """Of all contacts together, s."""
-    settled: Settled
+    settled: Rest
     flexible: int
     """Contacts of flexible bodies, which are left out."""
     change: advice.Change | None
@@ -146,7 +146,7 @@ class _Scene:
 def forecast(
     model: Any,
     data: Any,
-    settled: Settled,
+    settled: Rest,
     creep: float = CREEP,
     depth: float | None = None,
     control: Control | None = None,
@@ -195,14 +195,16 @@ def tried(
     return before, after, held
 
 
-def _anew(model: Any, data: Any, law: Step, limit: float, control: Control | None, good: Mapping[str, Any]) -> Forecast:
+def _anew(
+    model: Any, data: Any, law: Advance, limit: float, control: Control | None, good: Mapping[str, Any]
+) -> Forecast:
     """A forecast without advice, of a model that is settled anew under another law of stepping."""
     settled = settle(model, data, limit, control, law)
     return _told(_scene(awake(model), data, settled, stepping(control, law), **good), settled)
 
 
 def _scene(
-    model: Any, data: Any, settled: Settled, step: Step, creep: float = CREEP, depth: float | None = None
+    model: Any, data: Any, settled: Rest, step: Advance, creep: float = CREEP, depth: float | None = None
 ) -> _Scene:
     """The contacts of a settled model, measured; `data` is left at the end of that."""
     moving = settled.moving
@@ -219,14 +221,14 @@ def _scene(
     moves = np.array([not moving.keys().isdisjoint(both) for both in bodies.tolist()])
     radius = radii(model)[bodies].min(1)
     history: list[dict[tuple[int, int], Array]] = []
-    time = WINDOW if settled.steady and not moving else LONG
+    time = WINDOW if settled.steady and not moving else SECOND
     found = slips(model, data, those, number, bodies, watched(step, history), time)
     now = borne(model, start)
     for pair in np.unique(those.geoms, axis=0):
         part, key = (those.geoms == pair).all(1), tuple(pair.tolist())
         series = np.array([each.get(key, np.zeros(6)) for each in history])
         moves[part] |= bool((series[:, 0] == 0).any())  # contact is lost
-        if moves[part].any() or time == LONG:  # the load of a moment may say nothing
+        if moves[part].any() or time == SECOND:  # the load of a moment may say nothing
             mean, then = series.mean(0), now[key]
             friction, sideways = np.hypot.reduce([mean[3:], then[3:]], 1)
             load = mean[0] / then[0]
@@ -238,7 +240,7 @@ def _scene(
     return _Scene(model, start, own, those.rows, number, radius, moves, found, creep, good)
 
 
-def _told(scene: _Scene, settled: Settled) -> Forecast:
+def _told(scene: _Scene, settled: Rest) -> Forecast:
     """The forecast without advice."""
     those, moves, names = scene.contacts, scene.moves, geom_names(scene.model)
     law, harms, pairs = those.law(), scene.harm(those), []

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 
 from compare.bench.contact_law import MEETING, Array, Contacts
-from compare.bench.settled import WINDOW_STEPS, Step, advance
+from compare.bench.settled import WINDOW_STEPS, Advance, advance
 
 
-def meet(model: Any, data: Any, step: Step) -> None:
-    """Step to the moment of a window at which most pairs of geoms bear a load: what rattles comes and goes."""
+def meet(model: Any, data: Any, step: Advance) -> None:
+    """Advance to the moment of a window at which most pairs of geoms bear a load: what rattles comes and goes."""
     most = 0
     for _ in range(WINDOW_STEPS):
         step(model, data, 1)
@@ -37,7 +37,7 @@ def borne(model: Any, data: Any) -> dict[tuple[int, int], Array]:
     return found
 
 
-def watched(step: Step, history: list[dict[tuple[int, int], Array]]) -> Step:
+def watched(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
     """Steps that note what pairs of geoms bear."""
 
     def one_by_one(model: Any, data: Any, nstep: int) -> None:
@@ -49,7 +49,7 @@ def watched(step: Step, history: list[dict[tuple[int, int], Array]]) -> Step:
 
 
 def slips(
-    model: Any, data: Any, c: Contacts, number: Array, bodies: Array, step: Step, time: float
+    model: Any, data: Any, c: Contacts, number: Array, bodies: Array, step: Advance, time: float
 ) -> dict[str, Array]:
     """How deep each contact is, and how fast its two bodies slip past each other and turn, in the mean of a window."""
     found = data.contact

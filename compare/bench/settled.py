@@ -18,7 +18,7 @@ from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
 
 Control = Callable[[Any, Any], None]
 """Sets `data.ctrl`, or any force, of a model and its data before a step; it may be given copies of both."""
-Step = Callable[[Any, Any, int], None]
+Advance = Callable[[Any, Any, int], None]
 """Advances the data of a model by a number of steps, as `mujoco.mj_step` does."""
 STEADY, STILL = 2e-3, 1e-8
 """A speed that changes by less than this share, or by this (m/s), from one window to the next has settled."""
@@ -39,7 +39,7 @@ class UnsettledError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Settled:
+class Rest:
     """What a model has come to; bodies in words."""
 
     steady: bool
@@ -94,7 +94,7 @@ def drive(model: Any, data: Any, values: Sequence[str]) -> None:
         data.ctrl[k] = parse_number(f"--ctrl: {name}", text, "1", allowed)
 
 
-def stepping(control: Control | None, step: Step = mujoco.mj_step) -> Step:
+def stepping(control: Control | None, step: Advance = mujoco.mj_step) -> Advance:
     """Steps with a controller before each."""
     if control is None:
         return step
@@ -116,8 +116,8 @@ def awake(model: Any) -> Any:
     return model
 
 
-def settle(model: Any, data: Any, limit: float, control: Control | None = None, law: Step = mujoco.mj_step) -> Settled:
-    """Step until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
+def settle(model: Any, data: Any, limit: float, control: Control | None = None, law: Advance = mujoco.mj_step) -> Rest:
+    """Advance until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
 
     `law` steps in the place of `mj_step`. Raises `UnsettledError` if the model diverges.
     """
@@ -137,7 +137,7 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
         calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0  # a speed may pass through a maximum
     moving = {int(b): f"{_body(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
     steady = bool((change <= STEADY * speed + NOISE).all())
-    return Settled(steady, moving, tuple(_collapsed(model, first, data)), tuple(_asleep(sleepy, model, data, step)))
+    return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(_asleep(sleepy, model, data, step)))
 
 
 def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
@@ -158,7 +158,7 @@ def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
             yield f"{_body(model, root)} by {sunk:.2g} m, its {by}"
 
 
-def _asleep(sleepy: Any, model: Any, data: Any, step: Step) -> Iterator[str]:
+def _asleep(sleepy: Any, model: Any, data: Any, step: Advance) -> Iterator[str]:
     """Bodies that fall asleep at once if they may."""
     if sleepy is not model:
         state = copy.copy(data)
@@ -167,7 +167,7 @@ def _asleep(sleepy: Any, model: Any, data: Any, step: Step) -> Iterator[str]:
             yield _body(model, int(np.flatnonzero(model.body_treeid == tree)[0]))
 
 
-def advance(model: Any, data: Any, step: Step, time: float = WINDOW) -> Array:
+def advance(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array:
     """Mean velocities of the bodies in a window, shape (nbody, 6): of the centre of mass, m/s, and turning, rad/s.
 
     Raises `UnsettledError` if the model diverges.

@@ -26,7 +26,7 @@ from model.files import check_ours, make_directory, write_text
 from model.parameters import POSITIVE, check_names
 
 LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
-JSON, PAGE = "league.json", "league.html"
+LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
 _PAIR: dict[str, tuple[Any, Any, str]] = {
     "solref": (2, ("TIMECONST", "DAMPRATIO"), "spring and damper of a contact"),
     "solreffriction": (2, ("TIMECONST", "DAMPRATIO"), "the same of its friction"),
@@ -185,13 +185,13 @@ def ranked(args: argparse.Namespace) -> int:
     modules = {name for name in chosen if re.search(r"[.:]", name) or Path(f"{name}.py").exists()}
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
     make_directory(args.output)
-    check_ours(args.output / PAGE, beside=args.output / JSON)
+    check_ours(args.output / LEAGUE_PAGE, beside=args.output / LEAGUE_JSON)
     with progress.shown(quiet=args.json or args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
     if all(result.skipped for results in found.values() for result in results):
         raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")
     data = league.to_mapping(found)
-    write_text(args.output / JSON, json.dumps(data, indent=1))
+    write_text(args.output / LEAGUE_JSON, json.dumps(data, indent=1))
     summary, rows, columns = league.summary(found), league.rows(found), enumerate(league.tried(found).values(), 1)
     shown = {
         "summary": summary,
@@ -202,7 +202,7 @@ def ranked(args: argparse.Namespace) -> int:
         "caption": league.CAPTION,
         "picture": address(svg(league.draw(found))),
     }
-    write_text(args.output / PAGE, pages.render("compare.bench", "league.html", **shown))
+    write_text(args.output / LEAGUE_PAGE, pages.render("compare.bench", "league.html", **shown))
     for what, why in league.notes(found):
         if what.endswith("all cases"):
             print(f"dualball: {what.removesuffix(', all cases')} is left out: {why}", file=sys.stderr)
@@ -211,7 +211,7 @@ def ranked(args: argparse.Namespace) -> int:
     drawn = (pages.table(title, own, no_wrap=True, padding=0) for title, own in tables.items())
     options.show(data, args.json, *drawn, league.CAPTION)
     if not args.json:
-        print(f"page: {args.output / PAGE}")
+        print(f"page: {args.output / LEAGUE_PAGE}")
     return 0
 
 

@@ -28,7 +28,7 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 """A function that is called like `map`."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Ctrl-C, and what clusters send."""
-LONGEST = 120.0
+JUDGING = 120.0
 """Processor time that judging a claim or drawing a figure may take, s: a hundred times what most take. What files say
 may be nonsense that takes years."""
 PATIENCE = 10.0

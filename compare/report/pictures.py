@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from compare.kit.drawing import Drawing, GapError
 from compare.kit.tasks import sources
-from compare.kit.workers import LONGEST, at_most
+from compare.kit.workers import JUDGING, at_most
 from model import StorageError
 from model.files import write_text
 
@@ -41,7 +41,7 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
     """
     path, drawing, data = new
     try:
-        with at_most(LONGEST):
+        with at_most(JUDGING):
             figure, caption = drawing.draw(data)
         picture = svg(figure)
         described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
