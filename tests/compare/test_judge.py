@@ -142,7 +142,7 @@ def test_judging_a_claim_takes_no_longer_than_it_may(tmp_path: Path, monkeypatch
             endless()
         endless()
 
-    monkeypatch.setattr(validation, "LONGEST", 0.1)
+    monkeypatch.setattr(validation, "JUDGING", 0.1)
     monkeypatch.setattr(validation, "hear", hear)
     monkeypatch.setattr(validation, "stored", lambda directory: {})
     told = validation._judged(tmp_path, 0)
