@@ -6,6 +6,7 @@ All take some half an hour, most of them the piles (``--only piles``).
 from __future__ import annotations
 
 import argparse
+import copy
 import functools
 import itertools
 import math
@@ -164,14 +165,13 @@ def heap(count: int) -> Any:
     )
 
 
-def cost(model: Any, way: dict[str, Any], begin: Callable[[Any], None], rounds: int, steps: int) -> float:
-    """Processor time of a step, plain MuJoCo's with the same cone being 1: median of runs in turn, from one state."""
+def cost(model: Any, way: dict[str, Any], begin: Callable[[Any, Stepper], None], rounds: int, steps: int) -> float:
+    """Processor time of a step, plain MuJoCo's with the same cone being 1: median of runs in turn."""
     plain = {name: value for name, value in way.items() if name == "cone"}
-    runs, times = [start(model, **each) for each in (plain, way)], np.empty((rounds, 2))
+    runs, times = [start(copy.copy(model), **each) for each in (plain, way)], np.empty((rounds, 2))
     for row in times:
         for k, (data, stepper) in enumerate(runs):
-            begin(data)
-            stepper.step(data, 5)
+            begin(data, stepper)
             row[k] = processor_time(stepper, data, steps)
     return float(np.median(times[:, 1] / times[:, 0]))
 
@@ -184,34 +184,29 @@ def processor_time(stepper: Stepper, data: Any, steps: int) -> float:
 
 
 def at_rest(count: int, way: dict[str, Any]) -> float:
-    """Cost of a step at rest with so many contacts."""
-    model = columns(count)
-    data, stepper = start(model, **SOFT)
-    stepper.step(data, 1500)
-    place = data.qpos.copy()
+    """Cost of a step at rest with so many contacts, to which each comes by itself."""
 
-    def begin(data: Any) -> None:
-        data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = place, 0, 0
-        data.time += 1.0  # what was remembered is of another state
+    def begin(data: Any, stepper: Stepper) -> None:
+        if data.time == 0:
+            stepper.step(data, 1500 if count < 500 else 200)
 
-    return cost(model, way, begin, 15, max(3000 // count, 40))
+    return cost(columns(count), way, begin, 15, max(3000 // count, 40))
 
 
-def sliding_cost(way: dict[str, Any]) -> float:
-    """Cost of a step of a box that slides."""
-    model = one(BOX, 0.25, 20)
+def moving(model: Any, way: dict[str, Any], rounds: int, steps: int, speed: float = 0.0) -> float:
+    """Cost of a step from the beginning, where the first body may have a speed."""
 
-    def begin(data: Any) -> None:
+    def begin(data: Any, stepper: Stepper) -> None:
         mujoco.mj_resetData(model, data)
-        data.qvel[0] = 1.0
+        data.qvel[0] = speed
+        stepper.step(data)
 
-    return cost(model, way, begin, 15, 500)
+    return cost(model, way, begin, rounds, steps)
 
 
-def falling_cost(count: int, way: dict[str, Any]) -> float:
-    """Cost of a step of a heap in its first 1.2 s, 30 contacts of 8 boxes to 900 of 216."""
-    model = heap(count)
-    return cost(model, way, lambda data: mujoco.mj_resetData(model, data), 3 if count < 100 else 1, 600)
+def falling(count: int, rounds: int, way: dict[str, Any]) -> float:
+    """Cost of a step of a heap, 30 contacts of 8 boxes to 900 of 216."""
+    return moving(heap(count), way, rounds, 600)
 
 
 def costs() -> Rows:
@@ -224,8 +219,11 @@ def costs() -> Rows:
     }
     scenes: dict[str, Callable[[dict[str, Any]], float]] = {
         **{f"at rest, {count} contacts": functools.partial(at_rest, count) for count in (1, 12, 52, 200, 1000)},
-        "a box that slides": sliding_cost,
-        **{f"heap of {count} boxes that falls": functools.partial(falling_cost, count) for count in (8, 27, 64, 216)},
+        "a box that slides": lambda way: moving(one(BOX, 0.25, 20), way, 15, 500, speed=1.0),
+        **{
+            f"heap of {count} boxes that falls, 1.2 s": functools.partial(falling, count, 3 if count < 100 else 1)
+            for count in (8, 27, 64, 216)
+        },
     }
     rows = [["cost of a step", *ways, "soft, no numba"]]
     for name, measure in scenes.items():
