@@ -76,16 +76,30 @@ NV, NGEOM, RBOUND = range(SIZE + 1, SIZE + 1 + len(_MODEL))
 _OPTION = ("timestep", "gravity", "cone", "solver")
 STEP, GRAVITY, CONE, SOLVER = range(NV + len(_MODEL), NV + len(_MODEL) + len(_OPTION))
 
-_data, _contact, _model = _layout("mjData"), _layout("mjContact"), _layout("mjModel")
-_option = _model.opt.offset
+_OLD = {"efc_diagA": "efc_diagApprox"}
+"""Names that MuJoCo 3.3 has."""
+_LATER = {"map_efc2iefc", "iefc_R", "iefc_D", "adhesion"}
+"""What it has not."""
+
+
+def _offset(layout: Any, name: str) -> int:
+    """Where a member stands; -1 for one that this MuJoCo may lack."""
+    member = getattr(layout, name, None) or getattr(layout, _OLD.get(name, name), None)
+    if member is None and name not in _LATER:
+        raise ImportError(f"MuJoCo {mujoco.__version__} has no {name}: formulas on arrays must serve")
+    return int(member.offset) if member else -1
+
+
+_data, _contact, _model, _option = (_layout(struct) for struct in ("mjData", "mjContact", "mjModel", "mjOption"))
 _offsets: npt.NDArray[np.int64] = np.array(
-    [getattr(_data, name).offset if hasattr(_data, name) else -1 for name in _DATA]
-    + [getattr(_contact, name).offset if hasattr(_contact, name) else -1 for name in _CONTACT]
+    [_offset(_data, name) for name in _DATA]
+    + [_offset(_contact, name) for name in _CONTACT]
     + [ctypes.sizeof(_contact)]
-    + [getattr(_model, name).offset for name in _MODEL]
-    + [_option + getattr(_layout("mjOption"), name).offset for name in _OPTION],
+    + [_offset(_model, name) for name in _MODEL]
+    + [_offset(_model, "opt") + _offset(_option, name) for name in _OPTION],
     np.int64,
 )
+_offsets[WARNING] += int(mujoco.mjtWarning.mjWARN_BADQPOS) * ctypes.sizeof(_layout("mjWarningStat"))
 
 
 def _agrees() -> bool:
@@ -239,7 +253,6 @@ def _value(struct: int, name: int) -> float:
     return float(_real(struct + _at(name))[0])
 
 
-_BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
 _UNMOVED = 1e-6
 """Distance below which a contact is the one of the same number in the last step, m."""
 _STILL = 1e-9
@@ -314,9 +327,9 @@ def _gravity(m: int) -> float:
 
 @compiled
 def _resets(d: int) -> int:
-    """How often the engine has reset the state as it was bad."""
+    """How often the engine has reset the state as positions, velocities or accelerations were bad."""
     warnings = _int32(d + _at(WARNING))
-    return int(warnings[2 * _BADQPOS + 1] + warnings[2 * _BADQPOS + 3] + warnings[2 * _BADQPOS + 5])
+    return int(warnings[1] + warnings[3] + warnings[5])
 
 
 # -- the law -----------------------------------------------------------------------------------------------------------
@@ -661,7 +674,7 @@ def _stiffen(m: int, d: int, head: int) -> None:
     kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
     softness, stiffness, diagonal = _array(d, R), _array(d, D), _array(d, DIAG)
     velocity, reference = _array(d, VEL), _array(d, AREF)
-    islands = _at(NISLAND) >= 0 and _number(d, NISLAND) > 0  # they have copies
+    islands = _at(ISLAND_R) >= 0 and _number(d, NISLAND) > 0  # they have copies, but not in MuJoCo 3.3.0
     place = _whole(d, ISLAND_PLACE if islands else COLIND)
     island_softness, island_stiffness = _array(d, ISLAND_R if islands else R), _array(d, ISLAND_D if islands else D)
     slow = h * _gravity(m)
