@@ -59,9 +59,10 @@ def _layout(struct: str) -> type[ctypes.Structure]:
     return _fields(structs.STRUCTS[struct].fields)
 
 
+_DIAGONAL = "efc_diagA" if hasattr(mujoco.MjData, "efc_diagA") else "efc_diagApprox"
 _DATA = (
     "time", "ncon", "nefc", "ne", "nf", "warning", "geom_xpos", "geom_xmat", "contact", "efc_KBIP", "efc_R", "efc_D",
-    "efc_diagA", "efc_vel", "efc_margin", "efc_aref", "efc_frictionloss", "efc_J", "efc_J_rownnz", "efc_J_rowadr",
+    _DIAGONAL, "efc_vel", "efc_margin", "efc_aref", "efc_frictionloss", "efc_J", "efc_J_rownnz", "efc_J_rowadr",
     "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D",
 )  # fmt: skip
 (
@@ -428,12 +429,12 @@ def _still(m: int, d: int, head: int) -> bool:
 def _turn_in(m: int, head: int, source: int, known: bool) -> None:
     """What contacts bore, friction in the axes of both bodies, becomes what is handed on."""
     counts = _int64(head)
+    if known and not counts[TURNED]:
+        convert(m, head, source)
+    counts[TURNED] = 0
     if not known:
         counts[COUNT_BEFORE] = counts[DRY_BEFORE] = 0
         return
-    if not counts[TURNED]:
-        convert(m, head, source)
-    counts[TURNED] = 0
     for i in range(2):
         counts[KEPT + i], counts[BEFORE + i] = counts[BEFORE + i], counts[KEPT + i]
     counts[COUNT_BEFORE], counts[DRY_BEFORE] = counts[COUNT], counts[COUNT_DRY]
