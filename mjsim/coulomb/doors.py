@@ -88,7 +88,7 @@ class Coulomb:
 
     def state(self) -> dict[str, Array]:
         """A copy of what is remembered: contacts, (n, `law.WIDTH`), friction of joints, time and time step, s."""
-        return self._own.state()  # type: ignore[no-any-return]
+        return self._own.state()
 
     def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
         """Go on from a `state`.
@@ -188,7 +188,7 @@ _INSTALLED: dict[int, Coulomb] = {}
 
 
 def _simulation(model: int, data: int) -> Any:
-    """What serves a simulation that the callback meets for the first time, if anything: its address, or 0."""
+    """What serves a simulation that the callback meets for the first time, as its form tells it, or 0."""
     coulomb = _INSTALLED.get(model)
     if coulomb is None or coulomb._adopted is None:
         kernels.remember(model, data, 0)

@@ -22,6 +22,7 @@ Whole = npt.NDArray[np.intp]
 
 _BAD = slice(mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQACC + 1)
 _ELLIPTIC, _PGS = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_PGS
+_DIAGONAL = "efc_diagA" if hasattr(mujoco.MjData, "efc_diagA") else "efc_diagApprox"
 _UNMOVED = 1e-6
 """Distance below which a contact is the one of the same number in the last step, m."""
 _STILL = 1e-9
@@ -50,13 +51,13 @@ def _among(pairs: Any, wanted: Any) -> tuple[Whole, Whole, Whole]:
 def _poses(data: Any) -> Array:
     """What axes and Jacobians depend on; points of flush faces shift by µm."""
     contact = data.contact
-    places = contact.pos * 1e-3, contact.frame, data.geom_xpos, data.geom_xmat
-    return np.concatenate((*places, contact.geom, contact.dim, contact.efc_address, contact.friction), axis=None)
+    rows = contact.efc_address, contact.friction
+    return np.concatenate((contact.pos * 1e-3, contact.frame, data.geom_xpos, data.geom_xmat, *rows), axis=None)
 
 
 def _gravity(model: Any) -> float:
     """Its acceleration, m s-2; the earth's if there is none."""
-    return math.hypot(*model.opt.gravity) or 9.81
+    return math.hypot(*model.opt.gravity.tolist()) or 9.81
 
 
 class Simulation:
@@ -72,14 +73,16 @@ class Simulation:
 
     def restore(self, contacts: Array, joints: Array, time: Array) -> None:
         self._kept, self._dry, (self._moment, self._lasted) = contacts.T.copy(), joints.copy(), time.tolist()
-        self._turned, self._pending, self._resets, self._poses = True, None, b"", np.empty(0)
+        self._turned, self._pending, self._resets = True, None, b""
+        self._poses, self._counts = np.empty(0), (-1, -1)
+        self._memory = self._found = np.empty(0)
 
     def state(self) -> dict[str, Array]:
         if self._pending is not None:
             self.retain(None, self._pending)
         if not self._turned:  # what goes on from here does as what is restored
             self._convert(self._found)
-            self._turned, self._poses = True, np.empty(0)
+            self._turned, self._counts = True, (-1, -1)
         time = np.array([self._moment, self._lasted])
         return {"contacts": self._kept.T.copy(), "joints": self._dry.copy(), "time": time}
 
@@ -111,7 +114,8 @@ class Simulation:
         start, poses = data.qacc_warmstart, _poses(data)
         start[abs(start) < numbers.calm] = 0.0
         if known and self._still(data, poses):
-            self._memory = self._found if elapsed > 0 else self._memory
+            if elapsed > 0:
+                self._memory = self._found
             self._kept[law.GAP] = data.contact.dist[self._used]
         else:
             before = self._turn_in(known, elapsed)
@@ -202,7 +206,11 @@ class Simulation:
             self._mu, self._slide = np.where(dim > 1, contact.mu[used], 1.0), np.zeros(len(self._rows))
             self._slide[self._plus] = self._friction
         else:
-            self._plus, self._normals, self._normals_of = self._first[of] + 2 * row, dry + np.arange(len(rows)), self._of
+            self._plus, self._normals, self._normals_of = (
+                self._first[of] + 2 * row,
+                dry + np.arange(len(rows)),
+                self._of,
+            )
             self._other = np.arange(len(self._rows))
             self._other[self._plus], self._other[self._plus + 1] = self._plus + 1, self._plus
 
@@ -271,7 +279,7 @@ class Simulation:
         return True
 
     def _copy_rows(self, model: Any, data: Any) -> None:
-        """Keep the Jacobians: the engine's own arrays are gone when the next step wants to know what forces there were."""
+        """Keep the Jacobians: the engine's own are gone when the next step wants to know what forces there were."""
         self._limit = data.efc_frictionloss[self._rows[: self._counts[0]]]
         if mujoco.mj_isSparse(model):
             self._line, at = _spans(data.efc_J_rowadr[self._rows], data.efc_J_rownnz[self._rows])
@@ -284,12 +292,12 @@ class Simulation:
     def _accelerate(self, data: Any) -> Array:
         """J qacc of all rows."""
         if self._columns is None:
-            return self._jacobian @ data.qacc  # type: ignore[no-any-return]
-        return np.bincount(self._line, self._jacobian * data.qacc[self._columns], len(self._rows))
+            return np.dot(self._jacobian, data.qacc)  # type: ignore[no-any-return]
+        return np.bincount(self._line, self._jacobian * data.qacc[self._columns], len(self._rows))  # type: ignore[return-value]
 
     def _normal(self, values: Array) -> Array:
         """Of each contact, the number of its normal, or the mean of its first pair of edges."""
-        first = values[self._first]
+        first: Array = values[self._first]
         return first if self._elliptic else (first + values[self._other[self._first]]) / 2
 
     def _stiffen(self, model: Any, data: Any, acceleration: Array) -> None:
@@ -306,7 +314,7 @@ class Simulation:
             square = fall**2 / 4 + 2 * (numbers.restitution**2 * energy - above)
             goal[blow] = np.maximum(goal, np.sqrt(np.maximum(square, 0.0)) - fall / 2)[blow]
         first = self._rows[self._first]
-        self._soft[dry:] *= (numbers.softness * data.efc_diagA[first] / self._soft[self._first])[self._of]
+        self._soft[dry:] *= (numbers.softness * getattr(data, _DIAGONAL)[first] / self._soft[self._first])[self._of]
         velocity[self._normals] -= goal[self._normals_of]
         self._reference[dry:] = -velocity[dry:] / h
         data.efc_R[rows], data.efc_D[rows] = self._soft[dry:], 1 / self._soft[dry:]
@@ -344,17 +352,18 @@ class Simulation:
     def _foresee(self, model: Any, data: Any, residual: Array, enough: float) -> bool:
         """Foresee slip from the velocities now and the accelerations of the last step; whether that is in doubt."""
         kept, rigid, slip = self._kept, self._law.rigid, self._slip(residual)
-        state = kept[law.STATE]
-        new, stops, doubt = state <= law.OPEN, state == law.STICKS, False
+        state, much, doubt = kept[law.STATE], slip > enough, False
+        stops = state == law.STICKS
         if not stops.all():
+            new, closing = state <= law.OPEN, self._normal(residual) < 0
             stops |= (state == law.SLIDES) & (self._ahead(residual) >= 0)
-            closing = self._normal(residual) < 0
-            doubt = bool(np.where(new, closing & (rigid | (slip > enough)), ~stops & (kept[law.ERROR] > enough)).any())
-        kept[law.SLIP] = np.where(stops, 0.0, slip)
-        much = stops & (slip > enough)
-        doubt = doubt or bool(much.any() and (much & ~self._holds(data, residual)).any())
-        if rigid and not doubt:  # forces will change by a weight
-            doubt = bool((np.maximum.reduceat(abs(residual), self._first) > _gravity(model))[~new].any())
+            doubt = bool(np.where(new, closing & (rigid | much), ~stops & (kept[law.ERROR] > enough)).any())
+        kept[law.SLIP] = slip * ~stops
+        if not doubt and much.any():
+            doubt = bool((much & stops & ~self._holds(data, residual)).any())
+        if not doubt and rigid:  # forces will change by a weight
+            most = np.maximum.reduceat(abs(residual), self._first)
+            doubt = bool(((most > _gravity(model)) & (state > law.OPEN)).any())
         return doubt
 
     def _ahead(self, residual: Array) -> Array:
@@ -368,56 +377,60 @@ class Simulation:
         """Whether the forces of contacts would stay inside the cone if they alone did what accelerations lack to hold
         them."""
         lacks = residual + self._soft * (self._memory - self._held)
-        forces = self._memory - lacks / (data.efc_diagA[self._rows] + self._soft)
+        forces = self._memory - lacks / (getattr(data, _DIAGONAL)[self._rows] + self._soft)
         if not self._elliptic:
             return np.minimum.reduceat(forces, self._first) >= 0
         share = np.zeros(len(forces))
         share[self._plus] = forces[self._plus] / self._friction
         load = forces[self._first]
-        return (load > 0) & (np.add.reduceat(share**2, self._first) <= load**2)
+        inside: npt.NDArray[np.bool_] = (load > 0) & (np.add.reduceat(share**2, self._first) <= load**2)
+        return inside
 
     def _refer(self, data: Any) -> None:
         """Reference accelerations with memory, less slip in the normal direction."""
         self._target = self._reference + self._soft * self._held
-        self._target[self._normals] -= self._kept[law.SLIP, self._normals_of]
+        self._target[self._normals] -= self._kept[law.SLIP][self._normals_of]
         data.efc_aref[self._rows] = self._target
 
     def _weigh(self, data: Any) -> None:
         """Forces and slip that follow from the accelerations, and by how much what was foreseen is wrong, m s-2."""
         kept, dry, acceleration = self._kept, self._counts[0], self._accelerate(data)
         residual = acceleration - self._target
-        self._found, state = self._share(residual)
-        slip = np.zeros(len(state))
-        if not (state == law.STICKS).all():
-            slip = np.where(state == law.STICKS, 0.0, self._slip(residual + self._soft * self._found))
-        error = abs(slip - kept[law.SLIP])
-        apart = state == law.OPEN  # their slip matters if without it they would have closed
-        if apart.any():
-            error[apart & (self._normal(acceleration - self._reference) >= 0)] = 0.0
+        self._found = forces = -residual / self._soft
+        if self._share(residual, forces):
+            kept[law.STATE], kept[law.ERROR], kept[law.SEEN] = law.STICKS, kept[law.SLIP], 0.0
+        else:
+            state = kept[law.STATE]
+            kept[law.SEEN] = self._slip(residual + self._soft * forces) * (state != law.STICKS)
+            apart = (state == law.OPEN) & (self._normal(acceleration - self._reference) >= 0)
+            # the slip of open contacts matters if without it they would have closed
+            kept[law.ERROR] = np.where(apart, 0.0, abs(kept[law.SEEN] - kept[law.SLIP]))
         if self._law.rigid:
-            missed = abs(self._soft * (self._found - self._memory))
-            error = np.maximum(error, np.maximum.reduceat(missed, self._first))
-        kept[law.STATE], kept[law.ERROR], kept[law.SEEN] = state, error, slip
-        self._found[:dry] = np.clip(-residual[:dry] / self._soft[:dry], -self._limit, self._limit)
+            missed = np.maximum.reduceat(abs(self._soft * (forces - self._memory)), self._first)
+            np.maximum(kept[law.ERROR], missed, out=kept[law.ERROR])
+        if dry:
+            forces[:dry] = np.clip(-residual[:dry] / self._soft[:dry], -self._limit, self._limit)
 
-    def _share(self, residual: Array) -> tuple[Array, npt.NDArray[np.intp]]:
-        """Forces of the rows, as the engine's solver has them, and states of the contacts."""
-        forces, first = -residual / self._soft, self._first
+    def _share(self, residual: Array, forces: Array) -> bool:
+        """Limit forces of contacts, and find their states, as the engine's solver does; whether all stick."""
+        first, state = self._first, self._kept[law.STATE]
         if not self._elliptic:
-            forces = np.maximum(forces, 0.0)
-            least, most = (extreme.reduceat(forces, first) for extreme in (np.minimum, np.maximum))
-            return forces, np.where(least > 0, law.STICKS, np.where(most > 0, law.SLIDES, law.OPEN))
-        mu, tangent = self._mu, self._slip(residual)
-        normal = mu * residual[first]
-        state = np.where(mu * normal + tangent < 0, law.STICKS, law.SLIDES)
-        if (loose := state != law.STICKS).any():
-            state[apart := normal >= mu * tangent] = law.OPEN
-            load = np.where(apart, 0.0, (mu * tangent - normal) / (self._soft[first] * mu * (1 + mu * mu)))
-            rows = len(forces) - len(self._of) + np.flatnonzero(loose[self._of])
-            pull = (load / np.maximum(tangent, 1e-300))[self._of[rows - len(forces) + len(self._of)]]
-            forces[rows] = -pull * self._slide[rows] ** 2 * residual[rows]
-            forces[first[loose]] = load[loose]
-        return forces, state
+            np.maximum(forces, 0.0, out=forces)
+            if (sticks := np.minimum.reduceat(forces, first) > 0).all():
+                return True
+            opened = np.maximum.reduceat(forces, first) == 0
+        else:
+            tangent, normal, mu = self._slip(residual), residual[first], self._mu
+            if (sticks := mu * mu * normal + tangent < 0).all():
+                return True
+            opened = normal >= tangent
+            load = np.where(opened, 0.0, (tangent - normal) / (self._soft[first] * (1 + mu * mu)))
+            pull = (load / np.maximum(tangent, 1e-300))[self._of] * self._slide[-len(self._of) :] ** 2
+            loose = ~sticks[self._of]
+            forces[-len(loose) :][loose] = (-pull * residual[-len(loose) :])[loose]
+            forces[first[~sticks]] = load[~sticks]
+        state[:] = np.where(sticks, law.STICKS, np.where(opened, law.OPEN, law.SLIDES))
+        return False
 
     def _take_over(self) -> None:
         """What was found is what is foreseen next: slip, and the forces of rigid contacts."""
