@@ -87,7 +87,7 @@ def start(model: Any, law: dict[str, Any] | None = None, door: Any = Coulomb, **
     stepper = door(model, **offered)
     if len(law) > len(offered):
         stepper._law = replace(stepper._law, **law)
-        stepper._own = doors.kernels.Simulation(model, stepper._law)
+        stepper._own = type(stepper._own)(model, stepper._law)
     return mujoco.MjData(model), stepper
 
 

@@ -1,8 +1,8 @@
-"""The law as loops over contacts, compiled with numba, which the extra `fast` installs; `formulas` says the same in NumPy.
+"""The law as loops over contacts, compiled with numba, which the extra `fast` installs; `formulas` has it in NumPy.
 
-A step of a small scene takes 10 µs, and handing over its arrays would cost as much. So the loops read and write `mjData`
-where the engine keeps it: `mujoco.introspect` tells the offsets, and the engine's functions are called by their
-addresses. What a simulation remembers lies in blocks of memory, whose addresses and sizes are its `head`.
+A step of a small scene takes 10 µs, and handing over its arrays would cost as much. So the loops read and write
+`mjData` where the engine keeps it: `mujoco.introspect` tells the offsets, and the engine's functions are called by
+their addresses. What a simulation remembers lies in blocks of memory, whose addresses and sizes are its `head`.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from . import law
-
-Array = npt.NDArray[np.float64]
+from .law import Array
 
 if numba.config.DISABLE_JIT:
     raise ImportError("numba is told not to compile: formulas on arrays must serve")
@@ -65,16 +64,16 @@ _DATA = (
     "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D", "qvel",
 )  # fmt: skip
 (
-    TIME, NCON, NEFC, NE, NF, WARNING, XPOS, XMAT, CONTACT, KBIP, R, D, DIAG, VEL, MARGIN, AREF, LOSS, J, ROWNNZ, ROWADR,
-    COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D, QVEL,
+    TIME, NCON, NEFC, NE, NF, WARNING, XPOS, XMAT, CONTACT, KBIP, R, D, DIAG, VEL, MARGIN, AREF, LOSS, J, ROWNNZ,
+    ROWADR, COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D, QVEL,
 ) = range(len(_DATA))  # fmt: skip
 _CONTACT = ("dist", "pos", "frame", "friction", "mu", "dim", "geom", "efc_address", "includemargin", "adhesion")
 DIST, POS, FRAME, FRICTION, MU, DIM, GEOM, ADDRESS, INCLUDE, ADHESION = range(len(_DATA), len(_DATA) + len(_CONTACT))
 SIZE = len(_DATA) + len(_CONTACT)
 _MODEL = ("nv", "ngeom", "geom_rbound")
-NV, NGEOM, RBOUND = range(SIZE + 1, SIZE + 1 + len(_MODEL))
+DOFS, NGEOM, RBOUND = range(SIZE + 1, SIZE + 1 + len(_MODEL))
 _OPTION = ("timestep", "gravity", "cone", "solver")
-STEP, GRAVITY, CONE, SOLVER = range(NV + len(_MODEL), NV + len(_MODEL) + len(_OPTION))
+STEP, GRAVITY, CONE, SOLVER = range(DOFS + len(_MODEL), DOFS + len(_MODEL) + len(_OPTION))
 
 _OLD = {"efc_diagA": "efc_diagApprox"}
 """Names that MuJoCo 3.3 has."""
@@ -105,8 +104,8 @@ _offsets[WARNING] += int(mujoco.mjtWarning.mjWARN_BADQPOS) * ctypes.sizeof(_layo
 def _agrees() -> bool:
     """Whether a small model lies in memory as `mujoco.introspect` says."""
     model = mujoco.MjModel.from_xml_string(
-        '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 '
-        '.09"><freejoint/><geom size=".1" condim="4" friction=".7 .03 .01"/></body></worldbody></mujoco>'
+        '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/><worldbody><geom type="plane" size="1 1 1"/>'
+        '<body pos="0 0 .09"><freejoint/><geom size=".1" condim="4" friction=".7 .03 .01"/></body></worldbody></mujoco>'
     )
     data = mujoco.MjData(model)
     data.time = 3.0
@@ -264,14 +263,15 @@ _CORNER = 1.05 * math.pi
 
 # -- what a simulation remembers ---------------------------------------------------------------------------------------
 
-KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMNS, DRY, POSES, SCRATCH = range(0, 20, 2)
-"""Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their axes
-in those of both bodies, friction and regular friction (24); their places (4); rows (9); Jacobians and their columns; what
-dry friction bore."""
+KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH = range(0, 20, 2)
+"""Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their
+axes in those of both bodies, friction and regular friction (24); their places (4); rows (`ROW`); Jacobians and their
+columns; what dry friction bore; poses at which these were taken; a contact."""
 COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, TURNED, PENDING, RESETS, SOLVES = range(
     20, 31
 )
-"""Contacts now and before, rows, dry rows now and before; whether forces are still to be found; resets by the engine."""
+"""Counts: contacts now and before, rows, dry rows now and before, contacts and rows of the engine; whether contacts
+have their forces in the axes of bodies; whether forces are still to be found; resets by the engine; solutions."""
 MOMENT, LASTED, LEAST = 31, 32, 33
 """Time and time step of the last call, s; distance by which contacts must move for points to be put back, m."""
 RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, CALM, NEAR, FIXED = range(34, 44)
@@ -314,7 +314,7 @@ def _block(head: int, block: int) -> Any:
 
 @compiled
 def _elliptic(m: int) -> bool:
-    return _number(m, CONE) == 1
+    return bool(_number(m, CONE) == 1)
 
 
 @compiled
@@ -347,7 +347,7 @@ def control(m: int, d: int, head: int) -> None:
         retain(m, d, head)
     numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _value(m, STEP), resets
     start = _array(d, START)
-    for i in range(_number(m, NV)):
+    for i in range(_number(m, DOFS)):
         start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
     still = known and _still(m, d, head)
     if still:
@@ -383,7 +383,7 @@ def control(m: int, d: int, head: int) -> None:
             mj_fwdConstraint(m, d)
             counts[SOLVES] += 1
             qacc = _array(d, QACC)
-            for i in range(_number(m, NV)):
+            for i in range(_number(m, DOFS)):
                 start[i] = qacc[i]
             worst = _weigh(m, d, head)
             _take_over(m, d, head)
@@ -398,7 +398,7 @@ def control(m: int, d: int, head: int) -> None:
 def _same(d: int, offset: int, length: int, poses: Any, at: int) -> bool:
     """Whether an array of `mjData` is as it was."""
     now = _real(_int64(d + offset)[0])
-    for i in range(length):
+    for i in range(length):  # noqa: SIM110
         if not abs(now[i] - poses[at + i]) < _STILL:
             return False
     return True
@@ -445,13 +445,13 @@ def _still(m: int, d: int, head: int) -> bool:
 def _turn_in(m: int, d: int, head: int, source: int, known: bool) -> None:
     """What contacts bore, friction in the axes of both bodies, becomes what is handed on."""
     counts = _int64(head)
-    if not known:
-        counts[COUNT_BEFORE] = counts[DRY_BEFORE] = 0
-        return
-    if not counts[TURNED]:
+    if known and not counts[TURNED]:
         convert(m, head, source)
         carry_on(m, d, head)
     counts[TURNED] = 0
+    if not known:
+        counts[COUNT_BEFORE] = counts[DRY_BEFORE] = 0
+        return
     for i in range(2):
         counts[KEPT + i], counts[BEFORE + i] = counts[BEFORE + i], counts[KEPT + i]
     counts[COUNT_BEFORE], counts[DRY_BEFORE] = counts[COUNT], counts[COUNT_DRY]
@@ -493,12 +493,14 @@ def carry_on(m: int, d: int, head: int) -> None:
     _multiply(m, head, _array(d, QVEL))
     for i in range(counts[COUNT]):
         k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT] + RESIDUAL, 12 * ngeom + 20 * places[4 * i + INDEX] + 3
+        for j in range(3):
+            kept[k + j] = 0.0
         for t in range(2 if places[4 * i + LENGTH] > 1 else 0):
             speed = _tangential(rows, r, t, edges, axes[24 * i + 18 + t])
             for j in range(3):
                 one, two = (j + 1) % 3, (j + 2) % 3
                 across = poses[at + one] * poses[at + 3 + two] - poses[at + two] * poses[at + 3 + one]
-                kept[k + j] = kept[k + j] + speed * across if t else speed * poses[at + 3 + j]
+                kept[k + j] += speed * (across if t else poses[at + 3 + j])
 
 
 @compiled
@@ -599,14 +601,14 @@ def _apart(one: Any, k: int, other: Any, m: int) -> float:
 
 @compiled
 def _axis(t: int) -> int:
-    """Axis of a contact of the direction t of friction: tangents 1 and 2, then spinning about 0 and rolling about 1, 2."""
+    """Axis of a direction of friction: tangents 1 and 2, then spinning about 0 and rolling about 1 and 2."""
     return t + 1 if t < 2 else t - 2
 
 
 @compiled
 def _hand_on(m: int, d: int, head: int, scattered: bool) -> float:
-    """Give what is remembered to the nearest contact of the same geoms; how far those have moved whose pair has fewer, m."""
-    counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
+    """Give what is remembered to the nearest contact of the same geoms; how far any has moved, if some are fewer, m."""
+    counts, elliptic = _int64(head), _elliptic(m)
     count, kept, before = counts[COUNT], _block(head, KEPT), _block(head, BEFORE)
     axes, places, rows = _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
     numbers, bound = _real(head), _array(m, RBOUND)
@@ -669,7 +671,7 @@ def _hand_on(m: int, d: int, head: int, scattered: bool) -> float:
 
 @compiled
 def _stiffen(m: int, d: int, head: int) -> None:
-    """Rows of rigid contacts: as stiff as `Law.softness`, with the velocities that Moreau and Jean's time stepping asks."""
+    """Rows of rigid contacts: as stiff as `Law.softness`, for the velocities of Moreau and Jean's time stepping."""
     counts, numbers, elliptic, h = _int64(head), _real(head), _elliptic(m), _value(m, STEP)
     kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
     softness, stiffness, diagonal = _array(d, R), _array(d, D), _array(d, DIAG)
@@ -720,7 +722,7 @@ def _lift(m: int, d: int, head: int) -> None:
 @compiled
 def _copy_rows(m: int, d: int, head: int) -> None:
     """Keep the Jacobians: the engine's own arrays are gone when the next step wants to know what forces there were."""
-    counts, nv, sparse = _int64(head), _number(m, NV), mj_isSparse(m)
+    counts, nv, sparse = _int64(head), _number(m, DOFS), mj_isSparse(m)
     places, rows, count = _int64(counts[PLACES]), _block(head, ROWS), ROW * counts[COUNT_ROWS]
     for i in range(counts[COUNT]):
         for r in range(places[4 * i + LENGTH]):
@@ -733,7 +735,7 @@ def _copy_rows(m: int, d: int, head: int) -> None:
     for r in range(0, count, ROW):
         rows[r + BEGIN], rows[r + NONZEROS] = total, length[int(rows[r + ADDRESS_OF])] if sparse else nv
         total += int(rows[r + NONZEROS])
-    jacobian, columns = _room(head, JACOBIAN, total), _integers(head, COLUMNS, total)
+    jacobian, columns = _room(head, JACOBIAN, total), _integers(head, COLUMN, total)
     given, column, begin = _array(d, J), _whole(d, COLIND), _whole(d, ROWADR)
     for r in range(0, count, ROW):
         address, to = int(rows[r + ADDRESS_OF]), int(rows[r + BEGIN])
@@ -745,7 +747,7 @@ def _copy_rows(m: int, d: int, head: int) -> None:
 
 @compiled
 def _hold(m: int, d: int, head: int) -> None:
-    """The rows' own numbers, with what memory adds: of soft contacts friction, of pyramids what differs from the mean."""
+    """The rows' own numbers, with what memory adds: of soft ones friction, of pyramids what differs from the mean."""
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
     places, rows, softness, reference = _int64(counts[PLACES]), _block(head, ROWS), _array(d, R), _array(d, AREF)
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
@@ -766,8 +768,8 @@ def _hold(m: int, d: int, head: int) -> None:
 def _multiply(m: int, head: int, vector: Any) -> None:
     """J times a vector, of all rows, into `RESIDUAL`."""
     counts, rows = _int64(head), _block(head, ROWS)
-    jacobian, columns, moves = _block(head, JACOBIAN), _int64(counts[COLUMNS]), False
-    for i in range(_number(m, NV)):
+    jacobian, columns, moves = _block(head, JACOBIAN), _int64(counts[COLUMN]), False
+    for i in range(_number(m, DOFS)):
         moves |= vector[i] != 0
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
         total, begin = 0.0, int(rows[r + BEGIN])
@@ -833,7 +835,7 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
 
 @compiled
 def _holds(rows: Any, r: int, length: int, edges: bool, axes: Any, mu: int, diagonal: Any) -> bool:
-    """Whether the forces of a contact would stay inside the cone if they alone did what accelerations lack to hold it."""
+    """Whether forces of a contact would stay inside the cone if they alone did what accelerations lack to hold it."""
     square, load = 0.0, 0.0
     for e in range(r, r + ROW * length, ROW):
         lacks = rows[e + RESIDUAL] + rows[e + SOFT] * (rows[e + MEMORY] - rows[e + HELD])

@@ -11,14 +11,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from .law import WIDTH, Law
+from .law import WIDTH, Array, Law
 
 try:
     from . import compiled as kernels
 except ImportError:
     from . import formulas as kernels  # type: ignore[no-redef]
 
-Array = npt.NDArray[np.float64]
 _INTEGRATORS = ("EULER", "RK4", "IMPLICIT", "IMPLICITFAST")
 
 
@@ -33,8 +32,8 @@ class Coulomb:
         in which contacts are seen ahead, but bear nothing: at least the way of a step at the speed of a fall through
         the scene, or a fifth of their radius.
     restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
-    servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It needs geoms with a
-        `margin`, more than bodies sink in, of which an open contact then takes no notice; and it must be slower than
+    servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It needs geoms with
+        a `margin`, more than bodies sink in, of which an open contact then takes no notice; and it must be slower than
         the contact, best five times the time constant of `solref`.
 
     What is remembered belongs to one simulation: make one for each `MjData` (under `installed` that is done for you).
@@ -88,7 +87,7 @@ class Coulomb:
 
     def state(self) -> dict[str, Array]:
         """A copy of what is remembered: contacts, (n, `law.WIDTH`), friction of joints, time and time step, s."""
-        return self._own.state()  # type: ignore[no-any-return]
+        return self._own.state()
 
     def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
         """Go on from a `state`.
@@ -152,8 +151,8 @@ class Coulomb:
     def installed(self) -> Iterator[Coulomb]:
         """Within this, `mujoco.mj_step`, `mj_forward` and `mj_step1` with `mj_step2` obey the law for this model.
 
-        It is MuJoCo's control callback, for programs that step by themselves. Each `MjData` of the model has a memory of
-        its own; other models are left alone. Several may be installed at once.
+        It is MuJoCo's control callback, for programs that step by themselves. Each `MjData` of the model has a memory
+        of its own; other models are left alone. Several may be installed at once.
 
         Raises
         ------
@@ -188,7 +187,7 @@ _INSTALLED: dict[int, Coulomb] = {}
 
 
 def _simulation(model: int, data: int) -> Any:
-    """What serves a simulation that the callback meets for the first time, if anything: its address, or 0."""
+    """What serves a simulation that the callback meets for the first time, as its form tells it, or 0."""
     coulomb = _INSTALLED.get(model)
     if coulomb is None or coulomb._adopted is None:
         kernels.remember(model, data, 0)

@@ -417,7 +417,7 @@ def test_never_more_energy(geom, velocity, rigid):
 
 
 @WAYS
-@pytest.mark.parametrize("seeds", [[47], pytest.param(range(20), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [[3], pytest.param(range(20), marks=pytest.mark.slow)])
 def test_piles_come_to_rest(seeds, rigid):
     """The collider of boxes drops points and finds them again: bodies would rock if they were not put back."""
     from docs.studies import friction
