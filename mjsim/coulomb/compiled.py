@@ -203,11 +203,17 @@ def _adopt(typing: Any, function: Any, m: Any, d: Any) -> Any:
 
 
 def compiled(function: Any) -> Any:
+    """Compiled, once for all constants; a name with an underscore only for others that are compiled."""
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
+    if function.__name__.startswith("_"):
+        options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     try:
-        return numba.njit(cache=True, **options)(function)
+        dispatcher = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no place for a cache
-        return numba.njit(**options)(function)
+        dispatcher = numba.njit(**options)(function)
+    template = dispatcher.get_call_template
+    dispatcher.get_call_template = lambda given, named: template(tuple(map(types.unliteral, given)), named)
+    return dispatcher
 
 
 @compiled
@@ -1010,7 +1016,9 @@ def _put_back(m: int, d: int, head: int) -> bool:
                     x, y = x + across[j] * (place[j] - middle[j]), y + along[j] * (place[j] - middle[j])
                 angle[seen] = math.atan2(y, x)
                 seen += 1
-        angle[:seen].sort()
+        for n in range(1, seen):
+            for k in range(n, 0, -1):
+                angle[k - 1], angle[k] = min(angle[k - 1], angle[k]), max(angle[k - 1], angle[k])
         widest = angle[0] + 2 * math.pi - angle[seen - 1]
         for n in range(1, seen):
             widest = max(widest, angle[n] - angle[n - 1])
@@ -1036,14 +1044,28 @@ def _put_back(m: int, d: int, head: int) -> bool:
 # -- doors -------------------------------------------------------------------------------------------------------------
 
 
+@functools.cache
+def link() -> None:
+    """Compile the law, and let those that follow call it by its address: once is enough."""
+    for function in control, retain:
+        function.compile((types.intp,) * 3)
+        (result,) = function.overloads.values()
+        address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
+        llvmlite.binding.add_symbol(f"coulomb_{function.__name__}", address)
+
+
+_control = _function("control", *(types.intp,) * 3)
+_retain = _function("retain", *(types.intp,) * 3)
+
+
 @compiled
 def advance(m: int, d: int, head: int, nstep: int) -> None:
     """So many steps."""
     for _ in range(nstep):
         mj_step1(m, d)
-        control(m, d, head)
+        _control(m, d, head)
         mj_step2(m, d)
-        retain(m, d, head)
+        _retain(m, d, head)
 
 
 @compiled
@@ -1057,7 +1079,7 @@ def _serve(m: int, d: int) -> None:
     else:
         head = _adopt(table[1], m, d)
     if head:
-        control(m, d, head)
+        _control(m, d, head)
 
 
 def _native(function: Any) -> Any:
@@ -1102,6 +1124,7 @@ class Simulation:
     """What one simulation remembers, in memory that the compiled loops read and write."""
 
     def __init__(self, model: Any, numbers: law.Law) -> None:
+        link()
         self._model, self._head, self._data = model, np.zeros(HEAD, np.int64), 0
         self._real = self._head.view(float)
         self.address = self._head.ctypes.data
