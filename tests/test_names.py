@@ -10,6 +10,7 @@ SAME = {
     # what every subject, file format, adapter or page has
     *("CAPTION", "CLAIMS", "DEFAULTS", "FIGURES", "PROTOCOL", "PROTOCOLS", "SCHEMA", "SCHEMA_VERSION", "SECTIONS"),
     *("Scene", "Settings", "best", "defaults", "free"),
+    "Simulation",  # under Coulomb's law, compiled and as formulas
     # the same, with another value: degrees of polynomials, records, random numbers, units and symbols of other names
     *(
         "DEGREES",

@@ -512,7 +512,9 @@ def carry_on(m: int, d: int, head: int) -> None:
 @compiled
 def _tangential(rows: Any, r: int, t: int, edges: bool, friction: float) -> float:
     """What `RESIDUAL` of a contact's rows is along a tangent."""
-    return (rows[r + 2 * ROW * t] - rows[r + 2 * ROW * t + ROW]) / (2 * friction) if edges else rows[r + ROW * (t + 1)]
+    if edges:
+        return float((rows[r + 2 * ROW * t] - rows[r + 2 * ROW * t + ROW]) / (2 * friction))
+    return float(rows[r + ROW * (t + 1)])
 
 
 @compiled
@@ -1098,7 +1100,7 @@ def callback(find: Callable[[int, int], int]) -> Any:
     `find` is a Python function of the addresses of model and data.
     """
     ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(find)
-    _simulations[1] = ctypes.cast(ask, ctypes.c_void_p).value
+    _simulations[1] = ctypes.cast(ask, ctypes.c_void_p).value or 0
     _kept.append(ask)
     return _native(_serve.py_func).ctypes
 
