@@ -184,10 +184,20 @@ def _symbol(name: str) -> Any:
 _offsets_address, _simulations_address = _symbol("coulomb_offsets"), _symbol("coulomb_simulations")
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def _pointer(typing: Any, address: Any) -> Any:
-    """The address as a pointer."""
-    return types.voidptr(types.intp), lambda context, builder, call, args: builder.inttoptr(args[0], cgutils.voidptr_t)
+def _pointer(item: Any) -> Any:
+    """A function that makes an address a pointer, which compiled code indexes."""
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def pointer(typing: Any, address: Any) -> Any:
+        def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
+            return builder.inttoptr(args[0], context.get_value_type(call.return_type))
+
+        return types.CPointer(item)(types.intp), code
+
+    return pointer
+
+
+_int32, _int64, _real = _pointer(types.int32), _pointer(types.int64), _pointer(types.float64)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -204,7 +214,7 @@ def _adopt(typing: Any, function: Any, m: Any, d: Any) -> Any:
 
 def compiled(function: Any) -> Any:
     """Compiled, once for all constants; a name with an underscore only for others that are compiled."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}, "_nrt": False}
     if function.__name__.startswith("_"):
         options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     try:
@@ -214,21 +224,6 @@ def compiled(function: Any) -> Any:
     template = dispatcher.get_call_template
     dispatcher.get_call_template = lambda given, named: template(tuple(map(types.unliteral, given)), named)
     return dispatcher
-
-
-@compiled
-def _int32(address: int) -> Any:
-    return numba.carray(_pointer(address), 1 << 40, np.int32)
-
-
-@compiled
-def _int64(address: int) -> Any:
-    return numba.carray(_pointer(address), 1 << 40, np.int64)
-
-
-@compiled
-def _real(address: int) -> Any:
-    return numba.carray(_pointer(address), 1 << 40, np.float64)
 
 
 @compiled
@@ -466,13 +461,13 @@ def _turn_in(m: int, d: int, head: int, source: int, known: bool) -> None:
 @compiled
 def convert(m: int, head: int, source: int) -> None:
     """Keep what rows bear as what contacts bear, friction in the axes of both bodies."""
-    counts, elliptic, scratch = _int64(head), _elliptic(m), np.zeros(12)
+    counts, elliptic = _int64(head), _elliptic(m)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
     for i in range(counts[COUNT]):
         k, a, r, length = W * i, 24 * i, ROW * places[4 * i + AT] + source, places[4 * i + LENGTH]
-        load, scratch[:] = k + law.LOAD, 0.0
-        for j in range(5):
-            kept[load + j] = 0.0
+        load = k + law.LOAD
+        for j in range(load, k + W):
+            kept[j] = 0.0
         kept[load] = rows[r]
         for t in range(length - 1 if elliptic else length // 2):
             if elliptic:
@@ -482,9 +477,7 @@ def convert(m: int, head: int, source: int) -> None:
                 kept[load + t], force = plus + minus, axes[a + 18 + t] * (plus - minus)
             other, kind = a + _axis(t), 1 if t >= 2 else 0
             for j in range(6):
-                scratch[2 * j + kind] += axes[other + 3 * j] * force
-        for j in range(12):
-            kept[k + law.FORCE + j] = scratch[j]
+                kept[k + law.FORCE + 2 * j + kind] += axes[other + 3 * j] * force
     dry = _room(head, DRY, counts[COUNT_DRY])
     for i in range(counts[COUNT_DRY]):
         dry[i] = rows[ROW * (counts[COUNT_ROWS] + i) + source]
@@ -960,9 +953,10 @@ def _put_back(m: int, d: int, head: int) -> bool:
     ncon, size, contact = _number(d, NCON), _at(SIZE), _int64(d + _at(CONTACT))[0]
     xpos, xmat, bound = _array(d, XPOS), _array(d, XMAT), _array(m, RBOUND)
     before, count = _block(head, BEFORE), counts[COUNT_BEFORE]
-    point, angle, added = _integers(head, SCRATCH, size // 8), np.empty(ncon), 0
+    point, added = _integers(head, SCRATCH, size // 8 + 12 + ncon), 0
     address = counts[SCRATCH]
-    normal, across, along, middle = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    normal, across, along = _real(address + size), _real(address + size + 24), _real(address + size + 48)
+    middle, angle = _real(address + size + 72), _real(address + size + 96)
     for i in range(count):
         b = W * i
         gap, g = before[b + law.GAP], (int(before[b + law.GEOMS]), int(before[b + law.GEOMS + 1]))
