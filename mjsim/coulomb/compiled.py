@@ -214,7 +214,8 @@ def _adopt(typing: Any, function: Any, m: Any, d: Any) -> Any:
 
 def compiled(function: Any) -> Any:
     """Compiled, once for all constants; a name with an underscore only for others that are compiled."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}, "_nrt": False}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
+    options["_nrt"] = False  # there are no arrays whose references would be counted
     if function.__name__.startswith("_"):
         options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     try:
