@@ -152,8 +152,8 @@ plt.show()
 # ## What slides
 #
 # The same box on a slope of 30°, where friction cannot hold it any more: it slides down
-# with $g(\\sin 30° - 0.25\\cos 30°)$. In plain MuJoCo slip lifts it; it hovers, lands
-# and hovers again. Under the law it keeps its contact, and its acceleration.
+# with $g(\sin 30^\circ - 0.25\cos 30^\circ)$. In plain MuJoCo slip lifts it; it hovers,
+# lands and hovers again. Under the law it keeps its contact, and its acceleration.
 
 # %%
 SLIDE = SLOPE.replace("0 15 0", "0 30 0").replace("0.6", "0.25")

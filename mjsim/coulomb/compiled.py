@@ -274,11 +274,12 @@ COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, 
 )
 """Counts: contacts now and before, rows, dry rows now and before, contacts and rows of the engine; whether contacts
 have their forces in the axes of bodies; whether forces are still to be found; resets by the engine; solutions."""
-MOMENT, LASTED, LEAST = 31, 32, 33
-"""Time and time step of the last call, s; distance by which contacts must move for points to be put back, m."""
+MOMENT, LASTED, LEAST, CALLED = 31, 32, 33, 44
+"""Time and time step of the step under way, s; distance by which contacts must move for points to be put back, m; time
+of the last call, s."""
 RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, CALM, NEAR, FIXED = range(34, 44)
 """The numbers of a `law.Law`, in its order."""
-HEAD = 44
+HEAD = 45
 INDEX, FIRST, LENGTH, AT = range(4)
 """Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
 SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
@@ -342,12 +343,15 @@ def control(m: int, d: int, head: int) -> None:
     """Between the reference accelerations of a step and its forces: see `law`."""
     counts, numbers = _int64(head), _real(head)
     time, resets = _value(d, TIME), _resets(d)
-    elapsed = time - numbers[MOMENT]
+    elapsed, since = time - numbers[MOMENT], time - numbers[CALLED]
     known = 0 <= elapsed <= 1.5 * numbers[LASTED] and counts[RESETS] in (resets, -1)
-    source = FOUND if elapsed > 0 else MEMORY
-    if known and elapsed > 0:
+    over = elapsed > 0.75 * numbers[LASTED]  # not in the stages of a Runge-Kutta step, nor in a second call
+    source = FOUND if over else MEMORY
+    if known and over:
         retain(m, d, head)
-    numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _value(m, STEP), resets
+    if over or not known:
+        numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _value(m, STEP), resets
+    numbers[CALLED] = time
     start = _array(d, START)
     for i in range(_number(m, DOFS)):
         start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
@@ -371,8 +375,8 @@ def control(m: int, d: int, head: int) -> None:
         _stiffen(m, d, head)
     elif numbers[SERVO]:
         _lift(m, d, head)
-    if elapsed > 0 and known and not still:
-        _turn(m, d, head, elapsed)
+    if since > 0 and known and not still:
+        _turn(m, d, head, since)
         _multiply(m, head, _array(d, QACC))
     _hold(m, d, head)
     enough = numbers[SHARE] * _gravity(m)
@@ -1125,7 +1129,7 @@ class Simulation:
         self._model, self._head, self._data = model, np.zeros(HEAD, np.int64), 0
         self._real = self._head.view(float)
         self.address = self._head.ctypes.data
-        self._real[RIGID:HEAD] = [float(value) for value in dataclasses.astuple(numbers)]
+        self._real[RIGID:CALLED] = [float(value) for value in dataclasses.astuple(numbers)]
         self._real[LEAST] = numbers.near * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
         self.reset()
         weakref.finalize(self, _free, self._head)
@@ -1180,6 +1184,7 @@ class Simulation:
             self._array(block, values.size)[:] = values.ravel()
             self._head[count] = len(values)
         self._real[[MOMENT, LASTED]] = time
+        self._real[CALLED] = time[0]
         self._head[[PENDING, TURNED, COUNT_FOUND, RESETS]] = 0, 1, -1, -1
 
 

@@ -73,6 +73,7 @@ class Simulation:
 
     def restore(self, contacts: Array, joints: Array, time: Array) -> None:
         self._kept, self._dry, (self._moment, self._lasted) = contacts.T.copy(), joints.copy(), time.tolist()
+        self._called = self._moment
         self._turned, self._pending, self._resets = True, None, b""
         self._poses, self._counts = np.empty(0), (-1, -1)
         self._memory = self._found = np.empty(0)
@@ -108,25 +109,24 @@ class Simulation:
 
     def control(self, model: Any, data: Any) -> None:
         """Between the reference accelerations of a step and its forces: see `law`."""
-        self._data, numbers, elapsed, resets = (
-            data,
-            self._law,
-            data.time - self._moment,
-            data.warning.number[_BAD].tobytes(),
-        )
+        elapsed, since = data.time - self._moment, data.time - self._called
+        numbers, resets = self._law, data.warning.number[_BAD].tobytes()
         known = 0 <= elapsed <= 1.5 * self._lasted and self._resets in (resets, b"")
-        if known and elapsed > 0:
+        over = elapsed > 0.75 * self._lasted  # not in the stages of a Runge-Kutta step, nor in a second call
+        if known and over:
             self.retain(model, data)
-        self._moment, self._lasted, self._resets = data.time, model.opt.timestep, resets
+        if over or not known:
+            self._moment, self._lasted, self._resets = data.time, model.opt.timestep, resets
+        self._called, self._data = data.time, data
         start, poses = data.qacc_warmstart, _poses(data)
         start[abs(start) < numbers.calm] = 0.0
         still = known and self._still(data, poses)
         if still:
-            if elapsed > 0:
+            if over:
                 self._memory = self._found
             self._kept[law.GAP] = data.contact.dist[self._used]
         else:
-            before = self._turn_in(data, known, elapsed)
+            before = self._turn_in(data, known, over)
             self._find(model, data, poses)
             if self._hand_on(model, *before) > self._least and self._put_back(model, data, before[0]):
                 self._find(model, data, _poses(data))
@@ -142,8 +142,8 @@ class Simulation:
             self._stiffen(model, data, acceleration)
         elif numbers.servo:
             self._lift(model, data)
-        if elapsed > 0 and known and not still:
-            self._turn_rows(data, elapsed)
+        if since > 0 and known and not still:
+            self._turn_rows(data, since)
         self._hold()
         enough = numbers.share * _gravity(model)
         if self._foresee(model, data, acceleration - self._reference, enough):
@@ -170,10 +170,10 @@ class Simulation:
         counts = len(poses), data.nf, data.nefc
         return counts == (len(then), *self._counts) and bool(abs(poses - then).max(initial=0.0) < _STILL)
 
-    def _turn_in(self, data: Any, known: bool, elapsed: float) -> tuple[Array, Array]:
+    def _turn_in(self, data: Any, known: bool, over: bool) -> tuple[Array, Array]:
         """What contacts, friction in the axes of both bodies, and dry joints bore."""
         if not self._turned and known:
-            self._convert(self._found if elapsed > 0 else self._memory)
+            self._convert(self._found if over else self._memory)
             self._carry_on(data)
         self._turned = False
         return (self._kept, self._dry) if known else (np.empty((law.WIDTH, 0)), np.empty(0))
