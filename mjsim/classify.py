@@ -121,8 +121,9 @@ class Classifier:
         band = settings.regularisation_speed(load) * settings.rolls
         saturated = friction >= (1 - _SATURATED) * limit
         # A rotation that slips at both contacts alike while one of them holds is creep, too: the load moves from one
-        # to the other, as it may where both roll, and slip would be stopped by the one that holds.
-        held = ((normal > 0) & ~saturated)[..., ::-1] & (speed < _SHARED * speed[..., ::-1])
+        # to the other, as it may where both roll, and slip would be stopped by the one that holds. Rigid contacts, which
+        # have no band, don't creep.
+        held = ((normal > 0) & ~saturated)[..., ::-1] & (speed < _SHARED * speed[..., ::-1]) & (band > 0)
         slips = saturated & (speed > 3 * band) & ~held
         rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
         shown: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
