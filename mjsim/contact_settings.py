@@ -97,8 +97,8 @@ class ContactSettings:
     facets: int = 90
     """Number of planes of the prism."""
     law: str = "soft"
-    """``soft``: contacts as the engine has them; ``rigid``: as `mjsim.Coulomb` does, for a free ball in the vessel, and the
-    parameters of soft ones decide nothing."""
+    """``soft``: contacts as the engine has them; ``rigid``: by `mjsim.Coulomb`, for a free ball, where no parameter of
+    soft contacts decides anything."""
     cone: str = "elliptic"
     integrator: str = "Euler"
     iterations: int = 100
@@ -216,17 +216,9 @@ class ContactSettings:
     def rolls(self) -> float:
         """Share of `regularisation_speed` below which a contact rolls: without memory one that does creeps so fast.
 
-        0 if contacts are rigid: one that rolls bears less than the limit of friction, however fast it seems to slip. At
-        the end of a step, against the wall as it stood, it doesn't; at the beginning of the next one the wall has turned
-        by h omega_c. So a ball that rolls on the wall seems to slip along it by h omega_c r times the spin about the
-        wall's normal, h omega_c^2 R where it rolls on the floor too: the step times the load of the wall, see
-        `turning_speed`.
+        0 if contacts are rigid: one that rolls bears less than the limit of friction, or another one holds the ball.
         """
         return 0.0 if self.rigid else 1e-3 if self.memory else 0.4
-
-    def turning_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) that a wall shows as it turns, where the ball rolls on it with the normal force m `load`."""
-        return np.asarray((self.timestep if self.rigid else 0.0) * np.asarray(load, dtype=float))
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory."""

@@ -22,15 +22,15 @@ from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, followed, resistance
 from mjsim.coulomb import Coulomb
-from model import Parameters
+from model import Parameters, State
 from model.arrays import Array
-from model.kinematics import Motion, from_world, rotated, to_world
+from model.kinematics import Motion, from_world, rotated, slip_speeds, to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 @functools.cache
-def loops() -> Callable[..., None] | None:
+def loops() -> Callable[..., float] | None:
     """`mjsim.compiled_free.advance`, if numba is installed."""
     try:
         from mjsim.compiled_free import advance
@@ -56,6 +56,11 @@ def driven(place: Any, turned: Any, velocity: Any, omega_0: float, ball: Ball) -
     )
 
 
+def unwrapped(azimuth: float, last: float) -> float:
+    """The turn of an azimuth that is nearest to the last one; that one in a run that has diverged."""
+    return azimuth + math.tau * round((last - azimuth) / math.tau) if math.isfinite(azimuth) else last
+
+
 class Free:
     """Simulations of free balls, one after the other; arguments and methods as of `mjsim.stepping.Polar`."""
 
@@ -71,13 +76,13 @@ class Free:
         self.margins, self.given_up = np.zeros((2, len(models))), np.full(len(models), np.inf)
 
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
+        slips = np.zeros((len(self._balls), 2))
         if row is not None:
             for k, ball in enumerate(self._balls):
-                (position, quaternion), (velocity, spin) = (np.split(v, [3]) for v in (ball.data.qpos, ball.data.qvel))
-                x, azimuth = from_world(Motion(position, velocity, rotated(quaternion, spin)), ball.p)
-                ball.unwrap(float(azimuth))  # coordinates of the joint chain, with the orientation upright
+                x = ball.read()  # coordinates of the joint chain, with the orientation upright
                 joints = recorder.joint_state(x, ball.theta, ball.p)
                 row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = joints
+                slips[k] = slip_speeds(x, ball.p)
         fluid = np.array(list(omega_0))
         seen = np.empty((*fluid.shape, recorder.NSENSOR)) if sensors is None else sensors
         for k, ball in enumerate(self._balls):
@@ -85,6 +90,9 @@ class Free:
             self.margins[:, k] = ball.model.pair_margin[:2]
         if row is not None and sensors is not None:
             row[:, recorder.SENSORS : -1], row[:, -1] = sensors[0], 0.0
+            for k, ball in enumerate(self._balls):
+                if ball.law:
+                    row[k, recorder.SLIPS] = slips[k, 0], 0.0, slips[k, 1], 0.0
 
     def state(self) -> dict[str, Array]:
         kept = np.empty((len(self._balls), mujoco.mj_stateSize(self._balls[0].model, _INTEGRATION)))
@@ -119,6 +127,21 @@ class _Ball:
         self._reach = settings.touching(p.g)
         self.law = Coulomb(self.model, rigid=True) if settings.rigid else None
 
+    def read(self) -> State:
+        """The state; of rigid contacts velocities along the axes of the wall as the last step held it.
+
+        At the end of a step a ball that rolls on the wall doesn't slip against that. At the beginning of the next the
+        wall has turned by h omega_c, and what that shows, h omega_c^2 R, is no slip of the ball.
+        """
+        (place, quaternion), (velocity, spin) = (np.split(v, [3]) for v in (self.data.qpos, self.data.qvel))
+        spin, azimuth = rotated(quaternion, spin), math.atan2(place[1], place[0])
+        if self.law:
+            half = (azimuth - self.theta) / 2
+            turn = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
+            velocity, spin = rotated(turn, velocity), rotated(turn, spin)
+        self.unwrap(azimuth)
+        return from_world(Motion(place, velocity, spin), self.p)[0]
+
     def law_state(self) -> dict[str, Array]:
         """What the law of rigid contacts remembers, if there is one."""
         return self.law.state() if self.law else {}
@@ -126,8 +149,7 @@ class _Ball:
     def advance(self, fluid: Array, seen: Array) -> None:
         """Take a step for each omega_0; `seen` (steps, `NSENSOR`) takes the sensors and the gaps of A and B, m."""
         if self.law and (loop := loops()):
-            loop(self.law, self.data, self._ball, fluid, seen)
-            self.unwrap(math.atan2(self.data.mocap_quat[0, 3], self.data.mocap_quat[0, 0]) * 2)
+            self.theta = loop(self.law, self.data, self._ball, fluid, seen, self.theta)
             return
         for number, omega_0 in enumerate(fluid.tolist()):
             gaps = self._step(omega_0)
@@ -153,5 +175,4 @@ class _Ball:
 
     def unwrap(self, azimuth: float) -> None:
         """Take the turn of this azimuth that is nearest to the last one; leave it in a run that has diverged."""
-        if math.isfinite(azimuth):
-            self.theta = azimuth + math.tau * round((self.theta - azimuth) / math.tau)
+        self.theta = unwrapped(azimuth, self.theta)

@@ -120,7 +120,7 @@ def newcomer(step: float) -> ContactSettings:
 
 
 def rigid(step: float) -> ContactSettings:
-    """A free ball in the vessel, its wall a plane that is turned, and Coulomb's law for any model; nothing else of ours."""
+    """A free ball in the vessel, its wall a plane that is turned, and Coulomb's law for any model; no more of ours."""
     return replace(newcomer(ContactSettings.timestep), coordinates="free", law="rigid", timestep=step)
 
 
@@ -213,8 +213,7 @@ COULOMB = replace(
     study=None,
     stream=mjsim.Run,
     title="MuJoCo under a law of friction for any model, in the limit of no time step",
-    about="a free ball in the vessel, the wall a plane that is turned to it; rigid contacts by mjsim.Coulomb, which knows "
-    "nothing of this ball",
+    about="a free ball in the vessel, the wall a plane turned to it; contacts by mjsim.Coulomb, which serves any model",
     refine=(2, 4, 8, 16),
     mark="X",
 )
@@ -261,8 +260,7 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
     A contact that rolls creeps at a speed proportional to its friction force, with a factor that the settings give; a
     hundredth more than that is creep, too, since it lags behind a force that still changes. A ball that rolls on both
     moves its load from one contact to the other, so that one may be at the limit of friction while the other holds:
-    where one of two contacts creeps, the other slips no faster than it. With rigid contacts, which don't creep, a wall that is
-    turned from step to step shows a slip of its own.
+    where one of two contacts creeps, the other slips no faster than it. Rigid contacts don't creep.
     """
     m = run.header.parameters.m
     if ENGINES[run.header.engine].settings is not ContactSettings:
@@ -271,7 +269,6 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
     settings = ContactSettings.from_mapping({f.name: kept[f.name] for f in fields(ContactSettings) if f.name in kept})
     friction = np.hypot(run.force_A[:, 0], run.force_A[:, 2]), np.hypot(run.force_B[:, 1], run.force_B[:, 2])
     creep = (1.01 * settings.creep_speed(force / m) for force in friction)
-    seen = run.slip_speed_A, run.slip_speed_B - settings.turning_speed(run.force_B[:, 0] / m)
-    A, B = (np.maximum(v - c, 0.0) for v, c in zip(seen, creep, strict=True))
+    A, B = (np.maximum(v - c, 0.0) for v, c in zip((run.slip_speed_A, run.slip_speed_B), creep, strict=True))
     both = (run.force_A[:, 1] > 0) & (run.force_B[:, 0] > 0) & (not settings.memory) & (not settings.rigid)
     return np.where(both, np.minimum(A, B), A), np.where(both, np.minimum(A, B), B)
