@@ -15,7 +15,7 @@ P = Parameters.named("reference")
 STEPS = np.array([2e-3, 1e-3, 5e-4])
 
 
-def omega_c(p, settings, lasts=6.0):
+def omega_c(p, settings, lasts=10.0):
     """After a start 2 % off the stationary state, over that of theory."""
     case = Case.RR if p.omega_0 < 13 else Case.SS
     known = analytic.solution(p, case.name)
@@ -23,7 +23,7 @@ def omega_c(p, settings, lasts=6.0):
     return run.x[-1, 2] / known.state.omega_c, run
 
 
-@pytest.mark.parametrize(("omega_0", "order", "off"), [(12.0, 0.9, 1e-3), (14.5, 1.7, 4e-4)])
+@pytest.mark.parametrize(("omega_0", "order", "off"), [(12.0, 0.9, 1e-3), (14.5, 2.0, 4e-4)])
 def test_stationary_states_are_right_in_the_limit(omega_0, order, off) -> None:
     p = P.replace(omega_0=omega_0)
     coarse, middle, fine = (omega_c(p, rigid(step))[0] - 1 for step in STEPS)
@@ -33,22 +33,24 @@ def test_stationary_states_are_right_in_the_limit(omega_0, order, off) -> None:
 
 @pytest.mark.parametrize("spin", [-3.0, -60.0])
 def test_landing_gives_the_impulses_of_impact(spin) -> None:
-    """Normal impulses come to m g t whenever the ball lands; friction is μ times that, or what ends slip."""
+    """Normal impulses come to m g t whenever the ball lands; friction is μ times that, or what ends slip.
+
+    In the step of the landing friction acts half a gap below the ball, which changes its lever by up to h v/(2 r).
+    """
     p, t_end = P.replace(c=0.0, omega_0=0.0), 0.06
     x = State(y=0.01, slip_x=spin, h=0.02)
-    run = mjsim.simulate(p, x, t_end, settings=rigid(5e-4))
+    run = mjsim.simulate(p, x, t_end, settings=rigid(3e-5))
     stops = p.j / (1 + p.j) * p.r * abs(spin)
     slides = p.mu * p.g * t_end
     assert run.v_y[-1] == pytest.approx(0.0, abs=1e-6)
-    assert np.hypot((p.R - run.h[-1]) * run.omega_c[-1], run.v_h[-1]) == pytest.approx(min(slides, stops), rel=1e-4)
+    assert np.hypot((p.R - run.h[-1]) * run.omega_c[-1], run.v_h[-1]) == pytest.approx(min(slides, stops), rel=1e-3)
 
 
-def test_rolling_shows_no_slip() -> None:
+def test_rolling_shows_next_to_no_slip() -> None:
     run = omega_c(P.replace(omega_0=12.0), rigid(1e-3))[1]
     assert set(run.cases) == {Case.RR}
-    assert run.slip_speed_A[-1] < 1e-6
-    pushed_out = 1e-3 * run.omega_c[-1] ** 2 * P.R / 2
-    assert run.slip_speed_B[-1] < 1.2 * pushed_out
+    pushed_out = 1e-3 * run.omega_c[-1] ** 2 * P.R / 2  # of the wall, into which each step leads a little
+    assert max(run.slip_speed_A[-1], run.slip_speed_B[-1]) < 1.2 * pushed_out
 
 
 def test_compiled_steps_are_those_in_python(monkeypatch) -> None:
@@ -67,7 +69,7 @@ def test_wrong_settings_lose_the_state(monkeypatch, wrong) -> None:
         monkeypatch.setattr(free._Ball, "unwrap", lambda ball, azimuth: None)
     else:
         settings = replace(settings, law="soft")
-    assert abs(omega_c(p, settings, 1.0 if wrong == "wall" else 6.0)[0] - 1) > 0.05
+    assert abs(omega_c(p, settings, 1.0 if wrong == "wall" else 10.0)[0] - 1) > 0.05
 
 
 @pytest.mark.parametrize("change", [{"coordinates": "polar"}, {"servo": 0.1}, {"integrator": "discrete"}])
