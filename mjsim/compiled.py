@@ -28,19 +28,23 @@ _ROWS = types.Array(types.float64, 2, "A")
 _GIVEN = types.Array(types.float64, 2, "A", readonly=True)
 
 
-def _named_after_source(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function whose name contains the digest of `mjsim.corrections`.
+def named_after(*modules: Any) -> Callable[..., Any]:
+    """Give a function a name that contains the digest of what it calls.
 
     Numba keeps what it compiles on disk by name, and compiles it again when the function's own file has changed, but
     not when the file of a function that it calls has.
     """
-    digest = hashlib.sha256(Path(source.__file__).read_bytes()).hexdigest()
-    function.__qualname__ += f"_{digest[:16]}"
-    return function
+    digest = hashlib.sha256(b"".join(Path(module.__file__).read_bytes() for module in modules)).hexdigest()
+
+    def name(function: Callable[..., Any]) -> Callable[..., Any]:
+        function.__qualname__ += f"_{digest[:16]}"
+        return function
+
+    return name
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-@_named_after_source
+@named_after(source)
 def drive(
     watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,
     last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,

@@ -49,6 +49,7 @@ _CHOICES = {
     "integrator": ("Euler", "implicit", "implicitfast", "discrete"),
     "coordinates": ("polar", "free"),
     "wall": ("tangent", "prism"),
+    "law": ("soft", "rigid"),
 }
 _LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
 """`contact_decay` beyond which contacts are made slower; and `solref` with its time in steps, the fastest first: stable
@@ -95,6 +96,9 @@ class ContactSettings:
     """``tangent``: one plane turned to the ball's azimuth; ``prism``: `facets` fixed planes."""
     facets: int = 90
     """Number of planes of the prism."""
+    law: str = "soft"
+    """``soft``: contacts as the engine has them; ``rigid``: by `mjsim.Coulomb`, for a free ball, where no parameter of
+    soft contacts decides anything."""
     cone: str = "elliptic"
     integrator: str = "Euler"
     iterations: int = 100
@@ -122,6 +126,14 @@ class ContactSettings:
                 "coordinates = 'free' needs memory = False and order = 1: the corrections are for the joints",
             ),
             (
+                self.rigid and (self.coordinates != "free" or self.wall != "tangent" or self.servo > 0),
+                "law = 'rigid' needs coordinates = 'free', wall = 'tangent' and servo = 0: it holds contacts by itself",
+            ),
+            (
+                self.rigid and (self.integrator == "discrete" or self.noslip_iterations > 0),
+                "law = 'rigid' needs noslip_iterations = 0 and another integrator than discrete",
+            ),
+            (
                 self.memory and self.cone != "elliptic",
                 f"memory needs the elliptic cone, not cone = {self.cone!r}: its rows mix normal and friction",
             ),
@@ -136,12 +148,19 @@ class ContactSettings:
                 raise InputError(why)
 
     @property
+    def rigid(self) -> bool:
+        """Whether contacts are rigid."""
+        return self.law == "rigid"
+
+    @property
     def largest_timestep(self) -> float:
         """Largest stable time step, s.
 
         The normal rows need tc >= 2 h (else the engine silently replaces tc), the friction rows b_f h <= 1 to die
-        out without changing sign, and the servo must be slower than a step.
+        out without changing sign, and the servo must be slower than a step. Rigid contacts are stable with any step.
         """
+        if self.rigid:
+            return math.inf
         limits = [self.solref[0] / 2, self.solreffriction * self.solimp / 2]
         return min(limits + ([self.servo] if self.servo else []))
 
@@ -184,7 +203,7 @@ class ContactSettings:
 
     def fastest_slip(self, load: float, friction: float) -> float:
         """Slip speed (m s-1) up to which contact is continuous, where `hover_number` is 1."""
-        if friction == 0:
+        if friction == 0 or self.rigid:
             return math.inf
         kept = 0.0 if self.memory else friction**2 / self.impratio
         return self.softness * load * (1 + kept) / (friction * self.b_f)
@@ -195,12 +214,15 @@ class ContactSettings:
 
     @property
     def rolls(self) -> float:
-        """Share of `regularisation_speed` below which a contact rolls: without memory one that does creeps so fast."""
-        return 1e-3 if self.memory else 0.4
+        """Share of `regularisation_speed` below which a contact rolls: without memory one that does creeps so fast.
+
+        0 if contacts are rigid: one that rolls bears less than the limit of friction, or another one holds the ball.
+        """
+        return 0.0 if self.rigid else 1e-3 if self.memory else 0.4
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory."""
-        return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)
+        return self.regularisation_speed(load) * (0.0 if self.memory or self.rigid else 1.0)
 
     @property
     def midpoint(self) -> float:
@@ -223,15 +245,17 @@ class ContactSettings:
 
         With a low impedance the accelerations are those of springs and dampers, -K (2/tc v + 1/(tc dr)^2 gap), and
         friction turns them against each other: K = [[1, eta], [-mu, 1]], with the eigenvalues 1 +- i sqrt(mu eta).
-        Beyond 1 the contacts chatter.
+        Beyond 1 the contacts chatter. 0 if they are rigid.
         """
+        if self.rigid:
+            return 0.0
         (time, ratio), pull = self.solref, 1 + 1j * math.sqrt(mu * eta)
         damping, stiffness = 2 * self.timestep / time, (self.timestep / (time * ratio)) ** 2
         return float(np.abs(np.roots([1, pull * (damping + stiffness) - 2, 1 - pull * damping])).max())
 
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching: twice the depth to which gravity presses it."""
-        return 2 * self.margin(g)
+        return 0.0 if self.rigid else 2 * self.margin(g)
 
     def slowest_fall(self, g: float) -> float:
         """Speed (m s-1) from which on a ball comes down with an impact; below, the contacts stop it softly.

@@ -2,14 +2,16 @@
 
 A free ball takes the curve of the wall from the engine: the more independent witness and the less accurate one, since
 MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis. Of the
-corrections between the steps only drag, the turning of the wall and the servo of the margins apply to it.
+corrections between the steps only drag, the turning of the wall and the servo of the margins apply to it. With
+``law="rigid"`` its contacts obey `mjsim.Coulomb`, which serves any model and knows nothing of this one.
 """
 
 from __future__ import annotations
 
 import copy
+import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import mujoco
@@ -19,11 +21,44 @@ import numpy.typing as npt
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, followed, resistance
-from model import Parameters
+from mjsim.coulomb import Coulomb
+from model import Parameters, State
 from model.arrays import Array
-from model.kinematics import Motion, from_world, rotated, to_world
+from model.kinematics import Motion, from_world, rotated, slip_speeds, to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+@functools.cache
+def loops() -> Callable[..., float] | None:
+    """`mjsim.compiled_free.advance`, if numba is installed."""
+    try:
+        from mjsim.compiled_free import advance
+    except ImportError:
+        return None
+    return advance
+
+
+def driven(place: Any, turned: Any, velocity: Any, omega_0: float, ball: Ball) -> tuple[float, ...]:
+    """Drag (9) and the torque of the fluid on a free ball, N along the vessel's axes and N m along the ball's."""
+    x, y, v_x, v_y, v_z = place[0], place[1], velocity[0], velocity[1], velocity[2]
+    w, a, b, c = turned[0], turned[1], turned[2], turned[3]
+    w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
+    mc = resistance(w_x, w_y, v_z, ball)
+    upright = 2 * (a * c - w * b), 2 * (b * c + w * a), 1 - 2 * (a * a + b * b)  # the vessel's axis along the ball's
+    return (
+        -mc * w_x,
+        -mc * w_y,
+        -mc * v_z,
+        -ball.torque * (velocity[3] - omega_0 * upright[0]),
+        -ball.torque * (velocity[4] - omega_0 * upright[1]),
+        -ball.torque * (velocity[5] - omega_0 * upright[2]),
+    )
+
+
+def unwrapped(azimuth: float, last: float) -> float:
+    """The turn of an azimuth that is nearest to the last one; that one in a run that has diverged."""
+    return azimuth + math.tau * round((last - azimuth) / math.tau) if math.isfinite(azimuth) else last
 
 
 class Free:
@@ -41,27 +76,30 @@ class Free:
         self.margins, self.given_up = np.zeros((2, len(models))), np.full(len(models), np.inf)
 
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
+        slips = np.zeros((len(self._balls), 2))
         if row is not None:
             for k, ball in enumerate(self._balls):
-                (position, quaternion), (velocity, spin) = (np.split(v, [3]) for v in (ball.data.qpos, ball.data.qvel))
-                x, azimuth = from_world(Motion(position, velocity, rotated(quaternion, spin)), ball.p)
-                ball.unwrap(float(azimuth))  # coordinates of the joint chain, with the orientation upright
+                x = ball.read()  # coordinates of the joint chain, with the orientation upright
                 joints = recorder.joint_state(x, ball.theta, ball.p)
                 row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = joints
-        for number, fluid in enumerate(omega_0):
-            for k, (ball, omega) in enumerate(zip(self._balls, fluid.tolist(), strict=True)):
-                gaps = ball.step(omega)
-                if sensors is not None:
-                    sensors[number, k] = *ball.data.sensordata, *gaps
-                self.margins[:, k] = ball.model.pair_margin[:2]
+                slips[k] = slip_speeds(x, ball.p)
+        fluid = np.array(list(omega_0))
+        seen = np.empty((*fluid.shape, recorder.NSENSOR)) if sensors is None else sensors
+        for k, ball in enumerate(self._balls):
+            ball.advance(fluid[:, k], seen[:, k])
+            self.margins[:, k] = ball.model.pair_margin[:2]
         if row is not None and sensors is not None:
             row[:, recorder.SENSORS : -1], row[:, -1] = sensors[0], 0.0
+            for k, ball in enumerate(self._balls):
+                if ball.law:
+                    row[k, recorder.SLIPS] = slips[k, 0], 0.0, slips[k, 1], 0.0
 
     def state(self) -> dict[str, Array]:
         kept = np.empty((len(self._balls), mujoco.mj_stateSize(self._balls[0].model, _INTEGRATION)))
         for ball, own in zip(self._balls, kept, strict=True):
             mujoco.mj_getState(ball.model, ball.data, own, _INTEGRATION)
-        return {
+        laws = [(k, *kept) for k, ball in enumerate(self._balls) for kept in ball.law_state().items()]
+        return {f"{name}_{k}": values for k, name, values in laws} | {
             "integration": kept,
             "theta": np.array([ball.theta for ball in self._balls]),
             "margins": self.margins.copy(),
@@ -73,6 +111,8 @@ class Free:
             mujoco.mj_setState(ball.model, ball.data, state["integration"][k], _INTEGRATION)
             ball.theta = float(state["theta"][k])
             ball.model.pair_margin[:2] = state["margins"][:, k]
+            if ball.law:
+                ball.law.restore({name: state[f"{name}_{k}"] for name in ball.law_state()})
 
 
 class _Ball:
@@ -85,29 +125,54 @@ class _Ball:
         self.data.qvel[:] = [*start.velocity, *start.spin]
         self._turns = settings.wall == "tangent"
         self._reach = settings.touching(p.g)
+        self.law = Coulomb(self.model, rigid=True) if settings.rigid else None
 
-    def step(self, omega_0: float) -> tuple[float, float]:
-        """Take a step; return the gaps of A and B before it, m."""
+    def read(self) -> State:
+        """The state; of rigid contacts velocities along the axes of the wall as the last step held it.
+
+        At the end of a step a ball that rolls on the wall doesn't slip against that. At the beginning of the next the
+        wall has turned by h omega_c, and what that shows, h omega_c^2 R, is no slip of the ball.
+        """
+        (place, quaternion), (velocity, spin) = (np.split(v, [3]) for v in (self.data.qpos, self.data.qvel))
+        spin, azimuth = rotated(quaternion, spin), math.atan2(place[1], place[0])
+        if self.law:
+            half = (azimuth - self.theta) / 2
+            turn = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
+            velocity, spin = rotated(turn, velocity), rotated(turn, spin)
+        self.unwrap(azimuth)
+        return from_world(Motion(place, velocity, spin), self.p)[0]
+
+    def law_state(self) -> dict[str, Array]:
+        """What the law of rigid contacts remembers, if there is one."""
+        return self.law.state() if self.law else {}
+
+    def advance(self, fluid: Array, seen: Array) -> None:
+        """Take a step for each omega_0; `seen` (steps, `NSENSOR`) takes the sensors and the gaps of A and B, m."""
+        if self.law and (loop := loops()):
+            self.theta = loop(self.law, self.data, self._ball, fluid, seen, self.theta)
+            return
+        for number, omega_0 in enumerate(fluid.tolist()):
+            gaps = self._step(omega_0)
+            seen[number] = *self.data.sensordata, *gaps
+
+    def _step(self, omega_0: float) -> tuple[float, float]:
         data, p, gain = self.data, self.p, self._ball.gain
-        x, y, z, *_ = data.qpos.tolist()
-        v_x, v_y, v_z, *_ = data.qvel.tolist()
-        w_x, w_y, gaps = v_x + omega_0 * y, v_y - omega_0 * x, (z - p.r, p.R - math.hypot(x, y))
-        mc = resistance(w_x, w_y, v_z, self._ball)
-        data.qfrc_applied[:3] = -mc * w_x, -mc * w_y, -mc * v_z  # (9)
-        if self._ball.torque:  # the spin is along the ball's own axes, that of the fluid along the vessel's
-            fluid = rotated(data.qpos[3:7] * [1, -1, -1, -1], np.array([0.0, 0.0, omega_0]))
-            data.qfrc_applied[3:] = -self._ball.torque * (data.qvel[3:] - fluid)
-        self.unwrap(math.atan2(y, x))
+        place, turned = data.qpos[:3].tolist(), data.qpos[3:].tolist()
+        data.qfrc_applied[:] = driven(place, turned, data.qvel.tolist(), omega_0, self._ball)
+        gaps = place[2] - p.r, p.R - math.hypot(place[0], place[1])
+        self.unwrap(math.atan2(place[1], place[0]))
         if self._turns:
             data.mocap_quat[0] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
         if gain:
             for contact, gap in enumerate(gaps):
                 if gap < self._reach:
                     self.model.pair_margin[contact] = followed(self.model.pair_margin[contact], gap, gain)
-        mujoco.mj_step(self.model, data)
+        if self.law:
+            self.law.step(data)
+        else:
+            mujoco.mj_step(self.model, data)
         return gaps
 
     def unwrap(self, azimuth: float) -> None:
         """Take the turn of this azimuth that is nearest to the last one; leave it in a run that has diverged."""
-        if math.isfinite(azimuth):
-            self.theta = azimuth + math.tau * round((self.theta - azimuth) / math.tau)
+        self.theta = unwrapped(azimuth, self.theta)

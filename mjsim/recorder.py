@@ -15,6 +15,8 @@ NQ, NV, NSENSOR = 7, 6, 30
 SENSORS = NQ + NV
 """Where the sensors begin in a raw sample, which ends with the time by which all but velocities are ahead of them."""
 COLUMNS = SENSORS + NSENSOR + 1
+SLIPS = SENSORS + np.array([12, 13, 26, 27])
+"""Where they hold the slip velocities of A and B."""
 _COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
 
 

@@ -119,6 +119,11 @@ def newcomer(step: float) -> ContactSettings:
     return replace(contacts, servo=0.0, memory=False, order=1)
 
 
+def rigid(step: float) -> ContactSettings:
+    """A free ball in the vessel, its wall a plane that is turned, and Coulomb's law for any model; no more of ours."""
+    return replace(newcomer(ContactSettings.timestep), coordinates="free", law="rigid", timestep=step)
+
+
 def as_it_comes(step: float) -> ContactSettings:
     """MuJoCo's own parameters for a free ball in a vessel of flat facets, with its own friction cone, the pyramid."""
     return replace(newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
@@ -201,6 +206,17 @@ NEWCOMER = replace(
     stream=_unwarned,
     mark="x",
 )
+COULOMB = replace(
+    PLAIN,
+    name="mujoco-coulomb",
+    configure=lambda given, p: rigid(given.get("timestep", ContactSettings.timestep)),
+    study=None,
+    stream=mjsim.Run,
+    title="MuJoCo under a law of friction for any model, in the limit of no time step",
+    about="a free ball in the vessel, the wall a plane turned to it; contacts by mjsim.Coulomb, which serves any model",
+    refine=(2, 4, 8, 16),
+    mark="X",
+)
 EVENT = Engine(
     name="event",
     settings=analytic.Settings,
@@ -226,7 +242,7 @@ _OTHERS = (
 )
 WITNESSES = (MUJOCO, PLAIN, NEWCOMER)
 """Who is heard of a claim where no engine is named: the one on trial, and two beside it."""
-ENGINES: dict[str, Engine] = {each.name: each for each in (*WITNESSES, EVENT, MOREAU, *_OTHERS)}
+ENGINES: dict[str, Engine] = {each.name: each for each in (*WITNESSES, COULOMB, EVENT, MOREAU, *_OTHERS)}
 """Every engine by name."""
 
 
@@ -244,7 +260,7 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
     A contact that rolls creeps at a speed proportional to its friction force, with a factor that the settings give; a
     hundredth more than that is creep, too, since it lags behind a force that still changes. A ball that rolls on both
     moves its load from one contact to the other, so that one may be at the limit of friction while the other holds:
-    where one of two contacts creeps, the other slips no faster than it.
+    where one of two contacts creeps, the other slips no faster than it. Rigid contacts don't creep.
     """
     m = run.header.parameters.m
     if ENGINES[run.header.engine].settings is not ContactSettings:
@@ -254,5 +270,5 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
     friction = np.hypot(run.force_A[:, 0], run.force_A[:, 2]), np.hypot(run.force_B[:, 1], run.force_B[:, 2])
     creep = (1.01 * settings.creep_speed(force / m) for force in friction)
     A, B = (np.maximum(v - c, 0.0) for v, c in zip((run.slip_speed_A, run.slip_speed_B), creep, strict=True))
-    both = (run.force_A[:, 1] > 0) & (run.force_B[:, 0] > 0) & (not settings.memory)
+    both = (run.force_A[:, 1] > 0) & (run.force_B[:, 0] > 0) & (not settings.memory) & (not settings.rigid)
     return np.where(both, np.minimum(A, B), A), np.where(both, np.minimum(A, B), B)

@@ -16,7 +16,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from compare.kit import record
-from compare.kit.engines import NEWCOMER, PLAIN, Engine
+from compare.kit.engines import COULOMB, NEWCOMER, PLAIN, Engine
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
@@ -86,15 +86,15 @@ class Protocol:
 
     def measures(self, lab: Lab) -> dict[str, Parameters]:
         """The sets that it measures at a level with an engine, by name."""
-        asked = {PLAIN.name: self.plain, NEWCOMER.name: self.defaults}.get(lab.engine.name, self.quick)
-        known = sets(lab.level)
+        limited, known = lab.engine in (PLAIN, COULOMB), sets(lab.level)
+        asked = self.plain if limited else self.defaults if lab.engine is NEWCOMER else self.quick
         steps = self.steps[lab.level > Level.QUICK]
-        if (lab.beside and self.engine) or (lab.engine is PLAIN and lab.refine not in PLAIN.refine[:steps]):
+        if (lab.beside and self.engine) or (limited and lab.refine not in lab.engine.refine[:steps]):
             return {}
         if lab.level > Level.QUICK:
             asked = tuple(known)
             if lab.beside:
-                asked = asked[: 1 if not self.plain else TWELVE] if lab.engine is PLAIN else self.defaults
+                asked = asked[: 1 if not self.plain else TWELVE] if limited else self.defaults
         return {name: p for name, p in known.items() if name in asked}
 
 

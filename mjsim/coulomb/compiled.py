@@ -690,7 +690,9 @@ def _stiffen(m: int, d: int, head: int) -> None:
         a, length, gap = places[4 * i + FIRST], places[4 * i + LENGTH], kept[W * i + law.GAP]
         edges = length > 1 and not elliptic
         speed = (velocity[a] + velocity[a + 1]) / 2 if edges else velocity[a]
-        goal = -gap / h if gap > 0 else min(-numbers[PUSH] * gap / h, slow)
+        held = ROW * places[4 * i + AT] + MEMORY
+        load = diagonal[a] * (rows[held] + rows[held + ROW] if edges else rows[held])
+        goal = -gap / h if gap > 0 else min(-numbers[PUSH] * gap / h, max(slow, h * load))
         r, above = ROW * places[4 * i + AT] + RESIDUAL, max(gap, 0.0)
         fall = h * max(-(rows[r] + rows[r + ROW]) / 2 if edges else -rows[r], 0.0)
         if numbers[RESTITUTION] > 0 and gap + h * (speed - fall) < 0 and speed < -2 * slow:

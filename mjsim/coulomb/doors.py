@@ -120,6 +120,11 @@ class Coulomb:
             return
         self._own.advance(self.model, data, nstep)
 
+    def addresses(self, data: Any) -> tuple[int, int, int]:
+        """Of model, data and what is remembered, for compiled loops that take steps by `compiled.control`."""
+        self._begin(data)
+        return self.model._address, data._address, self._own.serve(data._address)
+
     def step1(self, data: Any) -> None:
         """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
         self._begin(data)

@@ -1,0 +1,82 @@
+"""A free ball under Coulomb's law for any model: how its step shows, what is left without one, and what must not be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import analytic
+import mjsim
+from compare.kit.engines import COULOMB, rigid
+from mjsim import free
+from model import Case, InputError, Parameters, State
+
+P = Parameters.named("reference")
+STEPS = np.array([2e-3, 1e-3, 5e-4])
+
+
+def omega_c(p, settings, lasts=10.0):
+    """After a start 2 % off the stationary state, over that of theory."""
+    case = Case.RR if p.omega_0 < 13 else Case.SS
+    known = analytic.solution(p, case.name)
+    run = mjsim.simulate(p, 0.98 * np.array(known.x, float), lasts, settings=settings)
+    return run.x[-1, 2] / known.state.omega_c, run
+
+
+@pytest.mark.parametrize(("omega_0", "order", "off"), [(12.0, 0.9, 1e-3), (14.5, 2.0, 4e-4)])
+def test_stationary_states_are_right_in_the_limit(omega_0, order, off) -> None:
+    p = P.replace(omega_0=omega_0)
+    coarse, middle, fine = (omega_c(p, rigid(step))[0] - 1 for step in STEPS)
+    assert np.log2((coarse - middle) / (middle - fine)) == pytest.approx(order, abs=0.4)
+    assert (coarse - 6 * middle + 8 * fine) / 3 == pytest.approx(0.0, abs=off)
+
+
+@pytest.mark.parametrize("spin", [-3.0, -60.0])
+def test_landing_gives_the_impulses_of_impact(spin) -> None:
+    """Normal impulses come to m g t whenever the ball lands; friction is μ times that, or what ends slip.
+
+    In the step of the landing friction acts half a gap below the ball, which changes its lever by up to h v/(2 r).
+    """
+    p, t_end = P.replace(c=0.0, omega_0=0.0), 0.06
+    x = State(y=0.01, slip_x=spin, h=0.02)
+    run = mjsim.simulate(p, x, t_end, settings=rigid(3e-5))
+    stops = p.j / (1 + p.j) * p.r * abs(spin)
+    slides = p.mu * p.g * t_end
+    assert run.v_y[-1] == pytest.approx(0.0, abs=1e-6)
+    assert np.hypot((p.R - run.h[-1]) * run.omega_c[-1], run.v_h[-1]) == pytest.approx(min(slides, stops), rel=1e-3)
+
+
+def test_rolling_shows_next_to_no_slip() -> None:
+    run = omega_c(P.replace(omega_0=12.0), rigid(1e-3))[1]
+    assert set(run.cases) == {Case.RR}
+    pushed_out = 1e-3 * run.omega_c[-1] ** 2 * P.R / 2  # of the wall, into which each step leads a little
+    assert max(run.slip_speed_A[-1], run.slip_speed_B[-1]) < 1.2 * pushed_out
+
+
+def test_compiled_steps_are_those_in_python(monkeypatch) -> None:
+    p = P.replace(omega_0=25.0, fluid_torque=0.3, drag="schiller-naumann", nu_f=1e-5)
+    x, settings = State(y=0.002, omega_c=9.0, slip_x=20.0), rigid(1e-3)
+    fast = mjsim.simulate(p, x, 0.3, settings=settings)
+    monkeypatch.setattr(free, "loops", lambda: None)
+    assert mjsim.simulate(p, x, 0.3, settings=settings).x == pytest.approx(fast.x, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize("wrong", ["wall", "law"])
+def test_wrong_settings_lose_the_state(monkeypatch, wrong) -> None:
+    p, settings = P.replace(omega_0=12.0), rigid(5e-4)
+    if wrong == "wall":
+        monkeypatch.setattr(free, "loops", lambda: None)
+        monkeypatch.setattr(free._Ball, "unwrap", lambda ball, azimuth: None)
+    else:
+        settings = replace(settings, law="soft")
+    assert abs(omega_c(p, settings, 1.0 if wrong == "wall" else 10.0)[0] - 1) > 0.05
+
+
+@pytest.mark.parametrize("change", [{"coordinates": "polar"}, {"servo": 0.1}, {"integrator": "discrete"}])
+def test_settings_that_the_law_cannot_serve(change) -> None:
+    with pytest.raises(InputError, match="law = 'rigid' needs"):
+        replace(rigid(1e-3), **change)
+
+
+def test_engine_takes_its_steps_from_these_settings() -> None:
+    assert COULOMB.at(1e-3, P) == rigid(1e-3)
