@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numba
 from numba.extending import register_jitable
 
 from mjsim import compiled, corrections, free
@@ -16,7 +17,7 @@ from model.arrays import Array
 _driven, _unwrapped = register_jitable(free.driven), register_jitable(free.unwrapped)
 
 
-@kernels.compiled
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 @compiled.named_after(corrections, free, kernels)
 def _advance(
     m: int, d: int, head: int, ball: Any, fluid: Array,
@@ -31,9 +32,9 @@ def _advance(
         wall[0], wall[3] = math.cos(theta / 2), math.sin(theta / 2)
         seen[number, -2], seen[number, -1] = qpos[2] - ball.r, ball.R - math.hypot(x, y)
         kernels.mj_step1(m, d)
-        kernels.control(m, d, head)
+        kernels.control_linked(m, d, head)
         kernels.mj_step2(m, d)
-        kernels.retain(m, d, head)
+        kernels.retain_linked(m, d, head)
         for i in range(len(sensors)):
             seen[number, i] = sensors[i]
     return theta

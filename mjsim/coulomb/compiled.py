@@ -1057,8 +1057,8 @@ def link() -> None:
         llvmlite.binding.add_symbol(f"coulomb_{function.__name__}", address)
 
 
-_control = _function("control", *(types.intp,) * 3)
-_retain = _function("retain", *(types.intp,) * 3)
+control_linked = _function("control", *(types.intp,) * 3)
+retain_linked = _function("retain", *(types.intp,) * 3)
 
 
 @compiled
@@ -1066,9 +1066,9 @@ def advance(m: int, d: int, head: int, nstep: int) -> None:
     """So many steps."""
     for _ in range(nstep):
         mj_step1(m, d)
-        _control(m, d, head)
+        control_linked(m, d, head)
         mj_step2(m, d)
-        _retain(m, d, head)
+        retain_linked(m, d, head)
 
 
 @compiled
@@ -1082,7 +1082,7 @@ def _serve(m: int, d: int) -> None:
     else:
         head = _adopt(table[1], m, d)
     if head:
-        _control(m, d, head)
+        control_linked(m, d, head)
 
 
 def _native(function: Any) -> Any:

@@ -352,15 +352,19 @@ class Simulation:
         numbers, h, gap, dry = self._law, model.opt.timestep, self._kept[law.GAP], self._counts[0]
         rows, velocity, slow = self._rows[dry:], data.efc_vel[self._rows], h * _gravity(model)
         speed, fall = self._normal(velocity), h * np.maximum(-self._normal(acceleration), 0.0)
-        goal = np.where(gap > 0, -gap / h, np.minimum(-numbers.push * gap / h, slow))
+        first = self._rows[self._first]
+        estimate, load = getattr(data, _DIAGONAL)[first], self._memory[self._first]
+        if not self._elliptic:
+            load = load + np.where(self._length > 1, self._memory[self._other[self._first]], 0.0)
+        push = np.minimum(-numbers.push * gap / h, np.maximum(slow, h * estimate * load))
+        goal = np.where(gap > 0, -gap / h, push)
         blow = (gap + h * (speed - fall) < 0) & (speed < -2 * slow) & (numbers.restitution > 0)
         if blow.any():  # Euler's method keeps v²/2 + gz - hgv/2 in flight
             above = fall / h * np.maximum(gap, 0.0)
             energy = speed * (speed - fall) / 2 + above
             square = fall**2 / 4 + 2 * (numbers.restitution**2 * energy - above)
             goal[blow] = np.maximum(goal, np.sqrt(np.maximum(square, 0.0)) - fall / 2)[blow]
-        first = self._rows[self._first]
-        self._soft[dry:] *= (numbers.softness * getattr(data, _DIAGONAL)[first] / self._soft[self._first])[self._of]
+        self._soft[dry:] *= (numbers.softness * estimate / self._soft[self._first])[self._of]
         velocity[self._normals] -= goal[self._normals_of]
         self._reference[dry:] = -velocity[dry:] / h
         data.efc_R[rows], data.efc_D[rows] = self._soft[dry:], 1 / self._soft[dry:]
