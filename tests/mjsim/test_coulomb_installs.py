@@ -1,0 +1,73 @@
+"""What serves where: compiled loops, and formulas where numba or the memory of MuJoCo is not as they need it."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+HOLDS = """
+import mujoco
+from mjsim import Coulomb
+from mjsim.coulomb import doors
+model = mujoco.MjModel.from_xml_string(
+    '<mujoco><option tolerance="1e-12" gravity="2.5 0 -9.5"/><worldbody><geom type="plane" size="9 9 1"/>'
+    '<body pos="0 0 .05"><freejoint/><geom type="box" size=".05 .05 .05"/></body></worldbody></mujoco>'
+)
+data, coulomb = mujoco.MjData(model), Coulomb(model)
+coulomb.step(data, 1000)
+place = data.qpos[0]
+coulomb.step(data, 50)
+with coulomb.installed():
+    mujoco.mj_step(model, data, 50)
+assert abs(data.qpos[0] - place) < 1e-12, data.qpos[0] - place
+print(doors.kernels.__name__)
+"""
+
+
+def serves(before: str) -> str:
+    """The module that holds a box on a slope in a Python of its own."""
+    done = subprocess.run([sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "import sys; sys.modules['numba'] = None",
+        "import os; os.environ['NUMBA_DISABLE_JIT'] = '1'",
+        "import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fields = d.fields[1:]",
+        "import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fields = d.fields[::-1]",
+    ],
+    ids=["without numba", "told not to compile", "a member is missing", "laid out in another way"],
+)
+def test_formulas_serve(before):
+    assert serves(before) == "mjsim.coulomb.formulas"
+
+
+@pytest.mark.slow  # it compiles
+def test_compiled_loops_need_no_place_for_a_cache():
+    pytest.importorskip("numba")
+    before = (
+        "from numba.core import caching\n"
+        "for name in 'CacheImpl', '_CacheImpl', 'CompileResultCacheImpl':\n"
+        "    vars(caching).get(name, type('', (), {}))._locator_classes = []\n"
+    )
+    assert serves(before) == "mjsim.coulomb.compiled"
+
+
+def test_an_older_mujoco_is_named():
+    before = "import sys, mujoco; mujoco.__version__ = '3.3.0'; sys.modules['mujoco.batch'] = None; "
+    done = subprocess.run([sys.executable, "-c", before + "import mjsim"], cwd=ROOT, capture_output=True, text=True)
+    assert done.stderr.splitlines()[-1].startswith("ImportError: dualball needs MuJoCo 4.0, and this is 3.3.0")
+
+
+def test_both_wheels_have_one_version():
+    versions = [
+        tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"]["version"]
+        for folder in (".", "mjsim/coulomb")
+    ]
+    assert versions[0] == versions[1]
