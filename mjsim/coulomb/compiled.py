@@ -60,15 +60,15 @@ def _layout(struct: str) -> type[ctypes.Structure]:
 
 _DATA = (
     "time", "ncon", "nefc", "ne", "nf", "warning", "geom_xpos", "geom_xmat", "contact", "efc_KBIP", "efc_R", "efc_D",
-    "efc_diagA", "efc_vel", "efc_margin", "efc_aref", "efc_frictionloss", "efc_J", "efc_J_rownnz", "efc_J_rowadr",
+    "efc_diagA", "efc_vel", "efc_aref", "efc_frictionloss", "efc_J", "efc_J_rownnz", "efc_J_rowadr",
     "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D", "qvel",
 )  # fmt: skip
 (
-    TIME, NCON, NEFC, NE, NF, WARNING, XPOS, XMAT, CONTACT, KBIP, R, D, DIAG, VEL, MARGIN, AREF, LOSS, J, ROWNNZ,
+    TIME, NCON, NEFC, NE, NF, WARNING, XPOS, XMAT, CONTACT, KBIP, R, D, DIAG, VEL, AREF, LOSS, J, ROWNNZ,
     ROWADR, COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D, QVEL,
 ) = range(len(_DATA))  # fmt: skip
-_CONTACT = ("dist", "pos", "frame", "friction", "mu", "dim", "geom", "efc_address", "includemargin", "adhesion")
-DIST, POS, FRAME, FRICTION, MU, DIM, GEOM, ADDRESS, INCLUDE, ADHESION = range(len(_DATA), len(_DATA) + len(_CONTACT))
+_CONTACT = ("dist", "pos", "frame", "friction", "mu", "dim", "geom", "efc_address", "includemargin")
+DIST, POS, FRAME, FRICTION, MU, DIM, GEOM, ADDRESS, INCLUDE = range(len(_DATA), len(_DATA) + len(_CONTACT))
 SIZE = len(_DATA) + len(_CONTACT)
 _MODEL = ("nv", "ngeom", "geom_rbound")
 DOFS, NGEOM, RBOUND = range(SIZE + 1, SIZE + 1 + len(_MODEL))
@@ -77,7 +77,7 @@ STEP, GRAVITY, CONE, SOLVER = range(DOFS + len(_MODEL), DOFS + len(_MODEL) + len
 
 _OLD = {"efc_diagA": "efc_diagApprox"}
 """Names that MuJoCo 3.3 has."""
-_LATER = {"map_efc2iefc", "iefc_R", "iefc_D", "adhesion"}
+_LATER = {"map_efc2iefc", "iefc_R", "iefc_D"}
 """What it has not."""
 
 
@@ -254,15 +254,6 @@ def _value(struct: int, name: int) -> float:
     return float(_real(struct + _at(name))[0])
 
 
-_UNMOVED = 1e-6
-"""Distance below which a contact is the one of the same number in the last step, m."""
-_STILL = 1e-9
-"""Most that contacts and bodies may move, m or rad, for what depends on their poses to stay as it is."""
-_OPEN = 1e9
-"""Approach that a contact allows which is open, m s-2."""
-_CORNER = 1.05 * math.pi
-"""Angle without other points of its patch that a corner of the patch sees at least."""
-
 # -- what a simulation remembers ---------------------------------------------------------------------------------------
 
 KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH = range(0, 20, 2)
@@ -405,7 +396,7 @@ def _same(d: int, offset: int, length: int, poses: Any, at: int) -> bool:
     """Whether an array of `mjData` is as it was."""
     now = _real(_int64(d + offset)[0])
     for i in range(length):  # noqa: SIM110
-        if not abs(now[i] - poses[at + i]) < _STILL:
+        if not abs(now[i] - poses[at + i]) < law.STILL:
             return False
     return True
 
@@ -433,10 +424,10 @@ def _still(m: int, d: int, head: int) -> bool:
         ):
             return False
         for j in range(3):  # points of flush faces shift by µm
-            if not abs(pos[j] - poses[first + j]) < 1e3 * _STILL:
+            if not abs(pos[j] - poses[first + j]) < 1e3 * law.STILL:
                 return False
         for j in range(6):
-            if not abs(axes[j] - poses[first + 3 + j]) < _STILL:
+            if not abs(axes[j] - poses[first + 3 + j]) < law.STILL:
                 return False
         for j in range(3):
             if slide[j] != poses[first + 9 + j]:
@@ -621,7 +612,7 @@ def _hand_on(m: int, d: int, head: int, scattered: bool) -> float:
     first, moved, fewer = 0, 0.0, False
     for i in range(counts[COUNT_BEFORE]):
         b, nearest, least, begin = W * i, -1, math.inf, first
-        if i < count and _apart(kept, W * i, before, b) < _UNMOVED**2:
+        if i < count and _apart(kept, W * i, before, b) < law.UNMOVED**2:
             nearest, least = i, 0.0
         for turn in range(0 if nearest == i else count):  # contacts of a pair are together, mostly where they were
             k = begin + turn
@@ -722,7 +713,7 @@ def _lift(m: int, d: int, head: int) -> None:
         margin, gap = _value(contact + places[4 * i + INDEX] * _at(SIZE), INCLUDE), kept[k + law.GAP]
         lift = min(max(kept[k + law.LIFT] - _value(m, STEP) / numbers[SERVO] * gap, 0.0), margin)
         kept[k + law.LIFT] = lift
-        spring = kbip[4 * a] * kbip[4 * a + 2] * (margin - lift) if lift > 0 or gap <= 0 else _OPEN
+        spring = kbip[4 * a] * kbip[4 * a + 2] * (margin - lift) if lift > 0 or gap <= 0 else law.APART
         for r in range(a, a + (1 if elliptic else length)):
             reference[r] -= spring
 
@@ -1025,7 +1016,7 @@ def _put_back(m: int, d: int, head: int) -> bool:
         widest = angle[0] + 2 * math.pi - angle[seen - 1]
         for n in range(1, seen):
             widest = max(widest, angle[n] - angle[n - 1])
-        if widest <= _CORNER:
+        if widest <= law.CORNER:
             continue
         template = _int64(contact + same * size)
         for n in range(size // 8):

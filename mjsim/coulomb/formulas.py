@@ -23,14 +23,6 @@ Whole = npt.NDArray[np.intp]
 _BAD = slice(mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQACC + 1)
 _ELLIPTIC, _PGS = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_PGS
 _DIAGONAL = "efc_diagA" if hasattr(mujoco.MjData, "efc_diagA") else "efc_diagApprox"
-_UNMOVED = 1e-6
-"""Distance below which a contact is the one of the same number in the last step, m."""
-_STILL = 1e-9
-"""Most that contacts and bodies may move, m or rad, for what depends on their poses to stay as it is."""
-_OPEN = 1e9
-"""Approach that a contact allows which is open, m s-2."""
-_CORNER = 1.05 * math.pi
-"""Angle without other points of its patch that a corner of the patch sees at least."""
 _COLUMNS = np.array([2, 4, 1, 3, 5])
 """Where forces along the tangents, and moments about normal and tangents, stand in rows (axis; force, moment)."""
 
@@ -168,7 +160,7 @@ class Simulation:
         """Whether bodies and contacts are where their axes and Jacobians were taken last."""
         then = self._poses
         counts = len(poses), data.nf, data.nefc
-        return counts == (len(then), *self._counts) and bool(abs(poses - then).max(initial=0.0) < _STILL)
+        return counts == (len(then), *self._counts) and bool(abs(poses - then).max(initial=0.0) < law.STILL)
 
     def _turn_in(self, data: Any, known: bool, over: bool) -> tuple[Array, Array]:
         """What contacts, friction in the axes of both bodies, and dry joints bore."""
@@ -235,7 +227,7 @@ class Simulation:
         old, nearest = _spans(begin, count)
         nearest, place = order[nearest], slice(law.PLACE, law.NORMAL)
         square = ((kept[place, nearest] - before[place, old]) ** 2).sum(axis=0)
-        square[(nearest == old) & (square < _UNMOVED**2)] = -1.0
+        square[(nearest == old) & (square < law.UNMOVED**2)] = -1.0
         best = np.lexsort((square, old))[(np.cumsum(count) - count)[count > 0]]
         best = best[np.argsort(nearest[best], kind="stable")]
         if len(best):
@@ -286,7 +278,7 @@ class Simulation:
             across /= math.hypot(*across)
             frame = np.array([normal[k], across, np.cross(normal[k], across)])
             angles = np.sort(np.arctan2(*(frame[:0:-1] @ away.T)))
-            if np.diff(angles, append=angles[0] + 2 * math.pi).max() > _CORNER:
+            if np.diff(angles, append=angles[0] + 2 * math.pi).max() > law.CORNER:
                 point = copy.copy(data.contact[same[-1]])
                 point.pos, point.dist, point.frame = middle[k], gap[k], frame.ravel()
                 mujoco.mj_addContact(model, data, point)
@@ -379,7 +371,7 @@ class Simulation:
         kept, gap, stiffness = self._kept, self._kept[law.GAP], data.efc_KBIP[self._rows[self._first]]
         margin = data.contact.includemargin[self._used]
         kept[law.LIFT] = lift = np.clip(kept[law.LIFT] - model.opt.timestep / self._law.servo * gap, 0.0, margin)
-        spring = np.where((lift > 0) | (gap <= 0), stiffness[:, 0] * stiffness[:, 2] * (margin - lift), _OPEN)
+        spring = np.where((lift > 0) | (gap <= 0), stiffness[:, 0] * stiffness[:, 2] * (margin - lift), law.APART)
         self._reference[self._normals] -= spring[self._normals_of]
 
     def _hold(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,15 @@ normal, or each pair of a pyramid's edges, bears (5), N; force and moment of fri
 axis; force, moment; 12), N and N m; the velocity that its last Jacobian gives to the present speeds, in world axes (3),
 m s-1."""
 NEW, OPEN, STICKS, SLIDES = range(4)
+
+UNMOVED = 1e-6
+"""Distance below which a contact is the one of the same number in the last step, m."""
+STILL = 1e-9
+"""Most that contacts and bodies may move, m or rad, for what depends on their poses to stay as it is."""
+APART = 1e9
+"""Approach that a contact allows which is open, m s-2."""
+CORNER = 1.05 * math.pi
+"""Angle without other points of its patch that a corner of the patch sees at least."""
 
 
 @dataclass(frozen=True)
