@@ -256,21 +256,21 @@ def _value(struct: int, name: int) -> float:
 
 # -- what a simulation remembers ---------------------------------------------------------------------------------------
 
-KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH = range(0, 20, 2)
+KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH, CHAINS = range(0, 22, 2)
 """Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their
 axes in those of both bodies, friction and regular friction (24); their places (4); rows (`ROW`); Jacobians and their
-columns; what dry friction bore; poses at which these were taken; a contact."""
+columns; what dry friction bore; poses at which these were taken; a contact; contacts by their geoms (`_chain`)."""
 COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, TURNED, PENDING, RESETS, SOLVES = range(
-    20, 31
+    22, 33
 )
 """Counts: contacts now and before, rows, dry rows now and before, contacts and rows of the engine; whether contacts
 have their forces in the axes of bodies; whether forces are still to be found; resets by the engine; solutions."""
-MOMENT, LASTED, LEAST, CALLED = 31, 32, 33, 44
+MOMENT, LASTED, LEAST, CALLED = 33, 34, 35, 47
 """Time and time step of the step under way, s; distance by which contacts must move for points to be put back, m; time
 of the last call, s."""
-RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, CALM, NEAR, FIXED = range(34, 44)
+RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED = range(36, 47)
 """The numbers of a `law.Law`, in its order."""
-HEAD = 45
+HEAD = 48
 INDEX, FIRST, LENGTH, AT = range(4)
 """Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
 SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
@@ -354,9 +354,9 @@ def control(m: int, d: int, head: int) -> None:
     else:
         _turn_in(m, d, head, source, known)
         _find(m, d, head)
-        if _hand_on(m, d, head, False) > numbers[LEAST] and _put_back(m, d, head):
+        if _hand_on(m, d, head) > numbers[LEAST] and _put_back(m, d, head):
             _find(m, d, head)
-            _hand_on(m, d, head, True)
+            _hand_on(m, d, head)
         _copy_rows(m, d, head)
     if counts[COUNT] + counts[COUNT_DRY] == 0:
         counts[PENDING] = 0
@@ -368,7 +368,6 @@ def control(m: int, d: int, head: int) -> None:
         _lift(m, d, head)
     if since > 0 and known and not still:
         _turn(m, d, head, since)
-        _multiply(m, head, _array(d, QACC))
     _hold(m, d, head)
     enough = numbers[SHARE] * _gravity(m)
     if _foresee(m, d, head, enough):
@@ -481,17 +480,15 @@ def convert(m: int, head: int, source: int) -> None:
 
 @compiled
 def carry_on(m: int, d: int, head: int) -> None:
-    """The velocity that each contact's last Jacobian gives to the present speeds, along its last axes: `law.SPEED`."""
-    counts, edges, ngeom = _int64(head), not _elliptic(m), _number(m, NGEOM)
-    kept, axes, poses = _block(head, KEPT), _block(head, AXES), _block(head, POSES)
-    places, rows = _int64(counts[PLACES]), _block(head, ROWS)
-    _multiply(m, head, _array(d, QVEL))
+    """The velocity that what sticks has by its last Jacobian and the present speeds, along its last axes."""
+    counts, edges, ngeom, speeds = _int64(head), not _elliptic(m), _number(m, NGEOM), _array(d, QVEL)
+    kept, axes, poses, places = _block(head, KEPT), _block(head, AXES), _block(head, POSES), _int64(counts[PLACES])
     for i in range(counts[COUNT]):
-        k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT] + RESIDUAL, 12 * ngeom + 20 * places[4 * i + INDEX] + 3
+        k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT], 12 * ngeom + 20 * places[4 * i + INDEX] + 3
         for j in range(3):
             kept[k + j] = 0.0
-        for t in range(2 if places[4 * i + LENGTH] > 1 else 0):
-            speed = _tangential(rows, r, t, edges, axes[24 * i + 18 + t])
+        for t in range(2 if places[4 * i + LENGTH] > 1 and kept[W * i + law.STATE] == law.STICKS else 0):
+            speed = _tangential(head, r, t, edges, axes[24 * i + 18 + t], speeds)
             for j in range(3):
                 one, two = (j + 1) % 3, (j + 2) % 3
                 across = poses[at + one] * poses[at + 3 + two] - poses[at + two] * poses[at + 3 + one]
@@ -499,22 +496,23 @@ def carry_on(m: int, d: int, head: int) -> None:
 
 
 @compiled
-def _tangential(rows: Any, r: int, t: int, edges: bool, friction: float) -> float:
-    """What `RESIDUAL` of a contact's rows is along a tangent."""
+def _tangential(head: int, r: int, t: int, edges: bool, friction: float, vector: Any) -> float:
+    """What a vector of all degrees of freedom is along a tangent of the contact whose rows begin at `r`."""
+    rows = _block(head, ROWS)
     if edges:
-        return float((rows[r + 2 * ROW * t] - rows[r + 2 * ROW * t + ROW]) / (2 * friction))
-    return float(rows[r + ROW * (t + 1)])
+        edge = r + 2 * ROW * t
+        return float((_along(head, rows, edge, vector) - _along(head, rows, edge + ROW, vector)) / (2 * friction))
+    return float(_along(head, rows, r + ROW * (t + 1), vector))
 
 
 @compiled
 def _turn(m: int, d: int, head: int, elapsed: float) -> None:
     """Add to the reference accelerations of what sticks to bodies that turn what the rows leave out, -dJ/dt v."""
     counts, edges = _int64(head), not _elliptic(m)
-    kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    contact, reference = _int64(d + _at(CONTACT))[0], _array(d, AREF)
-    _multiply(m, head, _array(d, QVEL))
+    kept, axes, places = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES])
+    contact, reference, speeds = _int64(d + _at(CONTACT))[0], _array(d, AREF), _array(d, QVEL)
     for i in range(counts[COUNT]):
-        k, a, r = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT] + RESIDUAL
+        k, a, r = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT]
         if kept[k + law.STATE] != law.STICKS or kept[k + law.SPEED] > 1e300 or places[4 * i + LENGTH] == 1:
             continue
         frame = _real(contact + places[4 * i + INDEX] * _at(SIZE) + _at(FRAME))
@@ -522,7 +520,7 @@ def _turn(m: int, d: int, head: int, elapsed: float) -> None:
             friction, before = axes[24 * i + 18 + t], 0.0
             for j in range(3):
                 before += frame[3 * t + 3 + j] * kept[k + law.SPEED + j]
-            change = (_tangential(rows, r, t, edges, friction) - before) / elapsed
+            change = (_tangential(head, r, t, edges, friction, speeds) - before) / elapsed
             if edges:
                 reference[a + 2 * t] -= friction * change
                 reference[a + 2 * t + 1] += friction * change
@@ -603,29 +601,49 @@ def _axis(t: int) -> int:
 
 
 @compiled
-def _hand_on(m: int, d: int, head: int, scattered: bool) -> float:
-    """Give what is remembered to the nearest contact of the same geoms; how far any has moved, if some are fewer, m."""
+def _chain(head: int) -> int:
+    """Contacts of a pair of geoms one after the other: `CHAINS` has the first at `_link`, and the next of each after
+    as many links as this returns; -1: no more. Others may be between them."""
+    counts, kept, links = _int64(head), _block(head, KEPT), 16
+    while links < 2 * counts[COUNT]:
+        links *= 2
+    chains = _integers(head, CHAINS, links + counts[COUNT])
+    for i in range(links):
+        chains[i] = -1
+    for i in range(counts[COUNT] - 1, -1, -1):
+        link = _link(kept, W * i, links)
+        chains[links + i], chains[link] = chains[link], i
+    return links
+
+
+@compiled
+def _link(contacts: Any, k: int, links: int) -> int:
+    """Where the chain of a contact's geoms begins."""
+    return (int(contacts[k]) * 2654435761 + int(contacts[k + 1]) * 40503) >> 3 & (links - 1)
+
+
+@compiled
+def _hand_on(m: int, d: int, head: int) -> float:
+    """Give what is remembered to the nearest contact of the same geoms; how far any has moved, if some are fewer, m.
+
+    What was before gets the square of that way as its `law.SEEN`, m^2."""
     counts, elliptic = _int64(head), _elliptic(m)
     count, kept, before = counts[COUNT], _block(head, KEPT), _block(head, BEFORE)
     axes, places, rows = _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    numbers, bound = _real(head), _array(m, RBOUND)
-    first, moved, fewer = 0, 0.0, False
+    numbers, bound, moved, fewer = _real(head), _array(m, RBOUND), 0.0, False
+    links = _chain(head)
+    chains = _int64(counts[CHAINS])
     for i in range(counts[COUNT_BEFORE]):
-        b, nearest, least, begin = W * i, -1, math.inf, first
+        b, nearest, least = W * i, -1, math.inf
         if i < count and _apart(kept, W * i, before, b) < law.UNMOVED**2:
             nearest, least = i, 0.0
-        for turn in range(0 if nearest == i else count):  # contacts of a pair are together, mostly where they were
-            k = begin + turn
-            if k >= count:
-                k -= count
+        k = chains[_link(before, b, links)] if nearest < 0 else -1
+        while k >= 0:
             distance = _apart(kept, W * k, before, b)
-            if distance < math.inf:
-                if nearest < 0:
-                    first = k
-                if distance < least:
-                    nearest, least = k, distance
-            elif nearest >= 0 and not scattered:
-                break
+            if distance < least:
+                nearest, least = k, distance
+            k = chains[links + k]
+        before[b + law.SEEN] = least
         if nearest < 0:
             continue
         k = W * nearest
@@ -672,7 +690,7 @@ def _stiffen(m: int, d: int, head: int) -> None:
     counts, numbers, elliptic, h = _int64(head), _real(head), _elliptic(m), _value(m, STEP)
     kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
     softness, stiffness, diagonal = _array(d, R), _array(d, D), _array(d, DIAG)
-    velocity, reference = _array(d, VEL), _array(d, AREF)
+    velocity, reference, bound = _array(d, VEL), _array(d, AREF), _array(m, RBOUND)
     islands = _at(ISLAND_R) >= 0 and _number(d, NISLAND) > 0  # they have copies, but not in MuJoCo 3.3.0
     place = _whole(d, ISLAND_PLACE if islands else COLIND)
     island_softness, island_stiffness = _array(d, ISLAND_R if islands else R), _array(d, ISLAND_D if islands else D)
@@ -683,7 +701,9 @@ def _stiffen(m: int, d: int, head: int) -> None:
         speed = (velocity[a] + velocity[a + 1]) / 2 if edges else velocity[a]
         held = ROW * places[4 * i + AT] + MEMORY
         load = diagonal[a] * (rows[held] + rows[held + ROW] if edges else rows[held])
-        goal = -gap / h if gap > 0 else min(-numbers[PUSH] * gap / h, max(slow, h * load))
+        one, other = bound[int(kept[W * i])], bound[int(kept[W * i + 1])]
+        deep = max(-gap - numbers[DEPTH] * (min(one, other) or max(one, other)), 0.0)  # planes have no radius
+        goal = -gap / h if gap > 0 else min(numbers[PUSH] * deep / h, max(slow, h * load))
         r, above = ROW * places[4 * i + AT] + RESIDUAL, max(gap, 0.0)
         fall = h * max(-(rows[r] + rows[r + ROW]) / 2 if edges else -rows[r], 0.0)
         if numbers[RESTITUTION] > 0 and gap + h * (speed - fall) < 0 and speed < -2 * slow:
@@ -766,15 +786,20 @@ def _hold(m: int, d: int, head: int) -> None:
 @compiled
 def _multiply(m: int, head: int, vector: Any) -> None:
     """J times a vector, of all rows, into `RESIDUAL`."""
-    counts, rows = _int64(head), _block(head, ROWS)
-    jacobian, columns, moves = _block(head, JACOBIAN), _int64(counts[COLUMN]), False
+    counts, rows, moves = _int64(head), _block(head, ROWS), False
     for i in range(_number(m, DOFS)):
         moves |= vector[i] != 0
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
-        total, begin = 0.0, int(rows[r + BEGIN])
-        for n in range(begin, begin + int(rows[r + NONZEROS]) if moves else begin):
-            total += jacobian[n] * vector[columns[n]]
-        rows[r + RESIDUAL] = total
+        rows[r + RESIDUAL] = _along(head, rows, r, vector) if moves else 0.0
+
+
+@compiled
+def _along(head: int, rows: Any, r: int, vector: Any) -> float:
+    """A row of J times a vector."""
+    jacobian, columns, total, begin = _block(head, JACOBIAN), _int64(_int64(head)[COLUMN]), 0.0, int(rows[r + BEGIN])
+    for n in range(begin, begin + int(rows[r + NONZEROS])):
+        total += jacobian[n] * vector[columns[n]]
+    return total
 
 
 @compiled
@@ -958,6 +983,9 @@ def _put_back(m: int, d: int, head: int) -> bool:
     for i in range(count):
         b = W * i
         gap, g = before[b + law.GAP], (int(before[b + law.GEOMS]), int(before[b + law.GEOMS + 1]))
+        near = share * max(bound[g[0]], bound[g[1]])
+        if not 1.99 * near**2 < before[b + law.SEEN] < math.inf:
+            continue
         opened, apart = 0.0, 0.0
         for j in range(3):
             normal[j], middle[j], along[j] = 0.0, 0.0, 0.0
@@ -972,7 +1000,6 @@ def _put_back(m: int, d: int, head: int) -> bool:
             opened += normal[j] * along[j]
         for j in range(3):
             apart += (along[j] - opened * normal[j]) ** 2
-        near = share * max(bound[g[0]], bound[g[1]])
         if gap + opened >= 0 or apart >= (near / 10) ** 2:
             continue
         had, left, alone, same = 0, 0, True, -1

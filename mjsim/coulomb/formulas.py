@@ -313,9 +313,9 @@ class Simulation:
         return np.where(self._length > 1, along, 0.0)
 
     def _carry_on(self, data: Any) -> None:
-        """The velocity that each contact's last Jacobian gives to the present speeds, along its last axes."""
+        """The velocity that the last Jacobian of what sticks gives to the present speeds, along its last axes."""
         if len(self._used):
-            along = self._tangential(self._multiply(data.qvel))
+            along = self._tangential(self._multiply(data.qvel)) * (self._kept[law.STATE] == law.STICKS)
             self._kept[law.SPEED :] = np.einsum("tn,ntj->jn", along, self._frame)
 
     def _turn_rows(self, data: Any, elapsed: float) -> None:
@@ -341,14 +341,18 @@ class Simulation:
     def _stiffen(self, model: Any, data: Any, acceleration: Array) -> None:
         """Rows of rigid contacts: as stiff as `Law.softness`, with the velocities that Moreau and Jean's time stepping
         asks."""
-        numbers, h, gap, dry = self._law, model.opt.timestep, self._kept[law.GAP], self._counts[0]
+        numbers, h, kept, dry = self._law, model.opt.timestep, self._kept, self._counts[0]
+        gap = kept[law.GAP]
         rows, velocity, slow = self._rows[dry:], data.efc_vel[self._rows], h * _gravity(model)
         speed, fall = self._normal(velocity), h * np.maximum(-self._normal(acceleration), 0.0)
         first = self._rows[self._first]
         estimate, load = getattr(data, _DIAGONAL)[first], self._memory[self._first]
         if not self._elliptic:
             load = load + np.where(self._length > 1, self._memory[self._other[self._first]], 0.0)
-        push = np.minimum(-numbers.push * gap / h, np.maximum(slow, h * estimate * load))
+        bound = model.geom_rbound[kept[law.GEOMS : law.PLACE].astype(int)]  # planes have none
+        smaller = np.where(bound.min(axis=0) > 0, bound.min(axis=0), bound.max(axis=0))
+        deep = np.maximum(-gap - numbers.depth * smaller, 0.0)
+        push = np.minimum(numbers.push * deep / h, np.maximum(slow, h * estimate * load))
         goal = np.where(gap > 0, -gap / h, push)
         blow = (gap + h * (speed - fall) < 0) & (speed < -2 * slow) & (numbers.restitution > 0)
         if blow.any():  # Euler's method keeps v²/2 + gz - hgv/2 in flight

@@ -39,14 +39,16 @@ class Law:
     restitution: float = 0.0
     servo: float = 0.0
     """Time in which contacts lose their depth, s; 0: never."""
-    share: float = 1e-2
+    share: float = 5e-2
     """Share of gravity to which the slip of contacts, and what rigid ones bear, must be foreseen."""
     most: int = 20
     """Solutions that a step may take to foresee them."""
-    softness: float = 1e-4
+    softness: float = 1e-3
     """R of a rigid contact, in units of the inverse mass that the engine estimates."""
     push: float = 0.1
     """Share of its depth that a rigid contact loses in a step."""
+    depth: float = 1e-5
+    """Depth that it keeps, in units of the smaller radius: without any, colliders drop points of what rests."""
     calm: float = 1e-5
     """Acceleration below which the solver starts from none, m s-2 or rad s-2."""
     near: float = 0.01
