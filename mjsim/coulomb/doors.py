@@ -30,7 +30,8 @@ class Coulomb:
     rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say. True: Moreau and
         Jean's time stepping, in which contacts have no depth to speak of and land within one step. Geoms get a `margin`
         in which contacts are seen ahead, but bear nothing: at least the way of a step at the speed of a fall through
-        the scene, or a fifth of their radius.
+        the scene, or a fifth of their radius. Dampers become inertia, of the same effect, which contacts know: the
+        integrator is Euler's from then on. Both are for the model's time step as it is now.
     restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
     servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It needs geoms with
         a `margin`, more than bodies sink in, of which an open contact then takes no notice; and it must be slower than
@@ -58,9 +59,11 @@ class Coulomb:
             if rigid:
                 raise ValueError("servo is for soft contacts: rigid ones have no depth")
         self.model, self._law = model, Law(rigid, float(restitution), servo or 0.0)
+        self._step = float(model.opt.timestep)
         self._check()
         if rigid:
             _see_ahead(model)
+            _damp_at_the_end(model)
         self._own = kernels.Simulation(model, self._law)
         self._adopted: dict[int, Any] | None = None
 
@@ -70,6 +73,10 @@ class Coulomb:
         if name not in _INTEGRATORS or (name == "RK4" and self._law.rigid):
             why = "is of another order than blows" if name == "RK4" else "computes reference accelerations of its own"
             raise ValueError(f"integrator = {name} {why}; Coulomb's law needs Euler, implicit or implicitfast")
+        if self._law.rigid and option.timestep != self._step:
+            raise ValueError(
+                f"timestep = {option.timestep:g} s was {self._step:g} s when Coulomb(…, rigid=True) was made"
+            )
         if option.noslip_iterations:
             raise ValueError(f"noslip_iterations = {option.noslip_iterations} must be 0: Coulomb's law is in its place")
         for field in ("geom_friction", "pair_friction"):
@@ -221,3 +228,27 @@ def _see_ahead(model: Any) -> None:
     np.maximum(model.geom_margin, np.minimum(ahead, most), out=model.geom_margin)
     pairs = [model.pair_geom1, model.pair_geom2]
     np.maximum(model.pair_margin, np.minimum(ahead, most[np.array(pairs)].max(axis=0)), out=model.pair_margin)
+
+
+def _damp_at_the_end(model: Any) -> None:
+    """Dampers, at the speed after a step, as inertia: h times their damping.
+
+    That is what MuJoCo's integrators do, but only after contacts have been solved for, so that velocities are not those
+    which contacts asked for. Of implicit integrators the dampers of joints, tendons and servos on them are kept.
+    """
+    option, euler = model.opt, mujoco.mjtIntegrator.mjINT_EULER
+    if option.integrator == euler and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
+        return
+    model.dof_armature += option.timestep * model.dof_damping
+    if option.integrator != euler:
+        tendons = getattr(model, "tendon_armature", np.zeros(model.ntendon))  # MuJoCo 3.3.0 has none
+        tendons += option.timestep * model.tendon_damping
+        for k in np.flatnonzero(model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)).tolist():
+            inertia = -option.timestep * model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
+            kind, target = mujoco.mjtTrn(model.actuator_trntype[k]), model.actuator_trnid[k, 0]
+            if kind == mujoco.mjtTrn.mjTRN_TENDON:
+                tendons[target] += inertia
+            elif kind == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[target] >= int(mujoco.mjtJoint.mjJNT_SLIDE):
+                model.dof_armature[model.jnt_dofadr[target]] += inertia
+    option.integrator = euler
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP

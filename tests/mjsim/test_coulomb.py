@@ -362,6 +362,54 @@ def test_scenes_of_the_page_hold(name, rigid):
     assert creep(mujoco.MjModel.from_xml_path(str(SCENES / name)), rigid) < 1e-12
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "implicit"])
+def test_rigid_contacts_know_of_dampers(integrator):
+    """They become inertia, once, and motions stay as they are; `implicit` has Coriolis forces' derivative, too."""
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option integrator="{integrator}" timestep=".002"/><worldbody><body><joint name="j" damping="3" '
+        'axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/><body pos=".3 0 0"><joint name="k" '
+        'damping=".5" axis="0 1 0"/><geom name="tip" type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body></body>'
+        '<geom name="floor" type="plane" pos="0 0 -.3" size="1 1 1"/></worldbody><contact><exclude body1="world" '
+        'body2="world"/></contact><tendon><fixed name="t" damping="1"><joint joint="j" coef="1"/><joint joint="k" '
+        'coef="-1"/></fixed></tendon><actuator><position joint="j" kp="30" kv="2"/><position tendon="t" kp="3" kv="1"/>'
+        "</actuator></mujoco>"
+    )
+    plain = mujoco.MjData(model)
+    mujoco.mj_step(model, plain, 100)
+    assert not plain.ncon
+    for _ in range(2):
+        law, data = Coulomb(model, rigid=True), mujoco.MjData(model)
+        law.step(data, 100)
+        assert data.qpos == pytest.approx(plain.qpos, rel=1e-5 if integrator == "implicit" else 1e-9)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_a_damped_finger_lands_in_a_step(integrator):
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option integrator="{integrator}" timestep=".002" tolerance="1e-12"/><worldbody><geom type="plane" '
+        'size="1 1 1"/><body pos="0 0 .1"><joint type="slide" axis="0 0 1" damping="50"/><geom size=".02" mass=".2"/>'
+        "</body></worldbody></mujoco>"
+    )
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
+    data.qvel[0] = -40.6
+    speeds = []
+    for _ in range(50):
+        law.step(data)
+        speeds.append(float(data.qvel[0]))
+    landed = int(np.argmax(np.array(speeds) > -1e-9))
+    assert landed > 0
+    assert abs(data.qpos[0] + 0.08) < 1.1e-5 * 0.02  # the depth that it keeps
+    assert max(abs(speed) for speed in speeds[landed:]) < 1e-9
+
+
+def test_rigid_contacts_are_for_one_time_step():
+    model, data = scene()
+    law = Coulomb(model, rigid=True)
+    model.opt.timestep *= 2
+    with pytest.raises(ValueError, match=r"timestep = 0\.004 s was 0\.002 s"):
+        law.step(data)
+
+
 @WAYS
 def test_forces_turn_with_a_hand(rigid):
     fingers = "".join(
