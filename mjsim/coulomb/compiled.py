@@ -834,11 +834,11 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
         k, r, length, state = W * i, ROW * places[4 * i + AT], places[4 * i + LENGTH], kept[W * i + law.STATE]
         slip = _slip(rows, r, length, elliptic, axes, 24 * i + 18)
         edges = length > 1 and not elliptic
-        closing = (rows[r + RESIDUAL] + rows[r + ROW + RESIDUAL] < 0) if edges else rows[r + RESIDUAL] < 0
+        normal = (rows[r + RESIDUAL] + rows[r + ROW + RESIDUAL]) / 2 if edges else rows[r + RESIDUAL]
         error = kept[k + law.ERROR] > enough
         kept[k + law.SLIP] = slip
         if state == law.NEW or state == law.OPEN:
-            doubt |= closing and (rigid or slip > enough)
+            doubt |= normal < 0 and (rigid or slip > enough)
             continue
         ahead = 0.0  # of friction and slip: it stops
         if edges:
@@ -852,8 +852,8 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
             doubt |= slip > enough and not _holds(rows, r, length, edges, axes, 24 * i + 18, diagonal)
         else:
             doubt |= error
-        for e in range(r, r + ROW * length if rigid else r, ROW):  # forces will change by a weight
-            doubt |= abs(rows[e + RESIDUAL]) > gravity
+        # the force of a rigid contact will change by a weight
+        doubt |= rigid and (abs(normal) > gravity or (kept[k + law.SLIP] == 0 and slip > gravity))
     return doubt
 
 

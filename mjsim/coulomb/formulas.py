@@ -408,7 +408,7 @@ class Simulation:
         if not doubt and much.any():
             doubt = bool((much & stops & ~self._holds(data, residual)).any())
         if not doubt and rigid:  # forces will change by a weight
-            most = np.maximum.reduceat(abs(residual), self._first)
+            most = np.maximum(abs(self._normal(residual)), slip * stops)
             doubt = bool(((most > _gravity(model)) & (state > law.OPEN)).any())
         return doubt
 
