@@ -12,7 +12,7 @@ import itertools
 import math
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +37,7 @@ SCENES = {
     "cart": "cart with its wheels braked",
 }
 PYRAMIDAL = {"cone": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+IMPLICIT = {"integrator": mujoco.mjtIntegrator.mjINT_IMPLICITFAST}
 SOFT: dict[str, Any] = {"law": {}}
 RIGID: dict[str, Any] = {"law": {"rigid": True}}
 PLAIN: dict[str, Any] = {}
@@ -220,7 +221,10 @@ def costs() -> Rows:
     scenes: dict[str, Callable[[dict[str, Any]], float]] = {
         **{f"at rest, {count} contacts": functools.partial(at_rest, count) for count in (1, 12, 52, 200, 1000)},
         "a box that slides": lambda way: moving(one(BOX, 0.25, 20), way, 15, 500, speed=1.0),
-        **{f"heap of {count} boxes that falls, 1.2 s": functools.partial(falling, count, 1) for count in (8, 27, 64, 216)},
+        **{
+            f"heap of {count} boxes that falls, 1.2 s": functools.partial(falling, count, 1)
+            for count in (8, 27, 64, 216)
+        },
     }
     rows = [["cost of a step", *ways, "soft, no numba"]]
     for name, measure in scenes.items():
@@ -460,8 +464,10 @@ def piles() -> Rows:
     """How many piles come to rest, and how energy rises."""
     counted = [f"energy rises by more than {rise:.0e} J in" for rise in RISES]
     rows = [["piles", "way", "at rest to 1e-9 m", "largest drift in a second: median, m", *counted, "by at most, J"]]
-    ways: Iterable[tuple[str, dict[str, Any]]] = [("plain", PLAIN), ("soft", SOFT), ("rigid", RIGID)]
-    for mixed, (name, way) in itertools.product((False, True), ways):
+    euler = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
+    implicit = {f"{name}, implicitfast": way | IMPLICIT for name, way in euler.items()}
+    tried: list[tuple[bool, dict[str, dict[str, Any]]]] = [(False, euler), (True, euler | implicit)]
+    for mixed, (name, way) in ((mixed, way) for mixed, ways in tried for way in ways.items()):
         with ProcessPoolExecutor() as pool:
             done = pool.map(functools.partial(fallen, way, mixed), range(PILES), chunksize=5)
             drift, rise = np.transpose(list(done))

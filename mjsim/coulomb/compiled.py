@@ -652,6 +652,7 @@ def _hand_on(m: int, d: int, head: int) -> float:
         kept[k + law.STATE] = max(kept[k + law.STATE], before[b + law.STATE])
         kept[k + law.ERROR] = max(kept[k + law.ERROR], before[b + law.ERROR])
         kept[k + law.LIFT] = max(kept[k + law.LIFT], before[b + law.LIFT])
+        kept[k + law.BORE] = max(kept[k + law.BORE], before[b + law.BORE])
         reach = numbers[FIXED] * max(bound[int(before[b])], bound[int(before[b + 1])])
         fixed = alone and least <= 2 * reach**2
         for j in range(3):  # a contact that wanders over its bodies, or is made of several, has none
@@ -700,10 +701,12 @@ def _stiffen(m: int, d: int, head: int) -> None:
         edges = length > 1 and not elliptic
         speed = (velocity[a] + velocity[a + 1]) / 2 if edges else velocity[a]
         held = ROW * places[4 * i + AT] + MEMORY
-        load = diagonal[a] * (rows[held] + rows[held + ROW] if edges else rows[held])
+        load = rows[held] + rows[held + ROW] if edges else rows[held]
+        lasting = min(load, kept[W * i + law.BORE])  # not the force of a blow
+        kept[W * i + law.BORE] = load
         one, other = bound[int(kept[W * i])], bound[int(kept[W * i + 1])]
         deep = max(-gap - numbers[DEPTH] * (min(one, other) or max(one, other)), 0.0)  # planes have no radius
-        goal = -gap / h if gap > 0 else min(numbers[PUSH] * deep / h, max(slow, h * load))
+        goal = -gap / h if gap > 0 else min(numbers[PUSH] * deep / h, max(slow, h * diagonal[a] * lasting))
         r, above = ROW * places[4 * i + AT] + RESIDUAL, max(gap, 0.0)
         fall = h * max(-(rows[r] + rows[r + ROW]) / 2 if edges else -rows[r], 0.0)
         if numbers[RESTITUTION] > 0 and gap + h * (speed - fall) < 0 and speed < -2 * slow:

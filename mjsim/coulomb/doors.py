@@ -236,19 +236,21 @@ def _damp_at_the_end(model: Any) -> None:
     That is what MuJoCo's integrators do, but only after contacts have been solved for, so that velocities are not those
     which contacts asked for. Of implicit integrators the dampers of joints, tendons and servos on them are kept.
     """
-    option, euler = model.opt, mujoco.mjtIntegrator.mjINT_EULER
-    if option.integrator == euler and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
+    option, euler, h = model.opt, mujoco.mjtIntegrator.mjINT_EULER, model.opt.timestep
+    implicit, inertia = option.integrator != euler, np.array(h * model.dof_damping)
+    if not implicit and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
         return
-    model.dof_armature += option.timestep * model.dof_damping
-    if option.integrator != euler:
-        tendons = getattr(model, "tendon_armature", np.zeros(model.ntendon))  # MuJoCo 3.3.0 has none
-        tendons += option.timestep * model.tendon_damping
-        for k in np.flatnonzero(model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)).tolist():
-            inertia = -option.timestep * model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
-            kind, target = mujoco.mjtTrn(model.actuator_trntype[k]), model.actuator_trnid[k, 0]
-            if kind == mujoco.mjtTrn.mjTRN_TENDON:
-                tendons[target] += inertia
-            elif kind == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[target] >= int(mujoco.mjtJoint.mjJNT_SLIDE):
-                model.dof_armature[model.jnt_dofadr[target]] += inertia
-    option.integrator = euler
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    tendons = h * model.tendon_damping * implicit
+    for k in np.flatnonzero(model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)).tolist() if implicit else []:
+        servo = -h * model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
+        kind, target = mujoco.mjtTrn(model.actuator_trntype[k]), model.actuator_trnid[k, 0]
+        if kind == mujoco.mjtTrn.mjTRN_TENDON:
+            tendons[target] += servo
+        elif kind == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[target] >= int(mujoco.mjtJoint.mjJNT_SLIDE):
+            inertia[model.jnt_dofadr[target]] += servo
+    if inertia.any() or tendons.any():
+        model.dof_armature += inertia
+        if hasattr(model, "tendon_armature"):  # MuJoCo 3.3.0 has none
+            model.tendon_armature += tendons
+        option.integrator = euler
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP

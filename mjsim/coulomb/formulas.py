@@ -352,7 +352,8 @@ class Simulation:
         bound = model.geom_rbound[kept[law.GEOMS : law.PLACE].astype(int)]  # planes have none
         smaller = np.where(bound.min(axis=0) > 0, bound.min(axis=0), bound.max(axis=0))
         deep = np.maximum(-gap - numbers.depth * smaller, 0.0)
-        push = np.minimum(numbers.push * deep / h, np.maximum(slow, h * estimate * load))
+        lasting, kept[law.BORE] = np.minimum(load, kept[law.BORE]), load  # not the force of a blow
+        push = np.minimum(numbers.push * deep / h, np.maximum(slow, h * estimate * lasting))
         goal = np.where(gap > 0, -gap / h, push)
         blow = (gap + h * (speed - fall) < 0) & (speed < -2 * slow) & (numbers.restitution > 0)
         if blow.any():  # Euler's method keeps v²/2 + gz - hgv/2 in flight
