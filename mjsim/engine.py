@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,6 @@ import numpy.typing as npt
 from mjsim import limits, recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
-from mjsim.free import Free
 from mjsim.journal import Journal
 from mjsim.stepping import Polar
 from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
@@ -22,6 +21,9 @@ from model.arrays import Array
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import check_number
 from model.trajectory import SAMPLE
+
+if TYPE_CHECKING:
+    from mjsim.free import Free
 
 BLOCK = 256
 """Most samples a run keeps before it hands them out."""
@@ -95,11 +97,13 @@ class Run:
         built = {p: (build or scene.build)(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
         given = models, parameters, settings, states, theta_0
-        self._stepper: Free | Polar = (
-            Free(*given)
-            if settings.coordinates == "free"
-            else Polar(*given, next(self._omega_0(0, 1)), batched or len(models) > 1)
-        )
+        self._stepper: Free | Polar
+        if settings.coordinates == "free":
+            from mjsim.free import Free  # here, because the law of its contacts takes long to load
+
+            self._stepper = Free(*given)
+        else:
+            self._stepper = Polar(*given, next(self._omega_0(0, 1)), batched or len(models) > 1)
         shown = dataclasses.asdict(settings) | {
             "t_end": float(t_end),
             "sample_interval": self._interval * settings.timestep,

@@ -38,8 +38,8 @@ from model.trajectory import (
     Trajectory,
     attributes,
     columns,
-    current_versions,
 )
+from model.versions import current_versions
 
 BATCH, BATCH_VERSION = "dualball-batch", 1
 """What a file of many runs says of itself."""

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
-import platform
-import subprocess
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from importlib import metadata
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -23,6 +18,7 @@ from model.errors import InputError
 from model.flow import Flow
 from model.kinematics import VARIABLES, State, slip_speeds
 from model.parameters import Parameters
+from model.versions import current_commit, current_versions
 
 if TYPE_CHECKING:
     import xarray
@@ -46,34 +42,6 @@ def _column(
 
 FLUID: Mapping[str, Any] = {"name": "omega_0", **_column("rad s-1", "angular velocity of the fluid").metadata}
 """The column of a file that follows from the flow, and isn't read back."""
-
-
-@functools.cache
-def current_versions() -> Mapping[str, str]:
-    """Versions of the packages that determine a result, and of Python."""
-    versions = {"python": platform.python_version()}
-    return versions | {name: version(name) for name in ("dualball", "mujoco", "numpy", "scipy")}
-
-
-@functools.cache
-def version(package: str) -> str:
-    """The version of an installed package."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed"
-
-
-@functools.cache
-def current_commit() -> str:
-    """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
-    # Without locks: git leaves them in the checkout if it takes too long and is killed.
-    git = ["git", "--no-optional-locks", "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"]
-    here = Path(__file__).resolve().parent
-    try:
-        return subprocess.check_output(git, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10).strip()
-    except (OSError, subprocess.SubprocessError):
-        return ""
 
 
 @dataclass(frozen=True)
@@ -256,11 +224,3 @@ def samples(time: Array, theta: Array, x: State, p: Parameters) -> npt.NDArray[n
     block["gap_A"], block["gap_B"] = x.y, x.h
     block["slip_speed_A"], block["slip_speed_B"] = slip_speeds(x, p)
     return block
-
-
-class SimulationError(RuntimeError):
-    """A run that could not reach its end: the message names time and state; `trajectory` holds what there is."""
-
-    def __init__(self, message: str, trajectory: Trajectory) -> None:
-        super().__init__(message)
-        self.trajectory = trajectory

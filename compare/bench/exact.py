@@ -24,7 +24,7 @@ from model.arrays import Array
 from model.files import check_ours, make_directory, write_text
 from model.hdf5 import WholeFile
 from model.kinematics import to_world
-from model.trajectory import current_versions
+from model.versions import current_versions
 
 SMOOTH, ROUGH = Parameters.named("reference"), Parameters.named("high-wall-friction")
 README = Path(__file__).with_name("templates") / "cases.md"

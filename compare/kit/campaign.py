@@ -31,7 +31,7 @@ from compare.kit.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import make_directory, remove_leftovers, write_text
 from model.parameters import POSITIVE, Range, check_number
-from model.trajectory import current_versions
+from model.versions import current_versions
 
 BATCH = 64
 """Runs in one MuJoCo batch: where the engine's cost a step stops falling."""

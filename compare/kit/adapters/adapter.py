@@ -36,7 +36,8 @@ from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import Motion, frame, from_world, to_world
 from model.parameters import POSITIVE, check_choice, check_number
-from model.trajectory import current_versions, samples, version
+from model.trajectory import samples
+from model.versions import current_versions, version
 
 Floats = Sequence[float]
 _HUGE = 1e8
