@@ -48,7 +48,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "contacts and engines": {
         "forecast": ("bench", "what the contacts of a MuJoCo model will do: depth, creep, hovering, largest step"),
         "grade": ("bench", "a score card for contact settings: yours, dualball's, MuJoCo's own; or another engine"),
-        "cases": ("bench", "the exact contact cases: listed, shown, or as files for engines in any language"),
+        "cases": ("cases", "the exact contact cases: listed, shown, or as files for engines in any language"),
         "league": ("bench", "all installed engines on the exact cases, as they come and in the best settings known"),
     },
 }

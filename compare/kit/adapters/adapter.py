@@ -141,12 +141,6 @@ class BreakdownError(RuntimeError):
     """The engine can't take the next step."""
 
 
-def tangent(radius: float, azimuth: float) -> tuple[Array, Array]:
-    """Point and inward normal, each (3,), of the plane that touches a cylinder about the z axis there."""
-    normal = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-    return -radius * normal, normal
-
-
 def simulate(
     engine: str,
     library: Library,
