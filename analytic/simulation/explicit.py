@@ -1,0 +1,211 @@
+"""Steps through one case, compiled by numba: Dormand and Prince's method of order 8 with dense output, and its roots.
+
+The coefficients are those of `scipy.integrate.DOP853`. Guards are looked at four times in each step.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from numba.extending import register_jitable
+from scipy.integrate import DOP853
+
+from analytic.mechanics import drag
+from analytic.simulation import equations
+from analytic.simulation.equations import Motion
+from model.arrays import Array
+
+for _function in equations.TEXT:
+    setattr(equations, _function.__name__, register_jitable(error_model="numpy")(_function))
+_DIGEST = hashlib.sha256(b"".join(Path(str(m.__file__)).read_bytes() for m in (drag, equations))).hexdigest()[:16]
+A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
+A_MORE, C_MORE = np.ascontiguousarray(DOP853.A_EXTRA), np.ascontiguousarray(DOP853.C_EXTRA)
+STAGES, ALL = len(B), len(B) + 1 + len(C_MORE)
+DONE, FIRED, STIFF, STUCK, PAUSED = range(5)
+"""Why `follow` returns: at the end, at a guard, with a small slip for too long, with steps too short, for a breath."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+"""Of the length of a step: below what its error allows; and by how much it may change."""
+LOOKS = 4
+"""How often in a step guards are looked at."""
+HALVINGS = 200
+EPS = math.ulp(1.0)
+
+
+def _compiled(function: Any) -> Any:
+    """Numba's cache knows a function by its name, and not when another file has changed."""
+    function.__qualname__ += f"_{_DIGEST}"
+    try:
+        return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    except RuntimeError:  # no place for a cache
+        return numba.njit(nogil=True, error_model="numpy")(function)
+
+
+@register_jitable
+def _between(x: float, z: Array, F: Array, out: Array) -> None:
+    """Coordinates at a share x of a step that began at z."""
+    for i in range(len(z)):
+        value = 0.0
+        for n in range(len(F)):
+            value = (value + F[len(F) - 1 - n, i]) * (x if n % 2 == 0 else 1 - x)
+        out[i] = z[i] + value
+
+
+@register_jitable
+def _root(
+    guard: int, level: float, low: float, high: float, t: float, h: float, k: Motion, z: Array, F: Array, now: Array,
+    values: Array,
+) -> float:  # fmt: skip
+    """Share of a step within (low, high) at which a guard falls through its level, to the last digit of the time.
+
+    By the rule of false position, whose end that stays counts half the next time (Illinois); halved where that is slow.
+    """
+    _between(low, z, F, now)
+    equations.guards(t + low * h, now, k, values)
+    above = values[guard] - level
+    _between(high, z, F, now)
+    equations.guards(t + high * h, now, k, values)
+    below = values[guard] - level
+    if above <= 0:
+        return low
+    if below >= 0:
+        return high
+    stays = 0
+    for n in range(HALVINGS):
+        if high - low <= 4 * EPS * max(high, abs(t / h)):
+            break
+        x = (low * below - high * above) / (below - above)
+        if n % 3 == 2 or not low < x < high:
+            x = (low + high) / 2
+        _between(x, z, F, now)
+        equations.guards(t + x * h, now, k, values)
+        value = values[guard] - level
+        if value > 0:
+            low, above = x, value
+            below = below / 2 if stays == 1 else below
+            stays = 1
+        else:
+            high, below = x, value
+            above = above / 2 if stays == -1 else above
+            stays = -1
+    return high
+
+
+@_compiled
+def follow(
+    k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
+    rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, small: float,
+    patience: int, most: int,
+) -> tuple[int, float, float, int, int]:  # fmt: skip
+    """At most so many steps from the time start + tau towards start + span: why they end, tau, h, guard, `taken`.
+
+    z, level and samples are written to: z (n,); level of each guard, as `integrator.Stretch` says; samples, (m, n), at
+    those of `times` that are passed, from the number `taken` on. A slip (coordinates `slips`) below `small` times
+    `unit` for more than `patience` steps is for a stiff method.
+    """
+    n, slow, rejected = len(z), 0, False
+    K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
+    new, now, values = np.empty(n), np.empty(n), np.empty(len(arm))
+    equations.rates(start + tau, z, k, K[0])
+    if h <= 0:  # by the size of the rates
+        rate = 0.0
+        for i in range(n):
+            rate = max(rate, abs(K[0, i]) / (atol[i] / rtol + abs(z[i])))
+        h = min(span - tau, 0.01 / rate if rate > 0 else span)
+    for _ in range(most):
+        if tau >= span:
+            return DONE, tau, h, -1, taken
+        last = tau + h >= span
+        if last:
+            h = span - tau
+        if h <= 4 * EPS * tau or h < 1e-300:
+            return STUCK, tau, h, -1, taken
+        for s in range(1, STAGES):
+            for i in range(n):
+                value = 0.0
+                for j in range(s):
+                    value += A[s, j] * K[j, i]
+                now[i] = z[i] + h * value
+            equations.rates(start + (tau + C[s] * h), now, k, K[s])
+        for i in range(n):
+            value = 0.0
+            for j in range(STAGES):
+                value += B[j] * K[j, i]
+            new[i] = z[i] + h * value
+        after = span if last else tau + h
+        equations.rates(start + after, new, k, K[STAGES])
+        fifth = third = 0.0
+        for i in range(n):
+            five = three = 0.0
+            for j in range(STAGES + 1):
+                five += E5[j] * K[j, i]
+                three += E3[j] * K[j, i]
+            size = atol[i] + rtol * max(abs(z[i]), abs(new[i]))
+            fifth += (five / size) ** 2
+            third += (three / size) ** 2
+        bound = fifth + 0.01 * third
+        error = h * fifth / math.sqrt(bound * n) if bound > 0 else bound
+        if not error < 1:
+            h *= max(SHRINK, SAFETY * error**-0.125) if error < math.inf else SHRINK
+            rejected = True
+            continue
+        for s in range(len(C_MORE)):
+            for i in range(n):
+                value = 0.0
+                for j in range(STAGES + 1 + s):
+                    value += A_MORE[s, j] * K[j, i]
+                now[i] = z[i] + h * value
+            equations.rates(start + (tau + C_MORE[s] * h), now, k, K[STAGES + 1 + s])
+        for i in range(n):
+            change = new[i] - z[i]
+            F[0, i], F[1, i] = change, h * K[0, i] - change
+            F[2, i] = 2 * change - h * (K[STAGES, i] + K[0, i])
+            for j in range(len(D)):
+                value = 0.0
+                for s in range(ALL):
+                    value += D[j, s] * K[s, i]
+                F[3 + j, i] = h * value
+        fired, end = -1, 2.0
+        for look in range(1, LOOKS + 1):
+            share = look / LOOKS
+            if look < LOOKS:
+                _between(share, z, F, now)
+            else:
+                now[:] = new
+            equations.guards(start + (tau + share * h), now, k, values)
+            for guard in range(len(arm)):
+                if values[guard] > arm[guard]:
+                    level[guard] = 0.0
+                elif values[guard] < level[guard]:
+                    root = _root(guard, level[guard], share - 1 / LOOKS, share, start + tau, h, k, z, F, K[1], values)
+                    equations.guards(start + (tau + share * h), now, k, values)
+                    if root < end:
+                        fired, end = guard, root
+            if fired >= 0:
+                break
+        until = tau + end * h if fired >= 0 else after
+        while taken < len(times) and times[taken] <= start + until:
+            _between(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
+            taken += 1
+        if fired >= 0:
+            _between(end, z, F, now)
+            z[:] = now
+            return FIRED, until, h, fired, taken
+        z[:] = new
+        K[0] = K[STAGES]
+        tau = after
+        grow = GROW if error == 0 else min(GROW, SAFETY * error**-0.125)
+        h *= min(grow, 1.0) if rejected else grow
+        rejected = False
+        least = math.inf
+        for i in slips:
+            least = min(least, z[i] / unit)
+        slow = slow + 1 if least <= small else 0
+        if slow > patience:
+            return STIFF, tau, h, -1, taken
+    return PAUSED, tau, h, -1, taken
