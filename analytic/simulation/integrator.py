@@ -1,6 +1,6 @@
 """Steps of the integrator through one chart, up to the first guard that fires.
 
-`explicit` integrates, or LSODA where numba isn't installed, except while a slip is small: its direction is stiff then,
+Where numba is installed, those of `solvers`; else LSODA, except while a slip is small: its direction is stiff then,
 which LSODA doesn't detect where hardly anything else moves, and BDF takes over. Where both need tiny steps because only
 round-off is left, the motion is continued along a straight line.
 """
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, partial
+from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -35,17 +35,17 @@ LOCAL = 0.25
 
 
 @cache
-def _compiled() -> ModuleType | None:
-    """`explicit`, where numba is installed and compiles."""
+def _solvers() -> ModuleType | None:
+    """The compiled ones, where numba is installed."""
     try:
         import numba
 
         if numba.config.DISABLE_JIT:
             return None
-        from analytic.simulation import explicit
+        from analytic.simulation import solvers
     except ImportError:
         return None
-    return explicit
+    return solvers
 
 
 class StalledError(ArithmeticError):
@@ -101,51 +101,52 @@ class Stretch:
             return
         while t < self.until:
             try:
-                slow, compiled = 0, _compiled() if not small else None
-                solve = partial(self._explicit, compiled) if compiled else partial(self._solve, BDF if small else LSODA)
-                for step in solve(t, z, first_step):
+                slow, solvers = 0, _solvers()
+                steps = self._compiled(solvers, small, t, z, first_step) if solvers else None
+                for step in steps or self._solve(BDF if small else LSODA, t, z, first_step):
                     yield step
                     t, z, first_step = step.time, step.z, None
                     if step.guard:
                         return
-                    if compiled:
-                        continue
                     grown = self.chart.least_slip(z) > SMALL_SLIP
                     slow = 0 if grown else slow + 1
-                    if slow % PATIENCE == PATIENCE - 1 and (last := self._straight(t, z)):
+                    patience = 2 if solvers else PATIENCE
+                    if slow % patience == patience - 1 and (last := self._straight(t, z)):
                         yield last
                         return
-                    if grown if small else slow > PATIENCE:
+                    if solvers is None and (grown if small else slow > PATIENCE):
                         break
-                if compiled and t < self.until and (last := self._straight(t, z)):
-                    yield last
-                    return
             except StalledError:
                 failures += 1
                 if failures > MAX_RESTARTS:
                     raise
             small = not small
 
-    def _explicit(self, compiled: Any, start: float, z: list[float], first_step: float | None) -> Iterator[Step]:
-        """Long strides, compiled: to the end, to a guard, or to where a slip has been small for too long."""
+    def _compiled(
+        self, solvers: Any, small: bool, start: float, z: list[float], first_step: float | None
+    ) -> Iterator[Step]:
+        """Long strides: to the end, to a guard, or to where the other solver should go on."""
         chart, times, here = self.chart, self.times, np.array(z, dtype=float)
         taken = int(np.searchsorted(times, start, side="right"))
         samples = np.empty((int(np.searchsorted(times, self.until, side="right")), len(here)))
-        atol, level = LOCAL * self.absolute * np.array(chart.scale), np.array(self._level)
+        scale, level = np.array(chart.scale), np.array(self._level)
         slips, unit = np.array(chart.slips, dtype=np.int64), float(chart.scale[chart.slips[0]]) if chart.slips else 1.0
         motion = chart.motion._replace(waves=np.array(chart.motion.waves, dtype=float).reshape(-1, 3))
-        tau, h, why = 0.0, first_step or 0.0, compiled.PAUSED
-        while why == compiled.PAUSED:
+        floor = scale.copy()
+        floor[slips] *= self.relative
+        solver, more = (solvers.implicit, (floor, PATIENCE)) if small else (solvers.explicit, (PATIENCE, BREATH))
+        tau, h, why = 0.0, first_step or 0.0, solvers.PAUSED
+        while why == solvers.PAUSED:
             before = taken
-            why, tau, h, guard, taken = compiled.follow(
-                motion, start, tau, h, self.until - start, here, times, taken, samples, LOCAL * self.relative, atol,
-                np.array(self._arm), level, slips, unit, SMALL_SLIP, PATIENCE, BREATH,
+            why, tau, h, guard, taken = solver(
+                motion, start, tau, h, self.until - start, here, times, taken, samples, LOCAL * self.relative,
+                LOCAL * self.absolute * scale, np.array(self._arm), level, slips, unit, SMALL_SLIP, *more,
             )  # fmt: skip
-            if why == compiled.STUCK or not np.isfinite(here).all():
+            if why == solvers.STUCK or not np.isfinite(here).all():
                 raise StalledError(f"steps become too short in case {Case(chart.motion.case).name}")
-            t = self.until if why == compiled.DONE else start + tau
+            t = self.until if why == solvers.DONE else start + tau
             self._level = level.tolist()
-            name = chart.ends[guard] if guard >= 0 else None
+            name = chart.ends[guard] if why == solvers.FIRED else None
             yield Step(t, here.tolist(), times[before:taken].tolist(), samples[before:taken].tolist(), name)
 
     def _straight(self, t: float, z: Sequence[float]) -> Step | None:

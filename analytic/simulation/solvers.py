@@ -1,6 +1,9 @@
-"""Steps through one case, compiled by numba: Dormand and Prince's method of order 8 with dense output, and its roots.
+"""Steps through one case, compiled by numba, and the moments at which it ends.
 
-The coefficients are those of `scipy.integrate.DOP853`. Guards are looked at four times in each step.
+`explicit` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
+`scipy.integrate.DOP853`; guards are looked at four times in each step. `implicit` is for a slip that has just set in, whose
+direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer & Wanner,
+Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
 """
 
 from __future__ import annotations
@@ -27,13 +30,15 @@ _DIGEST = hashlib.sha256(b"".join(Path(str(m.__file__)).read_bytes() for m in (d
 A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
 A_MORE, C_MORE = np.ascontiguousarray(DOP853.A_EXTRA), np.ascontiguousarray(DOP853.C_EXTRA)
 STAGES, ALL = len(B), len(B) + 1 + len(C_MORE)
-DONE, FIRED, STIFF, STUCK, PAUSED = range(5)
-"""Why `follow` returns: at the end, at a guard, with a small slip for too long, with steps too short, for a breath."""
+DONE, FIRED, OTHER, STUCK, PAUSED = range(5)
+"""Why they return: at the end, at a guard, as the other one should go on, with steps too short, for a breath."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 """Of the length of a step: below what its error allows; and by how much it may change."""
 LOOKS = 4
 """How often in a step guards are looked at."""
 HALVINGS = 200
+COLUMNS, USUAL = 10, 6
+"""Most columns of an extrapolation, and how many steps aim at."""
 EPS = math.ulp(1.0)
 
 
@@ -96,8 +101,19 @@ def _root(
     return high
 
 
+@register_jitable
+def _pass(guard_values: Array, arm: Array, level: Array) -> int:
+    """Arm guards that have risen; the first that has fallen through its level, or -1."""
+    for guard in range(len(arm)):
+        if guard_values[guard] > arm[guard]:
+            level[guard] = 0.0
+        elif guard_values[guard] < level[guard]:
+            return guard
+    return -1
+
+
 @_compiled
-def follow(
+def explicit(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
     rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, small: float,
     patience: int, most: int,
@@ -207,5 +223,144 @@ def follow(
             least = min(least, z[i] / unit)
         slow = slow + 1 if least <= small else 0
         if slow > patience:
-            return STIFF, tau, h, -1, taken
+            return OTHER, tau, h, -1, taken
+    return PAUSED, tau, h, -1, taken
+
+
+@register_jitable
+def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
+    """A matrix as its triangles, rows exchanged."""
+    n = len(M)
+    for i in range(n):
+        best = i
+        for r in range(i + 1, n):
+            if abs(M[r, i]) > abs(M[best, i]):
+                best = r
+        order[i] = best
+        for c in range(n):
+            M[i, c], M[best, c] = M[best, c], M[i, c]
+        for r in range(i + 1, n):
+            M[r, i] /= M[i, i]
+            for c in range(i + 1, n):
+                M[r, c] -= M[r, i] * M[i, c]
+
+
+@register_jitable
+def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
+    """What such a matrix makes b of, in its place."""
+    n = len(M)
+    for i in range(n):
+        b[i], b[order[i]] = b[order[i]], b[i]
+    for i in range(n):
+        for c in range(i):
+            b[i] -= M[i, c] * b[c]
+    for i in range(n - 1, -1, -1):
+        for c in range(i + 1, n):
+            b[i] -= M[i, c] * b[c]
+        b[i] /= M[i, i]
+
+
+@register_jitable
+def _extrapolated(
+    t: float, h: float, k: Motion, z: Array, J: Array, rtol: float, atol: Array, table: Array, M: Array,
+    order: npt.NDArray[np.int64], rate: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """A step by 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error, and how many columns that took."""
+    n, error = len(z), math.inf
+    for column in range(COLUMNS):
+        steps = column + 1
+        part, y = h / steps, table[column]
+        for i in range(n):
+            for c in range(n):
+                M[i, c] = (i == c) - part * J[i, c]
+        _factored(M, order)
+        y[:] = z
+        for s in range(steps):
+            equations.rates(t + (s + 1) * part, y, k, rate)
+            for i in range(n):
+                rate[i] *= part
+            _solve(M, order, rate)
+            for i in range(n):
+                y[i] += rate[i]
+        square = 0.0
+        for q in range(column - 1, -1, -1):
+            square = 0.0
+            for i in range(n):
+                more = (table[q + 1, i] - table[q, i]) / (steps / (q + 1) - 1)
+                table[q, i] = table[q + 1, i] + more
+                square += (more / (atol[i] + rtol * max(abs(z[i]), abs(table[q, i])))) ** 2
+        error = math.sqrt(square / n) if column > 0 else math.inf
+        if error <= 1 or not error < 1e10 and column > 0:
+            return error, steps
+    return error, COLUMNS
+
+
+@_compiled
+def implicit(
+    k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
+    rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, large: float,
+    floor: Array, most: int,
+) -> tuple[int, float, float, int, int]:  # fmt: skip
+    """As `explicit`, until all slips are `large` times `unit`. `floor` (n,) is what shifts of a Jacobian are at least."""
+    n = len(z)
+    table, J, M, order = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n, np.int64)
+    here, rate, values, now = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty(n)
+    for _ in range(most):
+        if tau >= span:
+            return DONE, tau, h, -1, taken
+        equations.rates(start + tau, z, k, here)
+        for c in range(n):
+            shift = math.sqrt(EPS) * max(abs(z[c]), floor[c])
+            now[:] = z
+            now[c] += shift
+            equations.rates(start + tau, now, k, rate)
+            for i in range(n):
+                J[i, c] = (rate[i] - here[i]) / (now[c] - z[c])
+        if h <= 0:
+            size = 0.0
+            for i in range(n):
+                size = max(size, abs(here[i]) / (atol[i] / rtol + abs(z[i])))
+            h = min(span - tau, 1e-3 / size if size > 0 else span)
+        stop = min(span, times[taken] - start) if taken < len(times) else span
+        while True:
+            length = min(h, stop - tau)
+            if length <= 4 * EPS * tau or length < 1e-300:
+                return STUCK, tau, h, -1, taken
+            error, columns = _extrapolated(start + tau, length, k, z, J, rtol, atol, table, M, order, rate)
+            if error <= 1:
+                break
+            h = length / 4
+        after = stop if length == stop - tau else tau + length
+        now[:] = table[0]
+        equations.guards(start + after, now, k, values)
+        guard = _pass(values, arm, level)
+        if guard >= 0:  # halve the step until it ends at the guard
+            low, high = 0.0, length
+            while high - low > 4 * EPS * max(tau, length):
+                middle = (low + high) / 2
+                _extrapolated(start + tau, middle, k, z, J, rtol, atol, table, M, order, rate)
+                equations.guards(start + (tau + middle), table[0], k, values)
+                fell = -1
+                for each in range(len(arm)):
+                    if values[each] < level[each]:
+                        fell = each
+                if fell >= 0:
+                    high, guard = middle, fell
+                    now[:] = table[0]
+                else:
+                    low = middle
+            z[:] = now
+            return FIRED, tau + high, h, guard, taken
+        z[:] = now
+        tau = after
+        while taken < len(times) and times[taken] <= start + tau:
+            samples[taken] = z
+            taken += 1
+        if length == h or error < 0.01:
+            h = length * (4.0 if columns < USUAL - 2 else 2.0 if columns < USUAL else 1.0 if columns == USUAL else 0.6)
+        least = math.inf
+        for i in slips:
+            least = min(least, z[i] / unit)
+        if least > large:
+            return OTHER, tau, 0.0, -1, taken
     return PAUSED, tau, h, -1, taken
