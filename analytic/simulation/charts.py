@@ -60,10 +60,11 @@ def _motion(
     falls: bool = False, since: float = 0.0, v_y: float = 0.0,
 ) -> Motion:  # fmt: skip
     """What the rates depend on, as plain numbers."""
+    ball = {name: float(getattr(p, name)) for name in ("m", "r", "R", "j", "mu", "eta", "g")}
+    line = {name: float(getattr(omega_0, name)) for name in ("start", "value", "slope")}
     return Motion(
-        int(case), *map(float, (p.m, p.r, p.R, p.j, p.mu, p.eta, p.g)), drag.Law(*map(float, drag.law(p))),
-        float(omega_0.start), float(omega_0.value), float(omega_0.slope), omega_0.waves, floor, side, LEAVES[leaves],
-        falls, since, v_y,
+        int(case), **ball, law=drag.Law(*map(float, drag.law(p))), **line, waves=omega_0.waves, floor=floor, side=side,
+        leaves=LEAVES[leaves], falls=falls, since=since, v_y=v_y,
     )  # fmt: skip
 
 

@@ -57,7 +57,7 @@ def fluid(t: float, k: Motion) -> float:
     omega_0 = k.value + k.slope * (t - k.start)
     for n in range(len(k.waves)):
         wave = k.waves[n]
-        omega_0 += wave[0] * math.sin(wave[1] * t + wave[2])
+        omega_0 = omega_0 + wave[0] * math.sin(wave[1] * t + wave[2])
     return omega_0
 
 
@@ -67,7 +67,8 @@ def resistance(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
     if wake == 0 and blunt == 0:
         return linear
     speed = math.sqrt(w_h * w_h + w_y * w_y + w_k * w_k)
-    return max(linear + wake * speed**drag.EXPONENT, blunt * speed)
+    slow: float = linear + wake * speed**drag.EXPONENT
+    return max(slow, blunt * speed)
 
 
 def rates(t: float, z: Any, k: Motion, out: Any) -> None:

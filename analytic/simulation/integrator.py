@@ -17,16 +17,15 @@ import numpy as np
 from scipy.integrate import BDF, LSODA
 from scipy.optimize import brentq
 
-from analytic.simulation.motion import FINER, GAPS, Chart
+from analytic.simulation.motion import FINER, GAPS, REPORT_EVERY, Chart
 from model import Case
 from model.arrays import Array
 
-ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
-"""Slip that has just set in, and slip whose direction may be stiff, relative to the spin of rolling at sqrt(g R)."""
+ONSET_SLIP, GROWN_SLIP, SMALL_SLIP = 1e-7, 1e-4, 1e-2
+"""Slip that has just set in; from which on compiled steps that are short cost less than stiff ones; and whose direction
+may be stiff: relative to the spin of rolling at sqrt(g R)."""
 PATIENCE = 300
 """Steps with a small slip after which BDF takes over; a slip that dies out takes fewer."""
-BREATH = 20_000
-"""Compiled steps after which Python may be interrupted."""
 MAX_RESTARTS = 20
 """How often in one stretch a solver may fail; the other one then takes over."""
 EPS = math.ulp(1.0)
@@ -63,6 +62,8 @@ class Step(NamedTuple):
     """Coordinates then."""
     guard: str | None = None
     """The guard that fired at its end."""
+    stands_for: int = 1
+    """Steps that it stands for."""
 
 
 class Stretch:
@@ -134,20 +135,26 @@ class Stretch:
         motion = chart.motion._replace(waves=np.array(chart.motion.waves, dtype=float).reshape(-1, 3))
         floor = scale.copy()
         floor[slips] *= self.relative
-        solver, more = (solvers.implicit, (floor, PATIENCE)) if small else (solvers.explicit, (PATIENCE, BREATH))
-        tau, h, why = 0.0, first_step or 0.0, solvers.PAUSED
+        solver, *more = (
+            (solvers.implicit, GROWN_SLIP, floor, PATIENCE)
+            if small
+            else (solvers.explicit, SMALL_SLIP, PATIENCE, REPORT_EVERY)
+        )
+        tau, h, why = 0.0, 0.0 if small else first_step or 0.0, solvers.PAUSED  # 0: it finds one
         while why == solvers.PAUSED:
             before = taken
             why, tau, h, guard, taken = solver(
                 motion, start, tau, h, self.until - start, here, times, taken, samples, LOCAL * self.relative,
-                LOCAL * self.absolute * scale, np.array(self._arm), level, slips, unit, SMALL_SLIP, *more,
+                LOCAL * self.absolute * scale, np.array(self._arm), level, slips, unit, *more,
             )  # fmt: skip
             if why == solvers.STUCK or not np.isfinite(here).all():
                 raise StalledError(f"steps become too short in case {Case(chart.motion.case).name}")
             t = self.until if why == solvers.DONE else start + tau
             self._level = level.tolist()
             name = chart.ends[guard] if why == solvers.FIRED else None
-            yield Step(t, here.tolist(), times[before:taken].tolist(), samples[before:taken].tolist(), name)
+            yield Step(
+                t, here.tolist(), times[before:taken].tolist(), samples[before:taken].tolist(), name, REPORT_EVERY
+            )
 
     def _straight(self, t: float, z: Sequence[float]) -> Step | None:
         """All the rest, if a straight line solves the equations to the tolerance and no guard fires; else None.

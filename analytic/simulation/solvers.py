@@ -1,9 +1,9 @@
 """Steps through one case, compiled by numba, and the moments at which it ends.
 
 `explicit` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
-`scipy.integrate.DOP853`; guards are looked at four times in each step. `implicit` is for a slip that has just set in, whose
-direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer & Wanner,
-Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
+`scipy.integrate.DOP853`; guards are looked at four times in each step. `implicit` is for a slip that has just set in,
+whose direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer &
+Wanner, Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def _compiled(function: Any) -> Any:
         return numba.njit(nogil=True, error_model="numpy")(function)
 
 
-@register_jitable
+@register_jitable  # type: ignore[untyped-decorator]
 def _between(x: float, z: Array, F: Array, out: Array) -> None:
     """Coordinates at a share x of a step that began at z."""
     for i in range(len(z)):
@@ -61,7 +61,7 @@ def _between(x: float, z: Array, F: Array, out: Array) -> None:
         out[i] = z[i] + value
 
 
-@register_jitable
+@register_jitable  # type: ignore[untyped-decorator]
 def _root(
     guard: int, level: float, low: float, high: float, t: float, h: float, k: Motion, z: Array, F: Array, now: Array,
     values: Array,
@@ -101,7 +101,7 @@ def _root(
     return high
 
 
-@register_jitable
+@register_jitable  # type: ignore[untyped-decorator]
 def _pass(guard_values: Array, arm: Array, level: Array) -> int:
     """Arm guards that have risen; the first that has fallen through its level, or -1."""
     for guard in range(len(arm)):
@@ -126,7 +126,7 @@ def explicit(
     """
     n, slow, rejected = len(z), 0, False
     K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
-    new, now, values = np.empty(n), np.empty(n), np.empty(len(arm))
+    new, now, values, seen = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty((LOOKS + 1, len(arm)))
     equations.rates(start + tau, z, k, K[0])
     if h <= 0:  # by the size of the rates
         rate = 0.0
@@ -187,23 +187,32 @@ def explicit(
                     value += D[j, s] * K[s, i]
                 F[3 + j, i] = h * value
         fired, end = -1, 2.0
-        for look in range(1, LOOKS + 1):
-            share = look / LOOKS
-            if look < LOOKS:
-                _between(share, z, F, now)
-            else:
-                now[:] = new
-            equations.guards(start + (tau + share * h), now, k, values)
-            for guard in range(len(arm)):
-                if values[guard] > arm[guard]:
+        for look in range(LOOKS + 1):
+            _between(look / LOOKS, z, F, now)
+            equations.guards(start + (tau + look / LOOKS * h), new if look == LOOKS else now, k, seen[look])
+        for guard in range(len(arm)):
+            for look in range(1, LOOKS + 1):
+                share = look / LOOKS
+                if seen[look, guard] > arm[guard]:
                     level[guard] = 0.0
-                elif values[guard] < level[guard]:
-                    root = _root(guard, level[guard], share - 1 / LOOKS, share, start + tau, h, k, z, F, K[1], values)
-                    equations.guards(start + (tau + share * h), now, k, values)
+                lowest = share
+                if look > 1:  # a dip between the looks: the vertex of the parabola through three
+                    one, two, three = seen[look - 2, guard], seen[look - 1, guard], seen[look, guard]
+                    bend = one - 2 * two + three
+                    away = (one - three) / (2 * bend) if bend > 0 else 2.0
+                    if abs(away) < 1 and two - bend * away * away / 2 < level[guard] + bend:
+                        lowest = share + (away - 1) / LOOKS
+                        _between(lowest, z, F, now)
+                        equations.guards(start + (tau + lowest * h), now, k, values)
+                        if not values[guard] < level[guard]:
+                            lowest = share
+                if lowest < share or seen[look, guard] < level[guard]:
+                    high = min(lowest, share)
+                    low = max(share - 1 / LOOKS, 0.0) if high > share - 1 / LOOKS else max(share - 2 / LOOKS, 0.0)
+                    root = _root(guard, level[guard], low, high, start + tau, h, k, z, F, now, values)
                     if root < end:
                         fired, end = guard, root
-            if fired >= 0:
-                break
+                    break
         until = tau + end * h if fired >= 0 else after
         while taken < len(times) and times[taken] <= start + until:
             _between(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
@@ -227,7 +236,7 @@ def explicit(
     return PAUSED, tau, h, -1, taken
 
 
-@register_jitable
+@register_jitable  # type: ignore[untyped-decorator]
 def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
     """A matrix as its triangles, rows exchanged."""
     n = len(M)
@@ -245,7 +254,7 @@ def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
                 M[r, c] -= M[r, i] * M[i, c]
 
 
-@register_jitable
+@register_jitable  # type: ignore[untyped-decorator]
 def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
     """What such a matrix makes b of, in its place."""
     n = len(M)
@@ -260,7 +269,7 @@ def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
         b[i] /= M[i, i]
 
 
-@register_jitable
+@register_jitable  # type: ignore[untyped-decorator]
 def _extrapolated(
     t: float, h: float, k: Motion, z: Array, J: Array, rtol: float, atol: Array, table: Array, M: Array,
     order: npt.NDArray[np.int64], rate: Array,
@@ -290,7 +299,7 @@ def _extrapolated(
                 table[q, i] = table[q + 1, i] + more
                 square += (more / (atol[i] + rtol * max(abs(z[i]), abs(table[q, i])))) ** 2
         error = math.sqrt(square / n) if column > 0 else math.inf
-        if error <= 1 or not error < 1e10 and column > 0:
+        if error <= 1 or (not error < 1e10 and column > 0):
             return error, steps
     return error, COLUMNS
 
@@ -301,7 +310,7 @@ def implicit(
     rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, large: float,
     floor: Array, most: int,
 ) -> tuple[int, float, float, int, int]:  # fmt: skip
-    """As `explicit`, until all slips are `large` times `unit`. `floor` (n,) is what shifts of a Jacobian are at least."""
+    """As `explicit`, until all slips are `large` times `unit`; a Jacobian shifts z by a share of it or `floor` (n,)."""
     n = len(z)
     table, J, M, order = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n, np.int64)
     here, rate, values, now = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty(n)
