@@ -56,7 +56,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
 
 class _Simulator:
     def __init__(self, p: Parameters, settings: Settings, recorder: Recorder) -> None:
-        self.p, self.settings, self.recorder = p, settings, recorder
+        self.p, self.settings, self.recorder, self.steps = p, settings, recorder, 0
         self.still = 10 * settings.rtol * math.sqrt(p.g * p.R) / p.r
         """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
 
@@ -121,12 +121,14 @@ class _Simulator:
             hops = ((x.y, x.v_y, dx.v_y), (x.h, x.v_h, dx.v_h))
             hop = min((2 * v / -a for gap, v, a in hops if gap == 0 < v and a < 0), default=math.inf)
         try:
-            for count, step in enumerate(stretch.steps(hop / 20 if hop < until - at.time else None), 1):
+            for step in stretch.steps(hop / 20 if hop < until - at.time else None):
                 reached += [*step.sample_times, step.time]
                 states += [*step.samples, step.z]
                 sampled += [True] * len(step.samples) + [False]
                 guard = step.guard
-                if count % REPORT_EVERY == 0:
+                self.steps += step.stands_for
+                if self.steps >= REPORT_EVERY:
+                    self.steps = 0
                     self.recorder.reached(step.time)
         finally:
             path = motion.path(np.array(reached), np.array(states).T)
@@ -138,8 +140,7 @@ class _Simulator:
             self.recorder.reached(float(path.time[-1]))
             return
         path = Path(*(column[wanted] for column in path))
-        omega_0 = np.array([fluid(t) for t in path.time.tolist()])
-        forces = path_forces(case, path, self.p, omega_0)
+        forces = path_forces(case, path, self.p, fluid(path.time))
         self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
 
 

@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from analytic.mechanics import rigid_body
 from analytic.mechanics.rigid_body import NOTHING, Forces
+from analytic.simulation import equations
+from analytic.simulation.equations import Motion
 from model import Case, Events, Flow, Header, Parameters, State, Trajectory
 from model.arrays import Array, Real
 from model.trajectory import samples
@@ -80,21 +82,31 @@ class Path(NamedTuple):
 class Chart:
     """The motion of one case in its coordinates z."""
 
-    case: Case
     start: list[float]
     scale: list[float]
     """Natural size of each coordinate, for absolute tolerances."""
-    rates: Callable[[float, Sequence[float]], list[float]]
+    motion: Motion
+    """What the rates depend on."""
     ends: tuple[str, ...]
     """What can end the case."""
-    guards: Callable[[float, Sequence[float]], tuple[float, ...]]
-    """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
     path: Callable[[Array, Array], Path]
     """States from times (n,) and coordinates (k, n)."""
     landing: float = math.inf
     """When the ball will touch the floor, where that is known in advance, s."""
     slips: tuple[int, ...] = ()
     """Which coordinates are slips with a direction of their own."""
+
+    def rates(self, t: float, z: Sequence[float]) -> list[float]:
+        """Rates of the coordinates."""
+        out = [0.0] * len(z)
+        equations.rates(t, z, self.motion, out)
+        return out
+
+    def guards(self, t: float, z: Sequence[float]) -> list[float]:
+        """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
+        out = [0.0] * len(self.ends)
+        equations.guards(t, z, self.motion, out)
+        return out
 
     def least_slip(self, z: Sequence[float]) -> float:
         """The smallest slip that has a direction, in natural units; inf if there is none."""

@@ -21,8 +21,7 @@ P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
 FLOOR = 1e-9
 
 
-def ramp(t: float) -> float:
-    return P.omega_0 + 3.0 * t
+RAMP = motion.Fluid(0.0, P.omega_0, 3.0)
 
 
 def moment(case: Case, seed: int) -> motion.Moment:
@@ -49,24 +48,24 @@ def test_rates_are_those_of_the_vector_field(case, law):
     p = P.replace(drag=law, nu_f=1e-5)
     for seed in range(20):
         at = moment(case, seed)
-        chart = charts.chart(case, at, p, ramp, FLOOR, "infeasible")
+        chart = charts.chart(case, at, p, RAMP, FLOOR, "infeasible")
         rate = np.array(chart.rates(at.time, chart.start))
         step = 1e-7
         t, z = at.time + step * np.array([-1.0, 0, 1]), np.array(chart.start)[:, None]
         path = chart.path(t, z + step * rate[:, None] * np.array([-1.0, 0, 1]))
         np.testing.assert_allclose(path.x[1], at.x, rtol=0, atol=1e-14 * np.max(np.abs(at.x)))
         slope = (path.x[2] - path.x[0]) / (2 * step)
-        expected = vector_field(case, path.x[1], p, ramp(at.time))
+        expected = vector_field(case, path.x[1], p, RAMP(at.time))
         # Differences err by round-off/step, and by step^2 times third derivatives; angles turn at some 1e3 rad/s.
         np.testing.assert_allclose(slope, expected, rtol=1e-6, atol=1e-6 * np.max(np.abs(expected)))
         assert (path.theta[2] - path.theta[0]) / (2 * step) == pytest.approx(at.x[2], rel=1e-6)
         change = energy(0.0, velocities(path.x[2], P), P) - energy(0.0, velocities(path.x[0], P), P)
         change += P.m * P.g * (path.x[2][0] - path.x[0][0])
         rho, (_, v_y, omega_c, *_, v_h) = P.R - at.x[6], at.x
-        lag = rho * (omega_c - ramp(at.time))
+        lag = rho * (omega_c - RAMP(at.time))
         power = -P.m * resistance(math.hypot(v_h, v_y, lag), p) * (v_h**2 + v_y**2 + rho * omega_c * lag)
         if case is not Case.RR:
-            forces = contact_forces(case, path.x[1], p, ramp(at.time))
+            forces = contact_forces(case, path.x[1], p, RAMP(at.time))
             power += sum(float(np.sum(f * v)) for f, v in zip(forces, slip_velocities(path.x[1], P), strict=True))
         largest = max(abs(power), P.m * P.g * P.R * 10)
         assert (path.work[2] - path.work[0]) / (2 * step) == pytest.approx(power, abs=1e-6 * largest)
@@ -83,7 +82,7 @@ def test_vanishing_slip_has_a_direction(case):
     if case.B is Contact.S:
         x = x._replace(slip_y=0.0, slip_z=0.0)
     at = motion.Moment(at.time, at.theta, x, at.alpha, at.beta)
-    chart = charts.chart(case, at, P, ramp, FLOOR, "infeasible")
+    chart = charts.chart(case, at, P, RAMP, FLOOR, "infeasible")
     assert chart.least_slip(chart.start) == pytest.approx(0.0, abs=1e-15)
     path = chart.path(np.array([at.time]), np.array(chart.start)[:, None])
     for given, kept in ((at.alpha, path.alpha[0]), (at.beta, path.beta[0])):

@@ -206,6 +206,7 @@ def test_a_solver_that_fails_gives_way_to_the_other(name, monkeypatch):
                 return "step size below spacing of numbers"
             return super().step()
 
+    monkeypatch.setattr(integrator, "_solvers", lambda: None)
     monkeypatch.setattr(integrator, name, Fails)
     run = simulate(p, x0, 1.5, sample_interval=0.1)
     assert Fails.steps >= 10
@@ -217,6 +218,7 @@ def test_solvers_that_both_fail_end_the_run(monkeypatch):
         self.status = "failed"
         return "step size below spacing of numbers"
 
+    monkeypatch.setattr(integrator, "_solvers", lambda: None)
     monkeypatch.setattr(integrator.BDF, "step", fails)
     monkeypatch.setattr(integrator.LSODA, "step", fails)
     with pytest.raises(SimulationError, match="in case SS: step size below spacing of numbers"):

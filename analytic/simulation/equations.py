@@ -1,0 +1,274 @@
+"""Rates of the coordinates of `charts`, and what ends a case: one text of plain floats, which numba compiles.
+
+At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with h = 0; away from it
+both are written in the resting frame. `dynamics` has them for arrays of states, and test_charts holds these against it.
+A function writes what it finds into a list or an array that it is given.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import Any, NamedTuple
+
+from analytic.mechanics import drag
+from model import Case
+
+RR, RS, RN, SR, SS, SN, NR, NS, NN = (int(case) for case in Case)
+STABILITY, FEASIBILITY = range(2)
+"""What `leave_rolling` of `Settings` asks of RR: that slip dies out, or only that forces hold it."""
+
+
+class Motion(NamedTuple):
+    """What the motion of one case depends on; in SI units."""
+
+    case: int
+    m: float
+    r: float
+    R: float
+    j: float
+    mu: float
+    eta: float
+    g: float
+    law: drag.Law
+    """Of the drag."""
+    start: float
+    """Time at which the line of the flow has its value, s."""
+    value: float
+    slope: float
+    waves: Any
+    """Rows of amplitude, angular frequency and phase, a tuple of tuples or an array (k, 3)."""
+    floor: float
+    """Slip in natural units below which the turning rate of its direction is capped."""
+    side: float
+    """Sine of the direction of a slip that keeps to one line."""
+    leaves: int
+    """`STABILITY` or `FEASIBILITY`."""
+    falls: bool
+    """Whether a free flight is known: with Stokes' drag."""
+    since: float
+    """When it began, s;"""
+    v_y: float
+    """and its vertical velocity then, m s-1."""
+
+
+def fluid(t: float, k: Motion) -> float:
+    """omega_0 at a time, rad s-1: a line and waves."""
+    omega_0 = k.value + k.slope * (t - k.start)
+    for n in range(len(k.waves)):
+        wave = k.waves[n]
+        omega_0 = omega_0 + wave[0] * math.sin(wave[1] * t + wave[2])
+    return omega_0
+
+
+def resistance(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
+    """c(|w|) of a velocity relative to the fluid, s-1."""
+    linear, wake, blunt = k.law
+    if wake == 0 and blunt == 0:
+        return linear
+    speed = math.sqrt(w_h * w_h + w_y * w_y + w_k * w_k)
+    slow: float = linear + wake * speed**drag.EXPONENT
+    return max(slow, blunt * speed)
+
+
+def rates(t: float, z: Any, k: Motion, out: Any) -> None:
+    """Rates of the coordinates of a case."""
+    if k.case == RN or k.case == SN or k.case == NN:
+        _rates_away(t, z, k, out)
+    else:
+        _rates_at_wall(t, z, k, out)
+
+
+def guards(t: float, z: Any, k: Motion, out: Any) -> None:
+    """What is positive while a case lasts, in natural units, in the order of `charts.ENDS`."""
+    if k.case == RN or k.case == SN or k.case == NN:
+        _guards_away(t, z, k, out)
+    else:
+        _guards_at_wall(t, z, k, out)
+
+
+def _forces(omega_c: float, v_y: float, w_x: float, c: float, lag: float, s_A: float, c_A: float, s_B: float,
+            c_B: float, k: Motion) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    """Forces of floor and wall along i, j, k in the cases at the wall, N; in RR with B_y = 0.
+
+    `lag` is omega_c - omega_0; s and c are sine and cosine of the directions of slip.
+    """
+    u, G, drive, j = k.m * k.R * omega_c * omega_c, k.m * k.g, k.m * k.R * c * lag, k.j
+    if k.case == RR:
+        z = j * drive / (1 + 2 * j)
+        return -j * u, G, z, (1 + j) * u, 0.0, z
+    if k.case == RS:
+        B_x = (1 + j) * u
+        B_z = -k.eta * B_x * s_B
+        return -j * u, G, j * (drive - B_z) / (1 + j), B_x, 0.0, B_z
+    if k.case == SR:
+        B_y = j * k.m * (k.R * omega_c * omega_c + k.r * omega_c * w_x)
+        A_y = G - B_y
+        A_z = k.mu * A_y * s_A
+        return 0.0, A_y, A_z, u, B_y, j * (drive - A_z) / (1 + j)
+    if k.case == SS:
+        determinant = 1 + k.mu * k.eta * c_A * c_B
+        A_y, B_x = (G - k.eta * c_B * u) / determinant, (u + k.mu * c_A * G) / determinant
+        return -k.mu * A_y * c_A, A_y, k.mu * A_y * s_A, B_x, k.eta * B_x * c_B, -k.eta * B_x * s_B
+    if k.case == NR:
+        B_y = j * k.m * (k.g + c * v_y + k.R * omega_c * omega_c + k.r * omega_c * w_x) / (1 + j)
+        return 0.0, 0.0, 0.0, u, B_y, j * drive / (1 + j)
+    return 0.0, 0.0, 0.0, u, k.eta * u * c_B, -k.eta * u * s_B
+
+
+def _at_wall(z: Any, k: Motion) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
+    """omega_c, v_y, slip_x, slip_z, q_A, sine and cosine of alpha, q_B, those of beta, slip_y."""
+    v_y = w_x = w_z = q_A = s_A = c_A = q_B = s_B = c_B = 0.0
+    omega_c = z[1]
+    if k.case == SR:
+        q_A, s_A = z[2], k.side
+        w_x = q_A * s_A
+    elif k.case == RS:
+        q_B, s_B = z[2], k.side
+    elif k.case == SS:
+        q_A, s_A, c_A = z[2], math.sin(z[3]), math.cos(z[3])
+        q_B, s_B, c_B = z[4], math.sin(z[5]), math.cos(z[5])
+        w_x, w_z = q_A * s_A, q_A * c_A
+    elif k.case == NR or k.case == NS:
+        v_y, omega_c, w_x = z[2], z[3], z[4]
+        if k.case == NS:
+            q_B, s_B, c_B = z[5], math.sin(z[6]), math.cos(z[6])
+            w_z = q_B * c_B
+    return omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, q_B * s_B
+
+
+def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
+    omega_0 = fluid(t, k)
+    omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, _ = _at_wall(z, k)
+    lag = omega_c - omega_0
+    c = resistance(0.0, v_y, k.R * lag, k)
+    A_x, A_y, A_z, B_x, B_y, B_z = _forces(omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
+    jmr = k.j * k.m * k.r
+    push = (A_z + B_z) / k.m - c * k.R * lag
+    roll = push / k.r
+    power = -k.m * c * (k.R * k.R * omega_c * lag + v_y * v_y)
+    dw_x = -A_z / jmr - omega_c * (v_y / k.r + w_z) - roll
+    dw_z = dv_y = 0.0
+    if k.case == NR or k.case == NS:
+        dv_y = B_y / k.m - k.g - c * v_y
+        out[1], out[2], out[3], out[4], first = v_y, dv_y, push / k.R, dw_x, 5
+    else:
+        out[1], first = push / k.R, 2
+    out[0] = omega_c
+    if k.case == SS or k.case == NS:
+        dw_z = (A_x - B_y) / jmr + omega_c * (k.R * omega_c / k.r + w_x) - dv_y / k.r
+    unit, spin = math.sqrt(k.R / k.g), math.sqrt(k.R * k.g) / k.r
+    if k.case == SR or k.case == SS:
+        bond = (q_A * c_A - w_z) / unit
+        out[first] = dw_x * s_A + dw_z * c_A - bond * c_A
+        power -= k.r * q_A * k.mu * A_y
+        if k.case == SS:
+            out[first + 1] = (dw_x * c_A - dw_z * s_A) / max(q_A, k.floor * spin)
+            first += 1
+        first += 1
+    if k.case == RS or k.case == SS or k.case == NS:
+        dw_y = B_z / jmr + roll
+        bond = (q_B * c_B - w_z) / unit
+        out[first] = dw_y * s_B + dw_z * c_B - bond * c_B
+        power -= k.r * q_B * k.eta * B_x
+        if k.case != RS:
+            out[first + 1] = (dw_y * c_B - dw_z * s_B) / max(q_B, k.floor * spin)
+            first += 1
+        first += 1
+    out[first] = power
+
+
+def _guards_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
+    omega_c, v_y, w_x, _, q_A, s_A, c_A, q_B, s_B, c_B, _ = _at_wall(z, k)
+    lag = omega_c - fluid(t, k)
+    c = resistance(0.0, v_y, k.R * lag, k)
+    if k.case == RR:
+        out[0] = _rolls_on(k.R / k.g * omega_c * omega_c, abs(k.j * c * k.R / k.g * lag / (1 + 2 * k.j)), k)
+        return
+    A_x, A_y, A_z, B_x, B_y, B_z = _forces(omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
+    spin, G = math.sqrt(k.R * k.g) / k.r, k.m * k.g
+    if k.case == RS:
+        out[0], out[1] = q_B / spin, (k.mu * A_y - math.sqrt(A_x * A_x + A_z * A_z)) / G
+    elif k.case == SR:
+        out[0], out[1], out[2] = q_A / spin, (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G, A_y / G
+    elif k.case == SS:
+        out[0], out[1], out[2], out[3] = q_A / spin, q_B / spin, A_y / G, B_x / G
+    else:
+        slips = q_B / spin if k.case == NS else (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
+        out[0], out[1] = z[1] / k.R, slips
+
+
+def _rolls_on(u: float, z: float, k: Motion) -> float:
+    """`rolling_forces.slip_margin` or `margin` of a centrifugal load u and friction z in units of the weight."""
+    at_A, at_B = 1 - k.j * u, (1 + k.j) * u
+    low_B, high_B = _normal_forces(at_B, z, k.eta)
+    if k.leaves == STABILITY:
+        share = min(max(at_B - low_B, 0.0), k.j * u)
+        return min(k.eta * at_B - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z))
+    low_A, high_A = _normal_forces(at_A, z, k.mu)
+    least, greatest = max(1 - high_A, at_B - high_B), min(1 - low_A, at_B - low_B)
+    overlap = -math.inf if greatest == -math.inf else greatest - least
+    size_A, size_B = math.sqrt(at_A * at_A + z * z), math.sqrt(at_B * at_B + z * z)
+    slack_A = k.mu * size_A - (z if at_A >= 0 else size_A)
+    return min(slack_A, k.eta * size_B - (z if at_B >= 0 else size_B), overlap)
+
+
+def _normal_forces(d: float, z: float, friction: float) -> tuple[float, float]:
+    """As `rolling_forces._normal_forces`."""
+    square = d * d + z * z
+    top = d + math.sqrt(max((friction - 1) * (friction + 1) * z * z + (friction * d) ** 2, 0.0))
+    low = 0.0 if square == 0 else square / top if top > 0 else math.inf
+    return low, (top / (1 - friction * friction) if friction < 1 else math.inf)
+
+
+def _pull(t: float, z: Any, rise: float, k: Motion) -> tuple[complex, complex, float]:
+    """Horizontal velocity, that relative to the fluid, m s-1, and c(|w|), s-1."""
+    V = complex(z[2], z[3])
+    lag = V - 1j * fluid(t, k) * complex(z[0], z[1])
+    return V, lag, resistance(lag.real, rise, lag.imag, k)
+
+
+def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
+    rise = 0.0
+    if k.case == NN:
+        rise = _fall_speed(t - k.since, k) if k.falls else z[5]
+    V, lag, c = _pull(t, z, rise, k)
+    power, push, last = -k.m * c * ((lag * V.conjugate()).real + rise * rise), -c * lag, 4
+    if k.case == RN:
+        push /= 1 + k.j
+    elif k.case == SN:
+        power -= k.m * k.mu * k.g * z[4]
+        along = cmath.rect(1.0, z[5])
+        friction = -k.mu * k.g * along
+        turning = (push + (1 + 1 / k.j) * friction) / along
+        push += friction
+        out[4], out[5], last = turning.real, turning.imag / max(z[4], k.floor * math.sqrt(k.R * k.g)), 6
+    elif not k.falls:
+        out[4], out[5], last = rise, -k.g - c * rise, 6
+    out[0], out[1], out[2], out[3], out[last] = V.real, V.imag, push.real, push.imag, power
+
+
+def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
+    gap = 1 - math.sqrt(z[0] * z[0] + z[1] * z[1]) / k.R
+    if k.case == RN:
+        _, lag, c = _pull(t, z, 0.0, k)
+        out[0], out[1] = k.mu - k.j * (c / (1 + k.j)) * abs(lag) / k.g, gap
+    elif k.case == SN:
+        out[0], out[1] = z[4] / math.sqrt(k.R * k.g), gap
+    else:
+        out[0] = gap
+        if not k.falls:
+            out[1] = z[4] / k.R
+
+
+def _fall_speed(t: float, k: Motion) -> float:
+    """As `drag.fall_speed`."""
+    c = k.law[0]
+    return k.v_y - (c * k.v_y + k.g) * (math.expm1(-c * t) / -c if c > 0 else t)
+
+
+TEXT = (
+    fluid, resistance, _forces, _at_wall, _rates_at_wall, _guards_at_wall, _rolls_on, _normal_forces, _pull,
+    _rates_away, _guards_away, _fall_speed, rates, guards,
+)  # fmt: skip
+"""What `solver` compiles, each after those that it calls."""

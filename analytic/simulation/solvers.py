@@ -1,0 +1,375 @@
+"""Steps through one case, compiled by numba, and the moments at which it ends.
+
+`explicit` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
+`scipy.integrate.DOP853`; guards are looked at four times in each step. `implicit` is for a slip that has just set in,
+whose direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer &
+Wanner, Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from numba.extending import register_jitable
+from scipy.integrate import DOP853
+
+from analytic.mechanics import drag
+from analytic.simulation import equations
+from analytic.simulation.equations import Motion
+from model.arrays import Array
+
+for _function in equations.TEXT:
+    setattr(equations, _function.__name__, register_jitable(error_model="numpy")(_function))
+_DIGEST = hashlib.sha256(b"".join(Path(str(m.__file__)).read_bytes() for m in (drag, equations))).hexdigest()[:16]
+A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
+A_MORE, C_MORE = np.ascontiguousarray(DOP853.A_EXTRA), np.ascontiguousarray(DOP853.C_EXTRA)
+STAGES, ALL = len(B), len(B) + 1 + len(C_MORE)
+DONE, FIRED, OTHER, STUCK, PAUSED = range(5)
+"""Why they return: at the end, at a guard, as the other one should go on, with steps too short, for a breath."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+"""Of the length of a step: below what its error allows; and by how much it may change."""
+LOOKS = 4
+"""How often in a step guards are looked at."""
+HALVINGS = 200
+COLUMNS, USUAL = 10, 6
+"""Most columns of an extrapolation, and how many steps aim at."""
+EPS = math.ulp(1.0)
+
+
+def _compiled(function: Any) -> Any:
+    """Numba's cache knows a function by its name, and not when another file has changed."""
+    function.__qualname__ += f"_{_DIGEST}"
+    try:
+        return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    except RuntimeError:  # no place for a cache
+        return numba.njit(nogil=True, error_model="numpy")(function)
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _between(x: float, z: Array, F: Array, out: Array) -> None:
+    """Coordinates at a share x of a step that began at z."""
+    for i in range(len(z)):
+        value = 0.0
+        for n in range(len(F)):
+            value = (value + F[len(F) - 1 - n, i]) * (x if n % 2 == 0 else 1 - x)
+        out[i] = z[i] + value
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _root(
+    guard: int, level: float, low: float, high: float, t: float, h: float, k: Motion, z: Array, F: Array, now: Array,
+    values: Array,
+) -> float:  # fmt: skip
+    """Share of a step within (low, high) at which a guard falls through its level, to the last digit of the time.
+
+    By the rule of false position, whose end that stays counts half the next time (Illinois); halved where that is slow.
+    """
+    _between(low, z, F, now)
+    equations.guards(t + low * h, now, k, values)
+    above = values[guard] - level
+    _between(high, z, F, now)
+    equations.guards(t + high * h, now, k, values)
+    below = values[guard] - level
+    if above <= 0:
+        return low
+    if below >= 0:
+        return high
+    stays = 0
+    for n in range(HALVINGS):
+        if high - low <= 4 * EPS * max(high, abs(t / h)):
+            break
+        x = (low * below - high * above) / (below - above)
+        if n % 3 == 2 or not low < x < high:
+            x = (low + high) / 2
+        _between(x, z, F, now)
+        equations.guards(t + x * h, now, k, values)
+        value = values[guard] - level
+        if value > 0:
+            low, above = x, value
+            below = below / 2 if stays == 1 else below
+            stays = 1
+        else:
+            high, below = x, value
+            above = above / 2 if stays == -1 else above
+            stays = -1
+    return high
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _pass(guard_values: Array, arm: Array, level: Array) -> int:
+    """Arm guards that have risen; the first that has fallen through its level, or -1."""
+    for guard in range(len(arm)):
+        if guard_values[guard] > arm[guard]:
+            level[guard] = 0.0
+        elif guard_values[guard] < level[guard]:
+            return guard
+    return -1
+
+
+@_compiled
+def explicit(
+    k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
+    rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, small: float,
+    patience: int, most: int,
+) -> tuple[int, float, float, int, int]:  # fmt: skip
+    """At most so many steps from the time start + tau towards start + span: why they end, tau, h, guard, `taken`.
+
+    z, level and samples are written to: z (n,); level of each guard, as `integrator.Stretch` says; samples, (m, n), at
+    those of `times` that are passed, from the number `taken` on. A slip (coordinates `slips`) below `small` times
+    `unit` for more than `patience` steps is for a stiff method.
+    """
+    n, slow, rejected = len(z), 0, False
+    K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
+    new, now, values, seen = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty((LOOKS + 1, len(arm)))
+    equations.rates(start + tau, z, k, K[0])
+    if h <= 0:  # by the size of the rates
+        rate = 0.0
+        for i in range(n):
+            rate = max(rate, abs(K[0, i]) / (atol[i] / rtol + abs(z[i])))
+        h = min(span - tau, 0.01 / rate if rate > 0 else span)
+    for _ in range(most):
+        if tau >= span:
+            return DONE, tau, h, -1, taken
+        last = tau + h >= span
+        if last:
+            h = span - tau
+        if h <= 4 * EPS * tau or h < 1e-300:
+            return STUCK, tau, h, -1, taken
+        for s in range(1, STAGES):
+            for i in range(n):
+                value = 0.0
+                for j in range(s):
+                    value += A[s, j] * K[j, i]
+                now[i] = z[i] + h * value
+            equations.rates(start + (tau + C[s] * h), now, k, K[s])
+        for i in range(n):
+            value = 0.0
+            for j in range(STAGES):
+                value += B[j] * K[j, i]
+            new[i] = z[i] + h * value
+        after = span if last else tau + h
+        equations.rates(start + after, new, k, K[STAGES])
+        fifth = third = 0.0
+        for i in range(n):
+            five = three = 0.0
+            for j in range(STAGES + 1):
+                five += E5[j] * K[j, i]
+                three += E3[j] * K[j, i]
+            size = atol[i] + rtol * max(abs(z[i]), abs(new[i]))
+            fifth += (five / size) ** 2
+            third += (three / size) ** 2
+        bound = fifth + 0.01 * third
+        error = h * fifth / math.sqrt(bound * n) if bound > 0 else bound
+        if not error < 1:
+            h *= max(SHRINK, SAFETY * error**-0.125) if error < math.inf else SHRINK
+            rejected = True
+            continue
+        for s in range(len(C_MORE)):
+            for i in range(n):
+                value = 0.0
+                for j in range(STAGES + 1 + s):
+                    value += A_MORE[s, j] * K[j, i]
+                now[i] = z[i] + h * value
+            equations.rates(start + (tau + C_MORE[s] * h), now, k, K[STAGES + 1 + s])
+        for i in range(n):
+            change = new[i] - z[i]
+            F[0, i], F[1, i] = change, h * K[0, i] - change
+            F[2, i] = 2 * change - h * (K[STAGES, i] + K[0, i])
+            for j in range(len(D)):
+                value = 0.0
+                for s in range(ALL):
+                    value += D[j, s] * K[s, i]
+                F[3 + j, i] = h * value
+        fired, end = -1, 2.0
+        for look in range(LOOKS + 1):
+            _between(look / LOOKS, z, F, now)
+            equations.guards(start + (tau + look / LOOKS * h), new if look == LOOKS else now, k, seen[look])
+        for guard in range(len(arm)):
+            for look in range(1, LOOKS + 1):
+                share = look / LOOKS
+                if seen[look, guard] > arm[guard]:
+                    level[guard] = 0.0
+                lowest = share
+                if look > 1:  # a dip between the looks: the vertex of the parabola through three
+                    one, two, three = seen[look - 2, guard], seen[look - 1, guard], seen[look, guard]
+                    bend = one - 2 * two + three
+                    away = (one - three) / (2 * bend) if bend > 0 else 2.0
+                    if abs(away) < 1 and two - bend * away * away / 2 < level[guard] + bend:
+                        lowest = share + (away - 1) / LOOKS
+                        _between(lowest, z, F, now)
+                        equations.guards(start + (tau + lowest * h), now, k, values)
+                        if not values[guard] < level[guard]:
+                            lowest = share
+                if lowest < share or seen[look, guard] < level[guard]:
+                    high = min(lowest, share)
+                    low = max(share - 1 / LOOKS, 0.0) if high > share - 1 / LOOKS else max(share - 2 / LOOKS, 0.0)
+                    root = _root(guard, level[guard], low, high, start + tau, h, k, z, F, now, values)
+                    if root < end:
+                        fired, end = guard, root
+                    break
+        until = tau + end * h if fired >= 0 else after
+        while taken < len(times) and times[taken] <= start + until:
+            _between(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
+            taken += 1
+        if fired >= 0:
+            _between(end, z, F, now)
+            z[:] = now
+            return FIRED, until, h, fired, taken
+        z[:] = new
+        K[0] = K[STAGES]
+        tau = after
+        grow = GROW if error == 0 else min(GROW, SAFETY * error**-0.125)
+        h *= min(grow, 1.0) if rejected else grow
+        rejected = False
+        least = math.inf
+        for i in slips:
+            least = min(least, z[i] / unit)
+        slow = slow + 1 if least <= small else 0
+        if slow > patience:
+            return OTHER, tau, h, -1, taken
+    return PAUSED, tau, h, -1, taken
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
+    """A matrix as its triangles, rows exchanged."""
+    n = len(M)
+    for i in range(n):
+        best = i
+        for r in range(i + 1, n):
+            if abs(M[r, i]) > abs(M[best, i]):
+                best = r
+        order[i] = best
+        for c in range(n):
+            M[i, c], M[best, c] = M[best, c], M[i, c]
+        for r in range(i + 1, n):
+            M[r, i] /= M[i, i]
+            for c in range(i + 1, n):
+                M[r, c] -= M[r, i] * M[i, c]
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
+    """What such a matrix makes b of, in its place."""
+    n = len(M)
+    for i in range(n):
+        b[i], b[order[i]] = b[order[i]], b[i]
+    for i in range(n):
+        for c in range(i):
+            b[i] -= M[i, c] * b[c]
+    for i in range(n - 1, -1, -1):
+        for c in range(i + 1, n):
+            b[i] -= M[i, c] * b[c]
+        b[i] /= M[i, i]
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _extrapolated(
+    t: float, h: float, k: Motion, z: Array, J: Array, rtol: float, atol: Array, table: Array, M: Array,
+    order: npt.NDArray[np.int64], rate: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """A step by 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error, and how many columns that took."""
+    n, error = len(z), math.inf
+    for column in range(COLUMNS):
+        steps = column + 1
+        part, y = h / steps, table[column]
+        for i in range(n):
+            for c in range(n):
+                M[i, c] = (i == c) - part * J[i, c]
+        _factored(M, order)
+        y[:] = z
+        for s in range(steps):
+            equations.rates(t + (s + 1) * part, y, k, rate)
+            for i in range(n):
+                rate[i] *= part
+            _solve(M, order, rate)
+            for i in range(n):
+                y[i] += rate[i]
+        square = 0.0
+        for q in range(column - 1, -1, -1):
+            square = 0.0
+            for i in range(n):
+                more = (table[q + 1, i] - table[q, i]) / (steps / (q + 1) - 1)
+                table[q, i] = table[q + 1, i] + more
+                square += (more / (atol[i] + rtol * max(abs(z[i]), abs(table[q, i])))) ** 2
+        error = math.sqrt(square / n) if column > 0 else math.inf
+        if error <= 1 or (not error < 1e10 and column > 0):
+            return error, steps
+    return error, COLUMNS
+
+
+@_compiled
+def implicit(
+    k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
+    rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, large: float,
+    floor: Array, most: int,
+) -> tuple[int, float, float, int, int]:  # fmt: skip
+    """As `explicit`, until all slips are `large` times `unit`; a Jacobian shifts z by a share of it or `floor` (n,)."""
+    n = len(z)
+    table, J, M, order = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n, np.int64)
+    here, rate, values, now = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty(n)
+    for _ in range(most):
+        if tau >= span:
+            return DONE, tau, h, -1, taken
+        equations.rates(start + tau, z, k, here)
+        for c in range(n):
+            shift = math.sqrt(EPS) * max(abs(z[c]), floor[c])
+            now[:] = z
+            now[c] += shift
+            equations.rates(start + tau, now, k, rate)
+            for i in range(n):
+                J[i, c] = (rate[i] - here[i]) / (now[c] - z[c])
+        if h <= 0:
+            size = 0.0
+            for i in range(n):
+                size = max(size, abs(here[i]) / (atol[i] / rtol + abs(z[i])))
+            h = min(span - tau, 1e-3 / size if size > 0 else span)
+        stop = min(span, times[taken] - start) if taken < len(times) else span
+        while True:
+            length = min(h, stop - tau)
+            if length <= 4 * EPS * tau or length < 1e-300:
+                return STUCK, tau, h, -1, taken
+            error, columns = _extrapolated(start + tau, length, k, z, J, rtol, atol, table, M, order, rate)
+            if error <= 1:
+                break
+            h = length / 4
+        after = stop if length == stop - tau else tau + length
+        now[:] = table[0]
+        equations.guards(start + after, now, k, values)
+        guard = _pass(values, arm, level)
+        if guard >= 0:  # halve the step until it ends at the guard
+            low, high = 0.0, length
+            while high - low > 4 * EPS * max(tau, length):
+                middle = (low + high) / 2
+                _extrapolated(start + tau, middle, k, z, J, rtol, atol, table, M, order, rate)
+                equations.guards(start + (tau + middle), table[0], k, values)
+                fell = -1
+                for each in range(len(arm)):
+                    if values[each] < level[each]:
+                        fell = each
+                if fell >= 0:
+                    high, guard = middle, fell
+                    now[:] = table[0]
+                else:
+                    low = middle
+            z[:] = now
+            return FIRED, tau + high, h, guard, taken
+        z[:] = now
+        tau = after
+        while taken < len(times) and times[taken] <= start + tau:
+            samples[taken] = z
+            taken += 1
+        if length == h or error < 0.01:
+            h = length * (4.0 if columns < USUAL - 2 else 2.0 if columns < USUAL else 1.0 if columns == USUAL else 0.6)
+        least = math.inf
+        for i in slips:
+            least = min(least, z[i] / unit)
+        if least > large:
+            return OTHER, tau, 0.0, -1, taken
+    return PAUSED, tau, h, -1, taken
