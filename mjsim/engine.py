@@ -9,7 +9,7 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from mjsim import limits, recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
 from mjsim.stepping import Polar
-from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
+from model import Events, Flow, Header, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_number
@@ -167,6 +167,15 @@ class Run:
             yield self._finish(done, raw)
             done += len(raw)
 
+    def trajectories(self, check: Callable[[], object] = lambda: None) -> list[Trajectory]:
+        """All runs, carried out to their ends; `check` is called from time to time, and may raise an error."""
+        kept: list[Blocks] = [[] for _ in self.headers]
+        for blocks in self:
+            check()
+            for own, block in zip(kept, blocks, strict=True):
+                own.append(block)
+        return [Trajectory.from_blocks(*each) for each in zip(self.headers, kept, self.events, strict=True)]
+
     def _omega_0(self, first: int, stop: int) -> Iterator[Array]:
         """omega_0 (runs,) in the middle of each step."""
         for chunk in range(first, stop, 1000):
@@ -238,7 +247,7 @@ def simulate(
     flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
     asked = [p], [x0], t_end, flows, settings
     run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, batched=False, progress=progress)
-    ((trajectory,),) = _carried_out([run])
+    (trajectory,) = run.trajectories()
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
     return trajectory
@@ -297,18 +306,15 @@ def simulate_many(
 
 
 def _carried_out(runs: Sequence[Run]) -> list[list[Trajectory]]:
-    """The trajectories of runs, to their end, a thread for each; all of them stop if one raises an error."""
+    """The trajectories of runs, a thread for each; all of them stop if one raises an error."""
     over = threading.Event()
 
-    def trajectories(run: Run) -> list[Trajectory]:
-        blocks = zip(*list(itertools.takewhile(lambda _: not over.is_set(), run)), strict=True)
-        # before headers and events, which say what happened
-        return [Trajectory.from_blocks(*each) for each in zip(run.headers, blocks, run.events, strict=True)]
+    def check() -> None:
+        if over.is_set():
+            raise CancelledError
 
-    if len(runs) == 1:
-        return [trajectories(runs[0])]
     with ThreadPoolExecutor(len(runs)) as pool:
         try:
-            return list(pool.map(trajectories, runs))
+            return list(pool.map(lambda run: run.trajectories(check), runs))
         finally:
             over.set()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Self
@@ -162,11 +162,18 @@ class Trajectory:
         return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 
     @classmethod
-    def from_blocks(cls, header: Header, blocks: Iterable[npt.NDArray[np.void]], events: Events) -> Self:
-        """Join blocks of samples, structured arrays of dtype `SAMPLE`."""
-        parts = list(blocks)
-        samples = np.concatenate(parts) if parts else np.empty(0, SAMPLE)
-        columns = {name: np.ascontiguousarray(samples[name]) for name in SAMPLE.fields or ()}
+    def from_blocks(cls, header: Header, blocks: list[npt.NDArray[np.void]], events: Events) -> Self:
+        """Join blocks of samples, structured arrays of dtype `SAMPLE`.
+
+        They are taken out of the list one by one, so that most of what they hold is in memory once.
+        """
+        columns = {name: np.empty((sum(map(len, blocks)), *meta["shape"]), meta["dtype"]) for name, meta in _SAMPLED}
+        last = len(columns["time"])
+        while blocks:
+            block = blocks.pop()
+            for name, column in columns.items():
+                column[last - len(block) : last] = block[name]
+            last -= len(block)
         return cls(header=header, events=events, **columns)
 
 
@@ -195,7 +202,8 @@ def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]
     return {f.name: {"name": table + f.name.removesuffix("_case"), **f.metadata} for f in fields}
 
 
-_meanings = (f"* {name}: {meta['long_name']}, in {meta['units']}" for name, meta in columns(Trajectory).items())
+_SAMPLED = columns(Trajectory).items()
+_meanings = (f"* {name}: {meta['long_name']}, in {meta['units']}" for name, meta in _SAMPLED)
 Trajectory.__doc__ = (Trajectory.__doc__ or "").replace("COLUMNS", "\n    ".join(_meanings).replace(", in 1", ""))
 
 
@@ -208,7 +216,7 @@ def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
     return attributes
 
 
-SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in columns(Trajectory).items()])
+SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in _SAMPLED])
 """One sample as a structured dtype; simulators yield blocks of these."""
 
 
