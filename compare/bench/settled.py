@@ -196,7 +196,7 @@ def radii(model: Any) -> Array:
 
 
 def _body(model: Any, body: int) -> str:
-    return f"body {model.body(body).name or body!r}"
+    return f"body {model.body(body).name or int(body)}"
 
 
 def few(names: Sequence[str]) -> str:

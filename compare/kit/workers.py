@@ -28,9 +28,9 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 """A function that is called like `map`."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Ctrl-C, and what clusters send."""
-JUDGING = 120.0
-"""Processor time that judging a claim or drawing a figure may take, s: a hundred times what most take. What files say
-may be nonsense that takes years."""
+JUDGING = 30.0
+"""Processor time that judging a claim or drawing a figure may take, s: thirty times what the longest takes at the quick
+level. What files say may be nonsense that takes years."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
 
@@ -185,7 +185,8 @@ def dask(address: str) -> Workers:
         from distributed import Client, KilledWorker
     except ImportError as error:
         raise InputError("--scheduler needs Dask: pip install distributed") from error
-    for name in ("distributed", "distributed.client"):  # what they log with a traceback we say in a line
+    # What they log with a traceback, also of what nobody waits for any more, we say in a line.
+    for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from compare.commands import cli
 from compare.kit import collection
 from compare.kit.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.kit.tasks import Task
-from compare.kit.workers import dask, processes
+from compare.kit.workers import Workers, dask, processes
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
@@ -277,6 +278,31 @@ def test_a_killed_dask_worker_changes_no_bit(tmp_path: Path, undisturbed) -> Non
         with Campaign(tmp_path, dask(cluster.scheduler_address), batch=1, report=kill_one) as campaign:
             assert campaign.complete(tasks()) == []
     assert killed
+    assert data(tmp_path) == undisturbed
+
+
+class Orphaned(ThreadPoolExecutor):
+    """As Dask's, whose futures are all cancelled once its scheduler is gone: here after the second."""
+
+    asked = 0
+
+    def submit(self, *call):  # type: ignore[override]
+        self.asked += 1
+        if self.asked <= 2:
+            return super().submit(*call)
+        gone: Future[object] = Future()
+        gone.cancel()
+        return gone
+
+
+def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(tmp_path: Path, undisturbed) -> None:
+    fleet = Workers(1, lambda: Orphaned(2), lambda executor, at_once: executor.shutdown(), ())
+    gone = "the workers' scheduler is gone; finished runs are kept"
+    with pytest.raises(StorageError, match=gone), Campaign(tmp_path, fleet, batch=1) as campaign:
+        campaign.complete(tasks())
+    assert len(data(tmp_path)) == 2
+    with Campaign(tmp_path, workers=0) as again:
+        assert again.complete(tasks()) == []
     assert data(tmp_path) == undisturbed
 
 

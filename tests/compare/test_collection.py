@@ -129,3 +129,45 @@ def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
     assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == OMEGAS[1]
     assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
     assert collection.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
+
+
+def test_means_alone_make_the_same_collection_in_any_number_of_processes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In less than a third of the space; what is done is not done again."""
+    monkeypatch.setattr(collection, "SHARE", 1)
+    ranges = ["--vary", "omega_0=5:10:6", "--vary", "eta=0.1,0.3"]
+    common = ["sweep", *ranges, "--time", "0.2", "--batch", "4", "--workers", "0", "--quiet"]
+    size, found = {}, {}
+    for name, more in (("whole", []), ("means", ["--means-only"])):
+        where = tmp_path / name
+        assert cli.main([*common, *more, "-o", str(where)]) == 0
+        before = {path: path.stat().st_mtime_ns for path in where.glob("*.h5")}
+        assert cli.main([*common, *more, "-o", str(where)]) == 0
+        assert before == {path: path.stat().st_mtime_ns for path in where.glob("*.h5")}
+        size[name] = sum(path.stat().st_size for path in before)
+        for workers in (0, 2):
+            output = tmp_path / f"{name}-{workers}.h5"
+            assert collection.collect(where, output, workers) == 12
+            with reading(output) as file:
+                found[name, workers] = {each: column(dataset(file, each)).tolist() for each in file}
+    first, *others = found.values()
+    for other in others:
+        assert repr(other) == repr(first)  # nan, too
+    assert size["means"] < size["whole"] / 3
+    (means, *_) = sorted((tmp_path / "means").glob("*.h5"))
+    assert collection.describe(means)["varied"] == ["eta", "omega_0"]
+    capsys.readouterr()
+    assert cli.main([*common, "-o", str(tmp_path / "means")]) == 2
+    assert "holds another sweep (means_only = True, not False)" in capsys.readouterr().err
+
+
+def test_a_sweep_is_sampled_as_often_as_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    common = ["sweep", "--vary", "omega_0=5,6", "--time", "0.2", "--workers", "0", "--quiet", "-o", str(tmp_path / "s")]
+    for wrong in ("0.5", "1e-5"):
+        assert cli.main([*common, "--sample-interval", wrong]) == 2
+        assert "within this run it must be >= 0.001 and <= 0.2" in capsys.readouterr().err
+    assert not (tmp_path / "s").exists()
+    assert cli.main([*common, "--sample-interval", "0.05"]) == 0
+    (file,) = (tmp_path / "s").glob("*.h5")
+    assert {len(run.time) for run in storage.load_runs(file).values()} == {5}

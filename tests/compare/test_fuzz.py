@@ -62,14 +62,20 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A file of every kind, by what it is."""
     made = tmp_path_factory.mktemp("whole")
     kept = {name: made / "runs" / f"{name}.h5" for name in RUNS} | {"collection": made / "all.h5"}
-    kept |= {"measurements": made / "measurements" / "settled.h5", "batch": made / "batch.h5"}
+    kept |= {
+        "measurements": made / "measurements" / "settled.h5",
+        "batch": made / "batch.h5",
+        "means": made / "means.h5",
+    }
     (made / "runs").mkdir()
     (made / "measurements").mkdir()
     for name in RUNS[:3]:
         assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
     storage.save(analytic.simulate(P, State(), 5.0, sample_interval=1e-3), kept[CHUNKS])
     collection.collect(made / "runs", kept["collection"])
-    storage.save_batch({name: storage.load(kept[name]) for name in RUNS[:3]}, kept["batch"])
+    runs = {name: storage.load(kept[name]) for name in RUNS[:3]}
+    storage.save_batch(runs, kept["batch"])
+    collection.save_means(runs, kept["means"])
     values = ("omega_c", 11.9), ("force_Ay", 0.1)
     rows = (measured("settled", *each, 1e-9, case="RR", y=0.1) for each in values)
     record.save(Records(tuple(rows), (Missing("settled", "x", "it never settles"),)), kept["measurements"], {})
@@ -100,6 +106,8 @@ READERS: list[tuple[str, Callable[[Path], Any]]] = [
     ("batch", storage.contents),
     ("batch", storage.load_runs),
     ("collection", collection.describe),
+    ("means", collection.describe),
+    ("means", storage.contents),
     ("measurements", record.load),
 ]
 
