@@ -102,6 +102,8 @@ def one(geom: str, mu: float = 0.6, slope: float = 0.0, height: float = 0.05, st
     )
 
 
+LONG = "heap of 216"
+"""A scene that is measured with soft contacts only: rigid ones take half an hour."""
 BOX, BALL = '<geom type="box" size=".05 .05 .05" mass="1"/>', '<geom type="sphere" size=".05" mass="1"/>'
 FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
 
@@ -228,9 +230,9 @@ def costs() -> Rows:
     }
     rows = [["cost of a step", *ways, "soft, no numba"]]
     for name, measure in scenes.items():
-        found = [f"{measure(way):.2f}" for way in ways.values()]
+        found = [f"{measure(way):.2f}" if not name.startswith(LONG) or way is SOFT else "–" for way in ways.values()]
         with mock.patch.object(doors, "kernels", formulas):
-            rows.append([name, *found, f"{measure(SOFT):.2f}"])
+            rows.append([name, *found, f"{measure(SOFT):.2f}" if not name.startswith(LONG) else "–"])
     return rows
 
 
