@@ -346,16 +346,13 @@ def choices() -> Rows:
 
     laws: dict[str, dict[str, Any]] = {
         "**soft**: slip foreseen to a twentieth of gravity": {},
-        "to a fifth": {"share": 0.2},
         "to a hundredth": {"share": 0.01},
         "foreseen, never solved for": {"most": 0},
         "at most 5 solutions": {"most": 5},
         "**rigid**: R = 1e-3": {"rigid": True},
         "R = 1e-2": {"rigid": True, "softness": 1e-2},
-        "R = 1e-4": {"rigid": True, "softness": 1e-4},
         "foreseen to a hundredth": {"rigid": True, "share": 0.01},
         "loses all its depth in a step": {"rigid": True, "push": 1.0},
-        "loses none": {"rigid": True, "push": 0.0},
         "keeps none": {"rigid": True, "depth": 0.0},
     }
     return [
