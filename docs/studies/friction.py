@@ -102,8 +102,8 @@ def one(geom: str, mu: float = 0.6, slope: float = 0.0, height: float = 0.05, st
     )
 
 
-LONG = "heap of 216"
-"""A scene that is measured with soft contacts only: rigid ones take half an hour."""
+LONG = "heap of 216", "at rest, 1000"
+"""Scenes that are measured with soft contacts only: others take half an hour."""
 BOX, BALL = '<geom type="box" size=".05 .05 .05" mass="1"/>', '<geom type="sphere" size=".05" mass="1"/>'
 FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
 
