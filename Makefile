@@ -68,9 +68,13 @@ $(VENV)/installed-dev: requirements-dev.lock $(VENV)/installed
 	@.ci/install $(BIN)/python --require-hashes -r requirements-dev.lock
 	@touch $@
 
+ENGINES := drake pybullet
 $(VENV)/installed-engines: requirements-engines.lock $(VENV)/installed
-	@for engine in drake pybullet; do \
-	    .ci/install $(BIN)/python --only-binary :all: -c $< $$engine || \
+	@for engine in $(ENGINES); do \
+	    awk -v own=$$engine -v all="$(ENGINES)" 'BEGIN { n = split(all, each, " ") } \
+	        /^[a-z]/ { on = 1; for (k = 1; k <= n; k++) if (each[k] != own && index($$0, each[k] "==") == 1) on = 0 } on' \
+	        $< >$(VENV)/$$engine.txt; \
+	    .ci/install $(BIN)/python --require-hashes --only-binary :all: -r $(VENV)/$$engine.txt || \
 	        echo "the league goes on without $$engine, which has no wheel for this Python"; \
 	done
 	@touch $@
@@ -78,7 +82,7 @@ $(VENV)/installed-engines: requirements-engines.lock $(VENV)/installed
 lock:
 	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra fast -o requirements.lock
 	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra fast --group dev -c requirements.lock -o requirements-dev.lock
-	uv pip compile --universal --no-annotate --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra engines -c requirements.lock -o requirements-engines.lock
+	echo $(ENGINES) | tr ' ' '\n' | uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml - -c requirements.lock -o requirements-engines.lock
 
 clean:
 	rm -rf $(VENV) build docs/_build docs/api *.egg-info

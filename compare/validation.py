@@ -91,7 +91,7 @@ def validate(
     whole = Whole(progress, {}, len(chosen))
     with (
         threads(1) as bench,  # judges while the next protocols' runs are on their way
-        Campaign(output / results.RUNS, workers, limit=limit, report=whole.measuring) as campaign,
+        Campaign(output / results.RUNS, workers, limit=limit, report=whole.measuring, passing=True) as campaign,
     ):
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
         jobs = [(protocol, lab) for lab in labs for protocol in todo if protocol.measures(lab)]

@@ -1,5 +1,8 @@
 """The dual-point contact ball in MuJoCo, and Coulomb's law for any model; knows no solution of the problem."""
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 import mujoco
 
 import model
@@ -16,7 +19,16 @@ except ImportError:
     ) from None
 
 from mjsim.contact_settings import ContactSettings
-from mjsim.coulomb import Coulomb
 from mjsim.engine import Run, simulate, simulate_many
 
+if TYPE_CHECKING:
+    from mjsim.coulomb import Coulomb
+
 __all__ = ["ContactSettings", "Coulomb", "Run", "simulate", "simulate_many"]
+
+
+def __getattr__(name: str) -> Any:
+    """The law when it is asked for: compiled, it takes as long to load as all else."""
+    if name == "Coulomb":
+        return importlib.import_module("mjsim.coulomb").Coulomb
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

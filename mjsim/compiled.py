@@ -22,7 +22,9 @@ from model.arrays import Array
 
 for name in ("slip", "resistance", "lands", "hovering", "near_axis", "unbearable"):  # the others call them
     register_jitable(getattr(source, name))
-_corrections, _eventful, _followed = map(numba.njit(cache=True), (source.corrections, source.eventful, source.followed))
+_corrections, _eventful, _followed = map(
+    numba.njit(cache=True, nogil=True), (source.corrections, source.eventful, source.followed)
+)
 _BALL, _VELOCITY = len(Ball._fields), len(Velocity._fields)
 _ROWS = types.Array(types.float64, 2, "A")
 _GIVEN = types.Array(types.float64, 2, "A", readonly=True)
@@ -43,7 +45,7 @@ def named_after(*modules: Any) -> Callable[..., Any]:
     return name
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 @named_after(source)
 def drive(
     watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,

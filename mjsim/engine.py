@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
+import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +18,16 @@ import numpy.typing as npt
 from mjsim import limits, recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
-from mjsim.free import Free
-from mjsim.journal import Journal
 from mjsim.stepping import Polar
-from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
+from model import Events, Flow, Header, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import check_number
+from model.parameters import Range, check_number
 from model.trajectory import SAMPLE
+
+if TYPE_CHECKING:
+    from mjsim.free import Free
+    from mjsim.journal import Journal
 
 BLOCK = 256
 """Most samples a run keeps before it hands them out."""
@@ -31,6 +37,9 @@ EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
 NOTED = 4096
 """Steps of all runs of which the cases are told at once."""
+SHARE = 16
+"""Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's Python."""
+MOST_THREADS = 1024
 _HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 
@@ -78,11 +87,7 @@ class Run:
         progress: Callable[[float], None] | None = None,
         build: Callable[[Parameters, ContactSettings], tuple[Any, str]] | None = None,
     ) -> None:
-        if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
-            raise InputError(
-                f"every run needs parameters, a start and a flow, but there are {len(parameters)} parameter sets, "
-                f"{len(x0s)} starts and {len(flows)} flows"
-            )
+        limits.check_counts(parameters, x0s, flows)
         self._parameters, self._flows, self._settings = list(parameters), list(flows), settings
         self._journal, self._progress = journal, progress
         self._interval, self._count = limits.sampling(t_end, settings.timestep, sample_interval)
@@ -95,11 +100,13 @@ class Run:
         built = {p: (build or scene.build)(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
         given = models, parameters, settings, states, theta_0
-        self._stepper: Free | Polar = (
-            Free(*given)
-            if settings.coordinates == "free"
-            else Polar(*given, next(self._omega_0(0, 1)), batched or len(models) > 1)
-        )
+        self._stepper: Free | Polar
+        if settings.coordinates == "free":
+            from mjsim.free import Free  # here, because the law of its contacts takes long to load
+
+            self._stepper = Free(*given)
+        else:
+            self._stepper = Polar(*given, next(self._omega_0(0, 1)), batched or len(models) > 1)
         shown = dataclasses.asdict(settings) | {
             "t_end": float(t_end),
             "sample_interval": self._interval * settings.timestep,
@@ -159,6 +166,15 @@ class Run:
                 self._journal.note(raw, self._stepper.state() | self._classifier.state())
             yield self._finish(done, raw)
             done += len(raw)
+
+    def trajectories(self, check: Callable[[], object] = lambda: None) -> list[Trajectory]:
+        """All runs, carried out to their ends; `check` is called from time to time, and may raise an error."""
+        kept: list[Blocks] = [[] for _ in self.headers]
+        for blocks in self:
+            check()
+            for own, block in zip(kept, blocks, strict=True):
+                own.append(block)
+        return [Trajectory.from_blocks(*each) for each in zip(self.headers, kept, self.events, strict=True)]
 
     def _omega_0(self, first: int, stop: int) -> Iterator[Array]:
         """omega_0 (runs,) in the middle of each step."""
@@ -231,7 +247,7 @@ def simulate(
     flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
     asked = [p], [x0], t_end, flows, settings
     run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, batched=False, progress=progress)
-    (trajectory,) = _carried_out(run)
+    (trajectory,) = run.trajectories()
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
     return trajectory
@@ -246,27 +262,59 @@ def simulate_many(
     *,
     sample_interval: float | None = None,
     theta_0: float = 0.0,
+    threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Trajectory]:
-    """Simulate many runs at once as one MuJoCo batch, in this process; arguments as in `simulate`.
+    """Simulate many runs at once, in this process; arguments as in `simulate`.
 
-    `flow` is one for all, one for each, or None for each one's own omega_0. A run that breaks down has a header
-    that says so; the others go on.
+    `flow` is one for all, one for each, or None for each one's own omega_0. Each thread steps a MuJoCo batch of its
+    share of the runs; None is a thread for each processor that has `SHARE` of them. Results are the same to the bit
+    whatever the number. A run that breaks down has a header that says so; the others go on.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, or numbers of runs differ.
     """
     flows: Sequence[Flow]
     if flow is None:
         flows = [Flow.steady(p.omega_0) for p in parameters]
     else:
         flows = [flow] * len(parameters) if isinstance(flow, Flow) else flow
+    limits.check_counts(parameters, x0s, flows)
+    if threads is None:
+        threads = max(1, min(os.cpu_count() or 1, len(flows) // SHARE))
+    parts = min(int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True))), len(flows))
     # The softest settings that any of the runs asks for.
     settings = settings or min((ContactSettings.for_problem(p) for p in parameters), key=lambda s: s.solimp)
-    run = Run(
-        parameters, x0s, t_end, flows, settings, sample_interval=sample_interval, theta_0=theta_0, progress=progress
-    )
-    return _carried_out(run)
+    how: dict[str, Any] = {"sample_interval": sample_interval, "theta_0": theta_0}
+    shares, done = [slice(k, None, parts) for k in range(parts)], [0.0] * parts
+
+    def report(part: int, fraction: float) -> None:
+        done[part] = fraction
+        if progress:
+            progress(sum(done) / parts)
+
+    runs = [
+        Run(parameters[own], x0s[own], t_end, flows[own], settings, progress=functools.partial(report, k), **how)
+        for k, own in enumerate(shares)
+    ]
+    found: list[Any] = [None] * len(flows)
+    for own, trajectories in zip(shares, _carried_out(runs), strict=True):
+        found[own] = trajectories
+    return found
 
 
-def _carried_out(run: Run) -> list[Trajectory]:
-    """The trajectories of a run, to its end."""
-    blocks = zip(*list(run), strict=True)  # before headers and events, which say what happened
-    return [Trajectory.from_blocks(*each) for each in zip(run.headers, blocks, run.events, strict=True)]
+def _carried_out(runs: Sequence[Run]) -> list[list[Trajectory]]:
+    """The trajectories of runs, a thread for each; all of them stop if one raises an error."""
+    over = threading.Event()
+
+    def check() -> None:
+        if over.is_set():
+            raise CancelledError
+
+    with ThreadPoolExecutor(len(runs)) as pool:
+        try:
+            return list(pool.map(lambda run: run.trajectories(check), runs))
+        finally:
+            over.set()

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 
 import numpy.typing as npt
 
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
-from model import Flow, Parameters, State, time_scales
+from model import Flow, InputError, Parameters, State, time_scales
 from model.kinematics import slip_speeds
 from model.parameters import Range, check_number
+
+
+def check_counts(parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], flows: Sequence[Flow]) -> None:
+    """Refuse runs that lack parameters, a start or a flow, and none at all."""
+    if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
+        raise InputError(
+            f"every run needs parameters, a start and a flow, but there are {len(parameters)} parameter sets, "
+            f"{len(x0s)} starts and {len(flows)} flows"
+        )
 
 
 def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> None:

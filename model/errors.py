@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from model.trajectory import Trajectory
 
 
 class InputError(ValueError):
@@ -14,7 +17,17 @@ class StorageError(InputError):
     """A file that is missing, cut short, foreign, or newer than this program."""
 
 
+class SimulationError(RuntimeError):
+    """A run that could not reach its end: the message names time and state; `trajectory` holds what there is."""
+
+    def __init__(self, message: str, trajectory: Trajectory) -> None:
+        super().__init__(message)
+        self.trajectory = trajectory
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the known name nearest to `name`, or ``""``."""
+    import difflib  # here, because only a mistake needs it
+
     near = difflib.get_close_matches(name, list(known), n=1)
     return f" (did you mean {near[0]!r}?)" if near else ""

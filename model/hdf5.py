@@ -173,7 +173,7 @@ def write_columns(file: h5py.File, columns: Mapping[str, Sequence[Any]], scale: 
     written = {}
     for name, values in columns.items():
         text = h5py.string_dtype() if len(values) and isinstance(values[0], str) else None
-        written[name] = file.create_dataset(name, data=values, dtype=text)
+        written[name] = file.create_dataset(name, data=np.asarray(values, object) if text else values, dtype=text)
         if name == scale:
             written[name].make_scale(scale)
         else:

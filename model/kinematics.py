@@ -176,3 +176,9 @@ def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
 
 def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray(np.einsum("...ab,...b->...a", matrix, vector))
+
+
+def tangent(radius: float, azimuth: float) -> tuple[Array, Array]:
+    """Point and inward normal, each (3,), of the plane that touches a cylinder about the z axis there."""
+    normal = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    return -radius * normal, normal

@@ -38,8 +38,8 @@ from model.trajectory import (
     Trajectory,
     attributes,
     columns,
-    current_versions,
 )
+from model.versions import current_versions
 
 BATCH, BATCH_VERSION = "dualball-batch", 1
 """What a file of many runs says of itself."""
@@ -122,7 +122,8 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):
                     row[:count] = getattr(table, name)
-                _create(file, meta, ("run", dimension, "axis"), scales, data=values)
+                packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size else {}
+                _create(file, meta, ("run", dimension, "axis"), scales, data=values, **packed)
         whole.finish()
 
 
@@ -153,13 +154,13 @@ def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
 
 
 def contents(path: str | Path) -> tuple[str, list[str]]:
-    """The version of dualball that wrote a file, and the names of its runs; none if it is of one run.
+    """The version of dualball that wrote a file, and the names of the runs that it is of; none if it is of one run.
 
     Raises `StorageError` as `load` does.
     """
     with reading(path) as file:
         version = str(_attribute(file.attrs, "versions", dict).get("dualball"))
-        return version, dataset(file, "run").asstr()[...].tolist() if is_batch(file) else []
+        return version, dataset(file, "run").asstr()[...].tolist() if "run" in file else []
 
 
 def exists(path: str | Path) -> bool:

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
-import platform
-import subprocess
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from importlib import metadata
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -23,6 +18,7 @@ from model.errors import InputError
 from model.flow import Flow
 from model.kinematics import VARIABLES, State, slip_speeds
 from model.parameters import Parameters
+from model.versions import current_commit, current_versions
 
 if TYPE_CHECKING:
     import xarray
@@ -46,34 +42,6 @@ def _column(
 
 FLUID: Mapping[str, Any] = {"name": "omega_0", **_column("rad s-1", "angular velocity of the fluid").metadata}
 """The column of a file that follows from the flow, and isn't read back."""
-
-
-@functools.cache
-def current_versions() -> Mapping[str, str]:
-    """Versions of the packages that determine a result, and of Python."""
-    versions = {"python": platform.python_version()}
-    return versions | {name: version(name) for name in ("dualball", "mujoco", "numpy", "scipy")}
-
-
-@functools.cache
-def version(package: str) -> str:
-    """The version of an installed package."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed"
-
-
-@functools.cache
-def current_commit() -> str:
-    """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
-    # Without locks: git leaves them in the checkout if it takes too long and is killed.
-    git = ["git", "--no-optional-locks", "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"]
-    here = Path(__file__).resolve().parent
-    try:
-        return subprocess.check_output(git, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10).strip()
-    except (OSError, subprocess.SubprocessError):
-        return ""
 
 
 @dataclass(frozen=True)
@@ -194,11 +162,18 @@ class Trajectory:
         return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 
     @classmethod
-    def from_blocks(cls, header: Header, blocks: Iterable[npt.NDArray[np.void]], events: Events) -> Self:
-        """Join blocks of samples, structured arrays of dtype `SAMPLE`."""
-        parts = list(blocks)
-        samples = np.concatenate(parts) if parts else np.empty(0, SAMPLE)
-        columns = {name: np.ascontiguousarray(samples[name]) for name in SAMPLE.fields or ()}
+    def from_blocks(cls, header: Header, blocks: list[npt.NDArray[np.void]], events: Events) -> Self:
+        """Join blocks of samples, structured arrays of dtype `SAMPLE`.
+
+        They are taken out of the list one by one, so that most of what they hold is in memory once.
+        """
+        columns = {name: np.empty((sum(map(len, blocks)), *meta["shape"]), meta["dtype"]) for name, meta in _SAMPLED}
+        last = len(columns["time"])
+        while blocks:
+            block = blocks.pop()
+            for name, column in columns.items():
+                column[last - len(block) : last] = block[name]
+            last -= len(block)
         return cls(header=header, events=events, **columns)
 
 
@@ -227,7 +202,8 @@ def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]
     return {f.name: {"name": table + f.name.removesuffix("_case"), **f.metadata} for f in fields}
 
 
-_meanings = (f"* {name}: {meta['long_name']}, in {meta['units']}" for name, meta in columns(Trajectory).items())
+_SAMPLED = columns(Trajectory).items()
+_meanings = (f"* {name}: {meta['long_name']}, in {meta['units']}" for name, meta in _SAMPLED)
 Trajectory.__doc__ = (Trajectory.__doc__ or "").replace("COLUMNS", "\n    ".join(_meanings).replace(", in 1", ""))
 
 
@@ -240,7 +216,7 @@ def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
     return attributes
 
 
-SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in columns(Trajectory).items()])
+SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in _SAMPLED])
 """One sample as a structured dtype; simulators yield blocks of these."""
 
 
@@ -256,11 +232,3 @@ def samples(time: Array, theta: Array, x: State, p: Parameters) -> npt.NDArray[n
     block["gap_A"], block["gap_B"] = x.y, x.h
     block["slip_speed_A"], block["slip_speed_B"] = slip_speeds(x, p)
     return block
-
-
-class SimulationError(RuntimeError):
-    """A run that could not reach its end: the message names time and state; `trajectory` holds what there is."""
-
-    def __init__(self, message: str, trajectory: Trajectory) -> None:
-        super().__init__(message)
-        self.trajectory = trajectory

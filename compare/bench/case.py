@@ -8,16 +8,16 @@ the surface.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from compare.kit.adapters.adapter import tangent
 from compare.kit.statistics import plain
 from model.arrays import Array
-from model.kinematics import rotated
+from model.kinematics import rotated, tangent
 
 Vector = tuple[float, float, float]
 VERSION = 1
@@ -71,6 +71,19 @@ class Body:
     """Unit quaternion, the scalar first."""
 
 
+class Answers(NamedTuple):
+    """The exact motion of a case, and wrong ones."""
+
+    times: Array
+    """Of the samples, (n,), s."""
+    exact: Array
+    """(n, 9): position, velocity and spin of the body at those times."""
+    contacts: tuple[str, ...]
+    """For each sample a letter a surface: R sticks or rolls, S slips, N does not touch."""
+    wrong: Mapping[str, Array]
+    """Answers that the case must notice: what is wrong, and `exact` as it would then be."""
+
+
 @dataclass(frozen=True)
 class Case:
     """A body, what it touches, what acts on it, and its exact motion."""
@@ -78,22 +91,18 @@ class Case:
     name: str
     about: str
     """What happens, in a sentence."""
+    kind: str
+    """Landing if a contact closes, else sticking if the body rests, else sliding if it slips, or rolling."""
     body: Body
     surfaces: tuple[Surface, ...]
-    times: Array = field(repr=False)
-    """Of the samples, (n,), s."""
-    exact: Array = field(repr=False)
-    """(n, 9): position, velocity and spin of the body at those times."""
-    contacts: tuple[str, ...] = field(repr=False)
-    """For each sample a letter a surface: R sticks or rolls, S slips, N does not touch."""
+    work_out: Callable[[], Answers] = field(repr=False)
+    """Called when one of the `answers` is first asked for: a list of the cases needs none."""
     bound: float
     """Of the error of `exact`, in units of `scales`."""
     source: str
     """Where `exact` is from."""
     scales: tuple[float, float, float]
     """By what errors of position (m), velocity (m/s) and spin (rad/s) are divided; infinite: not compared."""
-    wrong: Mapping[str, Array] = field(default_factory=dict, repr=False)
-    """Answers that the case must notice: what is wrong, and `exact` as it would then be."""
     g: float = 9.81
     """Gravity, along -z, m/s2."""
     pull: Vector = (0.0, 0.0, 0.0)
@@ -106,6 +115,32 @@ class Case:
     """Angular velocity of that fluid about the z axis: u = flow (-y, x, 0), rad/s."""
     motion: Any = field(default=None, repr=False)
     """Of a ball in the study's vessel: its `model.Parameters` and `model.State` at the start."""
+
+    @cached_property
+    def answers(self) -> Answers:
+        """The exact motion and wrong ones."""
+        return self.work_out()
+
+    @property
+    def times(self) -> Array:
+        """As of `Answers`, and so the next three."""
+        return self.answers.times
+
+    @property
+    def exact(self) -> Array:
+        return self.answers.exact
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        return self.answers.contacts
+
+    @property
+    def wrong(self) -> Mapping[str, Array]:
+        return self.answers.wrong
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: with the answers, not with what works them out."""
+        return vars(self) | {"answers": self.answers, "work_out": None}
 
     def force(self, t: float, position: Any, velocity: Any) -> Vector:
         """All that acts at the body's centre at a time in s but gravity and contacts, N; engines set it every step."""
@@ -220,9 +255,14 @@ class Case:
 
     def to_mapping(self) -> dict[str, Any]:
         """All of it but the MJCF as JSON-able data; scales that are infinite are None."""
-        data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": TIME_STEPS, "tolerance": TOLERANCE}
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        data = (
+            own
+            | self.answers._asdict()
+            | {"schema": "dualball-case", "version": VERSION, "steps": TIME_STEPS, "tolerance": TOLERANCE}
+        )
         data |= {"turned": self.round, "wrong": {name: self.error(states) for name, states in self.wrong.items()}}
-        del data["motion"]
+        del data["motion"], data["work_out"]
         return dict(plain(data))
 
 

@@ -191,7 +191,7 @@ def lines(columns: Sequence[Column]) -> list[Row]:
     found: list[Row] = []
     for group in league.KINDS:
         for k, case in enumerate(cases()):
-            if league.kind(case) == group:
+            if case.kind == group:
                 results = [column.results[k] for column in columns]
                 cells = [(league.cell(r), None if r.skipped else r.passed) for r in results]
                 found.append((f"error, {group}", case.name, [*cells]))

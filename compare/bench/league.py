@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.bench.case import TOLERANCE, VERSION, Case
+from compare.bench.case import TOLERANCE, VERSION
 from compare.bench.exact import cases
 from compare.bench.runner import FLOORS, Result, run_all
 from compare.kit.pages import Rows
@@ -84,19 +84,9 @@ def measure(
             over.set()
 
 
-def kind(case: Case) -> str:
-    """What a case is about: landing if a contact closes, else sticking if the body rests, sliding if it slips."""
-    alike = zip(*case.contacts, strict=True)
-    if any("N" in letters and set(letters) != {"N"} for letters in alike):
-        return "landing"
-    if (abs(case.exact[:, 3:]).max(axis=1) == 0).any():
-        return "sticking"
-    return "sliding" if any("S" in letters for letters in case.contacts) else "rolling"
-
-
 def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
     """A row for each engine that was tried: how many cases it passes, the median error of each kind, order and cost."""
-    kinds = {case.name: kind(case) for case in cases()}
+    kinds = {case.name: case.kind for case in cases()}
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
     for name, results in league.items():
         own = [result for result in results if not result.skipped]
@@ -199,7 +189,7 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
     """A panel for each kind of case: the median of an engine's errors over that of its costs, its steps joined."""
     from compare.kit import style  # here, because drawing takes a second to load
 
-    kinds = {case.name: kind(case) for case in cases()}
+    kinds = {case.name: case.kind for case in cases()}
     figure, panels = style.panels(7.6, 8.8, 2, 2, sharex=True, sharey=True)
     tried = {name: [r for r in results if r.errors] for name, results in league.items()}
     families = list(dict.fromkeys(name.removesuffix("-defaults") for name, own in tried.items() if own))

@@ -37,7 +37,7 @@ from compare.bench.case import TIME_STEPS, TOLERANCE, Case
 from model import InputError
 from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number
-from model.trajectory import version
+from model.versions import version
 
 LIMIT = 300.0
 """Longest that a run at one step may take, s of real time."""

@@ -1,4 +1,4 @@
-"""Contacts and engines: ``forecast`` for any MuJoCo model, ``grade`` for one's own settings, ``cases``, ``league``."""
+"""Contacts and engines: ``forecast`` for any MuJoCo model, ``grade`` for one's own settings, ``league``."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ import mujoco
 import numpy as np
 from rich.text import Text
 
-from compare.bench import exact, forecast, forecast_page, grade, league, native, settled
-from compare.bench.case import VERSION
+from compare.bench import forecast, forecast_page, grade, league, native, settled
 from compare.bench.native import CHOICES, NUMBERS, Native
 from compare.commands import options, running
 from compare.kit import engines, pages, progress
@@ -67,62 +66,12 @@ def add(commands: options.Commands) -> None:
     command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write (default: none)")
     options.outputs(command)
 
-    command = options.command(commands, "cases", listed, "-o cases")
-    command.add_argument("name", nargs="?", metavar="NAME", help="show this case")
-    files = "write JSON, HDF5, MJCF and the scoring rule (default: none)"
-    command.add_argument("-o", "--output", type=options.results, metavar="DIR", help=files)
-    options.outputs(command)
-
     command = options.command(commands, "league", ranked, "--quick")
     command.add_argument("--quick", action="store_true", help="one time step")
     named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENTRIES)}"
     command.add_argument("--engine", action="append", metavar="NAME", help=named)
     running.add_processes(command)
     options.outputs(command, "results")
-
-
-def listed(args: argparse.Namespace) -> int:
-    """List the cases, show one, or write all."""
-    own = {case.name: case for case in exact.cases()}
-    check_names([args.name] if args.name else [], list(own), "case")
-    if args.output:
-        exact.write(args.output)
-    chosen = own[args.name] if args.name else None
-    data = chosen.to_mapping() if chosen else {"version": VERSION, "cases": [c.to_mapping() for c in own.values()]}
-    if chosen:
-        about = {
-            "case": chosen.name,
-            "about": chosen.about,
-            "body": _fields(chosen.body),
-            "surfaces": "\n".join(map(_fields, chosen.surfaces)),
-            "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull {_numbers(chosen.pull)} N, growth "
-            f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s",
-            "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); inf: not compared",
-            "source": f"{chosen.source}; error below {chosen.bound:g}",
-            "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),
-            "ends at": f"t = {chosen.times[-1]:g} s: position {_numbers(chosen.exact[-1, :3])} m, velocity "
-            f"{_numbers(chosen.exact[-1, 3:6])} m/s, spin {_numbers(chosen.exact[-1, 6:])} rad/s",
-            "more": "all states, JSON, HDF5 and MJCF: dualball cases -o DIR",
-        }
-        shown: list[Any] = [pages.pairs(about)]
-    else:
-        rows = [["case", "contacts", "kind", "what happens"]]
-        rows += [[c.name, str(len(c.surfaces)), league.kind(c), c.about] for c in own.values()]
-        shown = [pages.table(f"Exact contact cases, version {VERSION}", rows, justify="left")]
-    options.show(data, args.json, *shown, *([f"written to {args.output}"] if args.output else []))
-    return 0
-
-
-def _fields(item: Any) -> str:
-    """The fields of a dataclass in a line, SI units."""
-    values = ((field.name, value) for field in dataclasses.fields(item) if (value := getattr(item, field.name)))
-    return ", ".join(f"{name} {value if isinstance(value, str) else _numbers(value)}" for name, value in values)
-
-
-def _numbers(values: Any) -> str:
-    """A number, or several in brackets."""
-    several = ", ".join(f"{value + 0.0:.6g}" for value in np.atleast_1d(values))
-    return f"({several})" if np.ndim(values) else several
 
 
 def graded(args: argparse.Namespace) -> int:

@@ -22,7 +22,7 @@ from compare.commands import options, signals
 from compare.kit import pages
 from model import InputError, SimulationError
 from model.files import leave
-from model.trajectory import current_versions
+from model.versions import version
 
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "study": {
@@ -48,7 +48,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "contacts and engines": {
         "forecast": ("bench", "what the contacts of a MuJoCo model will do: depth, creep, hovering, largest step"),
         "grade": ("bench", "a score card for contact settings: yours, dualball's, MuJoCo's own; or another engine"),
-        "cases": ("bench", "the exact contact cases: listed, shown, or as files for engines in any language"),
+        "cases": ("cases", "the exact contact cases: listed, shown, or as files for engines in any language"),
         "league": ("bench", "all installed engines on the exact cases, as they come and in the best settings known"),
     },
 }
@@ -130,7 +130,7 @@ def _parser(words: Sequence[str]) -> options.Parser:
         description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"dualball {current_versions()['dualball']}")
+    parser.add_argument("--version", action="version", version=f"dualball {version('dualball')}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS)
     known = {name: about for group in GROUPS.values() for name, about in group.items()}
     if words and words[0] in known:

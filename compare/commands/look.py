@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.kit import drawing, sweep
+from compare.kit import collection, drawing
 from compare.report import results
 from compare.view import inspection
 from mjsim import ContactSettings
@@ -89,10 +89,10 @@ def figures(args: argparse.Namespace) -> int:
 
 def inspect(args: argparse.Namespace) -> int:
     """Describe a run or a collection."""
-    if gathered := sweep.describe(args.file):
+    if gathered := collection.describe(args.file):
         if args.plot:
             raise InputError(f"{args.file} is a collection: only a run can be drawn")
-        options.show(gathered, args.json, sweep.table(gathered))
+        options.show(gathered, args.json, collection.table(gathered))
         return 0
     if args.plot:
         from compare.view import motions  # here, because drawing takes a second to load

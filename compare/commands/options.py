@@ -11,15 +11,15 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
-
-from rich.console import Console
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from compare.kit.pages import readable
-from compare.kit.statistics import plain
 from model import InputError, Parameters, drag
 from model.files import check_writable
 from model.parameters import ANY, NOT_NEGATIVE, Range
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 Commands = Any
 """What `argparse` calls the sub-parsers of a program."""
@@ -188,19 +188,25 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
         raise
 
 
-class Terminal(Console):
-    """Leaves it to the program what to do where nobody reads on."""
+def terminal(**look: Any) -> Console:
+    """A console that leaves it to the program what to do where nobody reads on."""
+    from rich.console import Console  # here, because help needs none
 
-    def on_broken_pipe(self) -> NoReturn:
-        raise BrokenPipeError
+    class Terminal(Console):
+        def on_broken_pipe(self) -> NoReturn:
+            raise BrokenPipeError
+
+    return Terminal(**look)
 
 
 def show(data: Any, as_json: bool, *shown: Any) -> None:
     """Print data as JSON, numbers that are not finite as null; or what is shown of it, tables and lines."""
     if as_json:
+        from compare.kit.statistics import plain  # here, because help needs no arrays
+
         print(json.dumps(plain(data), indent=1))
     else:
-        Terminal(markup=False).print(*shown, sep="\n")
+        terminal(markup=False).print(*shown, sep="\n")
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from compare.commands import options, running, signals
-from compare.kit import campaign, sweep
+from compare.kit import campaign, collection, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.view import inspection
 from model import Flow, InputError, Parameters
@@ -114,6 +114,6 @@ def _keep_apart(args: argparse.Namespace, p: Parameters) -> None:
 
 def collect(args: argparse.Namespace) -> int:
     """Gather the runs."""
-    count = sweep.collect(args.directory, args.output)
+    count = collection.collect(args.directory, args.output, args.workers)
     print(f"{count} runs gathered into {args.output}")
     return 0

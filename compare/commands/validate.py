@@ -53,14 +53,14 @@ def run(args: argparse.Namespace) -> int:
     """Measure and judge."""
     from compare import validation  # here, because it loads everything there is
 
-    console, chosen = options.Terminal(quiet=args.json), None
+    console, chosen = options.terminal(quiet=args.json), None
     if args.parameters:
         chosen = {args.parameters.stem: Parameters.load(args.parameters)}
     elif args.set:
         chosen = {args.set: Parameters.named(args.set)}
     if args.list:
         rows = [[claim.id, claim.source, claim.statement, str(claim.text)] for claim in CLAIMS]
-        options.Terminal().print(pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left"))
+        options.terminal().print(pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left"))
         return 0
     with progress.shown(quiet=args.quiet or args.json) as show:
         wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit, "engine": args.engine}
@@ -75,7 +75,7 @@ def judge(args: argparse.Namespace) -> int:
     """Judge what is stored."""
     from compare import validation  # here, because it loads everything there is
 
-    console = options.Terminal(quiet=args.json)
+    console = options.terminal(quiet=args.json)
     verdicts = validation.judge_stored(args.output, args.claim, args.workers)
     for verdict in verdicts:
         console.print(line(verdict), soft_wrap=True)

@@ -17,8 +17,9 @@ import os
 import re
 import sys
 import threading
+import time
 from collections import Counter, deque
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,17 +32,20 @@ from compare.kit.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import make_directory, remove_leftovers, write_text
 from model.parameters import POSITIVE, Range, check_number
-from model.trajectory import current_versions
+from model.versions import current_versions
 
 BATCH = 64
 """Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
-HELD = 2**18
-"""Most samples of a batch, some 60 MB; a run that has more is written as it comes."""
-READ = 2**19
-"""Samples of new runs, and of those read last, that are held in memory, some 100 MB: most are looked at soon after."""
+HELD = 2**17
+"""Most samples of a batch, some 20 MB, three times that while it is stored; a run with more is written as it comes."""
+READ = 2**18
+"""Samples of new runs, and of those read last, that are held in memory, some 45 MB: most are looked at soon after."""
+SHORT = 10.0
+"""Processor time of a batch, s, that isn't worth a file where runs are removed as soon as they are measured."""
 FAILURES = "failures.json"
+Save = Callable[[Mapping[str, Trajectory], Path], None]
 Ended = tuple[str, Path | None, Trajectory | None]
-"""Why a run is not whole, empty if it is; the file that holds what there is of it; the run, if it fits in memory."""
+"""Why a run is not whole, empty if it is; the file of what there is of it, if any; the run, if it is handed out."""
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
 
@@ -67,6 +71,9 @@ class Campaign:
     report : called after every batch with `doing`, and how many runs are done, in all, and failed
     doing : what the campaign is about
     label : what the names of new files begin with, see `reduce`
+    save : writes the whole runs of a batch, by key, to a file
+    looked_at : whether runs are: new ones are then in memory at first
+    passing : whether `reduce` removes most: batches of less than `SHORT` are then stored only if memory is short
     """
 
     directory: Path
@@ -76,6 +83,9 @@ class Campaign:
     report: Show = nowhere
     doing: str = ""
     label: str = "runs"
+    save: Save = storage.save_batch
+    looked_at: bool = True
+    passing: bool = False
 
     def __post_init__(self) -> None:
         self._workers = processes(self.workers) if isinstance(self.workers, int) else self.workers
@@ -125,13 +135,23 @@ class Campaign:
         return self._read[key]
 
     def _hold(self, runs: Mapping[str, Trajectory]) -> None:
-        """Keep runs in memory, and forget the earliest of the others while there are more than `READ` samples."""
+        """Keep runs in memory, and forget the earliest of the others while there are more than `READ` samples.
+
+        What isn't stored is before it is forgotten, all at once.
+        """
         for key, run in runs.items():
             before = self._read.pop(key, None)
             self._samples += len(run.time) - (len(before.time) if before else 0)
             self._read[key] = run
         while self._samples > READ and len(self._read) > len(runs):
-            self._samples -= len(self._read.pop(next(iter(self._read))).time)
+            first = next(iter(self._read))
+            if first not in self._files:
+                loose = {key: run for key, run in self._read.items() if key not in self._files}
+                self._files |= dict.fromkeys(loose, _store(loose, self.directory, self.label, self.save))
+            self._samples -= len(self._read.pop(first).time)
+
+    def _done(self, key: str) -> bool:
+        return key in self._files or key in self._read
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -152,7 +172,7 @@ class Campaign:
         The directory's `FAILURES` lists all that have failed in this campaign, for programs.
         """
         unique = {task.key: task for task in tasks}
-        todo = [task for key, task in unique.items() if key not in self._files]
+        todo = [task for key, task in unique.items() if not self._done(key)]
         earlier = [key for key in unique if key in self._files and _broke_down(self._files[key])]
         failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
         done = len(unique) - len(todo) - len(failures)
@@ -172,14 +192,16 @@ class Campaign:
                 write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
         return failures
 
-    def reduce(self, label: str, keys: Collection[str] = ()) -> None:
-        """Once what was measured under a label is stored: keep the runs of these keys, in one file, ``LABEL.h5``.
+    def keep(self, keys: Collection[str]) -> None:
+        """Store these runs of the label in a file of their own, ``LABEL.h5``, which `reduce` leaves."""
+        file = self.directory / f"{self.label}.h5"
+        if keys:
+            storage.save_batch({key: self.load(key) for key in sorted(keys)}, file)
+            self._files |= dict.fromkeys(keys, file)
 
-        All other files of the label are removed, but for those of runs that broke down.
-        """
-        gone = {f for f in self._files.values() if f.name.rpartition("-")[0] == label and not _broke_down(f)}
-        if keys and all(self._files.get(key) in gone for key in keys):
-            storage.save_batch({key: self.load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
+    def reduce(self) -> None:
+        """Remove all runs of the label but those kept and those that broke down: what was measured is stored."""
+        gone = {f for f in self._files.values() if f.name.rpartition("-")[0] == self.label and not _broke_down(f)}
         for file in gone:
             file.unlink(missing_ok=True)
         self._read, self._samples = {}, 0
@@ -194,6 +216,7 @@ class Campaign:
         pending: dict[Future[list[Ended]], tuple[Task, ...]] = {}
         again: deque[Task] = deque()
         died: Counter[str] = Counter()
+        how = self.save, self.looked_at, SHORT if self.passing else 0.0
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
             batches = list(itertools.islice(fresh, 2 * self._workers.count - len(pending)))
@@ -203,7 +226,7 @@ class Campaign:
                     return
                 batches = [(again.popleft(),)]
             for batch in batches:
-                pending[self._workers.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
+                pending[self._workers.submit(run_batch, batch, self.directory, self.label, self.limit, *how)] = batch
             wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)
@@ -226,12 +249,21 @@ def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 
-def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) -> list[Ended]:
+def run_batch(
+    tasks: Sequence[Task],
+    directory: Path,
+    label: str,
+    limit: float,
+    save: Save = storage.save_batch,
+    looked_at: bool = True,
+    short: float = 0.0,
+) -> list[Ended]:
     """Carry out tasks and store their runs under a label; raises `StorageError` if that can't be done.
 
-    Where a batch can't be carried out as a whole, its tasks are tried one by one.
+    Whole ones that took less than a `short` processor time, s, are handed out only. Where a batch can't be carried out
+    as a whole, its tasks are tried one by one.
     """
-    paths = [directory / f"{label}-{task.key}.h5" for task in tasks]
+    paths, begun = [directory / f"{label}-{task.key}.h5" for task in tasks], time.process_time()
     try:
         if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
             failure = store(tasks[0], paths[0], limit)
@@ -241,19 +273,26 @@ def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) 
         raise
     except (InputError, TimeoutError, MemoryError) as error:
         if len(tasks) > 1:
-            return [outcome for task in tasks for outcome in run_batch([task], directory, label, limit)]
+            how = directory, label, limit, save, looked_at, short
+            return [outcome for task in tasks for outcome in run_batch([task], *how)]
         return [(str(error) or "out of memory", None, None)]
     whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
-    together = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
-    if whole:
-        storage.save_batch(whole, together)
+    handed_only = looked_at and time.process_time() - begun < short
+    together = _store(whole, directory, label, save) if whole and not handed_only else None
     outcomes: list[Ended] = []
     for run, path in zip(runs, paths, strict=True):
         file = together if run.complete else failed_path(path)
         if not run.complete:
-            storage.save(run, file)
-        outcomes.append((run.header.failure, file, run))
+            storage.save(run, failed_path(path))
+        outcomes.append((run.header.failure, file, run if looked_at else None))
     return outcomes
+
+
+def _store(runs: Mapping[str, Trajectory], directory: Path, label: str, save: Save) -> Path:
+    """Write whole runs, by key, into a file named by all of them."""
+    path = directory / f"{label}-{hashlib.sha256(' '.join(runs).encode()).hexdigest()[:24]}.h5"
+    save(runs, path)
+    return path
 
 
 def _stored(directory: Path) -> Iterator[tuple[str, Path]]:

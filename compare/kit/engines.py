@@ -21,7 +21,7 @@ from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.errors import suggestion
-from model.trajectory import version
+from model.versions import version
 
 AnySettings = ContactSettings | analytic.Settings | adapter.Settings
 """Numerical settings of any engine."""

@@ -224,10 +224,11 @@ def carry_out(
         for k, row in enumerate(rows):
             if isinstance(row, Measurement) and protocol.drawn(row) and not lab.beside:
                 rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
-        record.save(Records.of(rows), path, about)
-    records = record.load(path)
-    campaign.reduce(label, {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
-    return records
+        records = Records.of(rows)
+        campaign.keep({run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
+        record.save(records, path, about)
+    campaign.reduce()
+    return record.load(path)
 
 
 def _too_weak(p: Parameters, protocol: Protocol) -> str:

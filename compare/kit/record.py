@@ -27,7 +27,7 @@ from model import Parameters, StorageError
 from model.arrays import Array
 from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
-from model.trajectory import current_commit, current_versions
+from model.versions import current_commit, current_versions
 
 SCHEMA, SCHEMA_VERSION = "dualball-measurements", 1
 Condition = float | str

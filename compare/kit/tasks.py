@@ -131,14 +131,7 @@ def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -
             )
             for task in tasks
         ]
-    run, blocks = _begun(tasks), []
-    for block in run:
-        check()
-        blocks.append(block)
-    return [
-        Trajectory.from_blocks(header, parts, events)
-        for header, parts, events in zip(run.headers, zip(*blocks, strict=True), run.events, strict=True)
-    ]
+    return _begun(tasks).trajectories(check)
 
 
 def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:

@@ -20,7 +20,7 @@ from compare.kit.record import Records, Testimony
 from compare.kit.statistics import plain
 from model.errors import StorageError
 from model.files import check_ours, make_directory, reading_json, write_text
-from model.trajectory import current_commit, current_versions
+from model.versions import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
 SCHEMA, SCHEMA_VERSION = "dualball-summary", 5

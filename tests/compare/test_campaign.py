@@ -2,6 +2,7 @@
 
 import functools
 import json
+import math
 import os
 import re
 import signal
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from compare.commands import cli
+from compare.kit import collection
 from compare.kit.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.kit.tasks import Task
 from compare.kit.workers import dask, processes
@@ -89,14 +91,41 @@ def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path: Path) -> None:
         campaign.complete([*tasks(3), WILD])
         campaign.label = "first-and-more"
         campaign.complete(tasks(4))
-        campaign.reduce("first", [tasks(2)[1].key])
+        campaign.label = "first"
+        campaign.keep([tasks(2)[1].key])
+        campaign.reduce()
         kept = sorted((*path.name.rsplit("-", 1)[:1], *path.suffixes) for path in tmp_path.glob("*.h5"))
         assert kept == [("first", ".failed", ".h5"), ("first-and-more", ".h5"), ("first.h5", ".h5")]
-        campaign.reduce("first", [tasks(2)[1].key])  # again, as after a kill: what is kept stays
+        campaign.reduce()  # again, as after a kill: what is kept stays
         assert list(storage.load_runs(tmp_path / "first.h5")) == [tasks(2)[1].key]
-        (tmp_path / "first.h5").unlink()
         assert campaign.complete(tasks(4)) == []
     assert len(data(tmp_path)) == 5
+
+
+def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
+    tmp_path: Path, undisturbed, monkeypatch
+) -> None:
+    """Runs of 201 samples each; the numbers are those of runs that were stored at once."""
+    for where, room, short, files in (("held", 2**18, 1e9, 0), ("tight", 500, 1e9, 3), ("slow", 2**18, 0.0, 5)):
+        monkeypatch.setattr("compare.kit.campaign.READ", room)
+        monkeypatch.setattr("compare.kit.campaign.SHORT", short)
+        with Campaign(tmp_path / where, workers=0, batch=2, passing=True) as campaign:
+            runs = campaign.run(tasks())
+            assert len(list((tmp_path / where).glob("*.h5"))) == files
+            numbers = {
+                str(run.header.parameters): {c: getattr(run, c).tobytes() for c in columns(Trajectory)} for run in runs
+            }
+            assert numbers == undisturbed
+            campaign.keep([tasks()[4].key])
+            campaign.reduce()
+            assert [path.name for path in (tmp_path / where).glob("*.h5")] == ["runs.h5"]
+            assert campaign.load(tasks()[4].key).header.parameters == tasks()[4].parameters
+
+
+def test_runs_that_nobody_looks_at_are_not_handed_out(tmp_path: Path) -> None:
+    ended = run_batch(tasks(2), tmp_path, "runs", math.inf, collection.save_means, False)
+    assert [(reason, run) for reason, _, run in ended] == [("", None)] * 2
+    assert len({file for _, file, _ in ended}) == 1
 
 
 def cut(content: bytes) -> bytes:

@@ -8,8 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import analytic
-from compare.bench import cases
+from compare.bench import cases, exact
 from compare.bench.case import TIME_STEPS, TOLERANCE
+from compare.commands import cli
 from model import Case as Kinds
 
 ALL = pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
@@ -33,9 +34,24 @@ def test_a_case_is_whole(case):
     assert (gaps[case.in_contact("N")] > 0).all()
     assert slips[case.in_contact("R")].max(initial=0.0) < 1e-12
     assert slips[case.in_contact("S")].min(initial=math.inf) > 1e-6
+    if any("N" in letters and set(letters) != {"N"} for letters in zip(*case.contacts, strict=True)):
+        kind = "landing"
+    elif (abs(case.exact[:, 3:]).max(axis=1) == 0).any():
+        kind = "sticking"
+    else:
+        kind = "sliding" if any("S" in letters for letters in case.contacts) else "rolling"
+    assert case.kind == kind
     assert case.wrong
     for name, states in case.wrong.items():
         assert case.error(states) > 2.5 * TOLERANCE, name
+
+
+def test_a_list_of_the_cases_simulates_nothing(monkeypatch, capsys):
+    exact.cases.cache_clear()
+    monkeypatch.setattr(exact.analytic, "simulate", lambda *given, **more: pytest.fail("simulated"))
+    assert cli.main(["cases"]) == 0
+    assert "falls-in" in capsys.readouterr().out
+    exact.cases.cache_clear()
 
 
 def test_there_are_enough_cases_of_each_kind():

@@ -11,7 +11,7 @@ import xarray
 
 import analytic
 from compare.commands import cli
-from compare.kit import sweep
+from compare.kit import collection
 from compare.kit.campaign import Campaign
 from compare.kit.tasks import Task
 from model import Parameters, StorageError, storage
@@ -38,7 +38,7 @@ def runs(grid: Path, tmp_path: Path) -> Path:
 
 
 def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
-    assert sweep.collect(grid, tmp_path / "all.h5") == 6
+    assert collection.collect(grid, tmp_path / "all.h5") == 6
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         assert set(data.coords) == {"run", "omega_0", "eta"}
         assert data.omega_0.dims == ("run",)
@@ -48,20 +48,20 @@ def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
         np.testing.assert_array_equal(table.eta, ETAS)
         assert np.isfinite(table).all()
         assert set(data.mu.values) == {P.mu}
-    assert sweep.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
+    assert collection.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
 
 
 def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
     sets = [P, P.replace(drag="quadratic", nu_f=1e-6)]
     with Campaign(tmp_path / "runs", workers=0) as campaign:
         assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
-    sweep.collect(tmp_path / "runs", tmp_path / "all.h5")
-    about = sweep.describe(tmp_path / "all.h5")
+    collection.collect(tmp_path / "runs", tmp_path / "all.h5")
+    about = collection.describe(tmp_path / "all.h5")
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
-    assert sweep.table(about).row_count == 6
+    assert collection.table(about).row_count == 6
     with reading(tmp_path / "all.h5") as file:
         older = {name: column(dataset(file, name)) for name in file if name != "drag"}
-    assert sweep.described(older)["varied"] == ["nu_f"]
+    assert collection.described(older)["varied"] == ["nu_f"]
 
 
 def test_theory_stands_beside_what_was_measured(tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_theory_stands_beside_what_was_measured(tmp_path: Path) -> None:
     with Campaign(tmp_path / "runs", workers=0) as campaign:
         tasks = [Task(engine="event", parameters=p, x0=states[name], t_end=1.0) for name, p in sets.items()]
         assert not campaign.complete(tasks)
-    sweep.collect(tmp_path / "runs", tmp_path / "all.h5")
+    collection.collect(tmp_path / "runs", tmp_path / "all.h5")
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         data = data.sortby("omega_0")
         np.testing.assert_allclose(data.slip_z, data.slip_z_theory, atol=1e-8)
@@ -84,11 +84,11 @@ def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ
     ((key, run),) = storage.load_runs(first).items()
     copy.parent.mkdir()
     shutil.copy(first, copy)
-    assert sweep.collect(runs, tmp_path / "all.h5") == 6
+    assert collection.collect(runs, tmp_path / "all.h5") == 6
     storage.save_batch({key: dataclasses.replace(run, y=run.y + 1e-300)}, copy)
     (tmp_path / "all.h5").unlink()
     with pytest.raises(StorageError) as caught:
-        sweep.collect(runs, tmp_path / "all.h5")
+        collection.collect(runs, tmp_path / "all.h5")
     assert str(caught.value) == f"{copy / key} and {first / key} hold the same run with different numbers"
     assert not (tmp_path / "all.h5").exists()
 
@@ -99,7 +99,7 @@ def test_what_cannot_be_read_is_named(runs: Path, tmp_path: Path, damaged: int, 
     for path in paths:
         path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(StorageError) as caught:
-        sweep.collect(runs, tmp_path / "all.h5")
+        collection.collect(runs, tmp_path / "all.h5")
     assert [str(path) in str(caught.value) for path in paths] == [k < named for k in range(damaged)]
     assert ("and 1 more" in str(caught.value)) == (damaged > named)
     assert "\n" not in str(caught.value)
@@ -109,8 +109,8 @@ def test_what_is_no_run_is_left_out(runs: Path) -> None:
     """The collection of the last time, and the journal of a run that goes on."""
     (runs / "x.journal").mkdir()
     (runs / "x.journal" / "000000.h5").touch()
-    assert sweep.collect(runs, runs / "all.h5") == 6
-    assert sweep.collect(runs, runs / "all.h5") == 6
+    assert collection.collect(runs, runs / "all.h5") == 6
+    assert collection.collect(runs, runs / "all.h5") == 6
 
 
 def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
@@ -127,5 +127,5 @@ def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
     assert (about["varied"], about["ranges"]["omega_0"]) == (["omega_0"], [min(OMEGAS), max(OMEGAS)])
     assert cli.main(["inspect", about["names"][1], "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == OMEGAS[1]
-    assert sweep.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
-    assert sweep.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
+    assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
+    assert collection.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]

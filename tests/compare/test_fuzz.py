@@ -14,7 +14,7 @@ import pytest
 import analytic
 from compare import testing
 from compare.commands import cli
-from compare.kit import record, sweep
+from compare.kit import collection, record
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.report import results
@@ -68,7 +68,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     for name in RUNS[:3]:
         assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
     storage.save(analytic.simulate(P, State(), 5.0, sample_interval=1e-3), kept[CHUNKS])
-    sweep.collect(made / "runs", kept["collection"])
+    collection.collect(made / "runs", kept["collection"])
     storage.save_batch({name: storage.load(kept[name]) for name in RUNS[:3]}, kept["batch"])
     values = ("omega_c", 11.9), ("force_Ay", 0.1)
     rows = (measured("settled", *each, 1e-9, case="RR", y=0.1) for each in values)
@@ -99,7 +99,7 @@ READERS: list[tuple[str, Callable[[Path], Any]]] = [
     *((name, read) for name in RUNS for read in (whole, parts)),
     ("batch", storage.contents),
     ("batch", storage.load_runs),
-    ("collection", sweep.describe),
+    ("collection", collection.describe),
     ("measurements", record.load),
 ]
 

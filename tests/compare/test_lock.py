@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from compare.commands import cli
-from compare.kit import sweep
+from compare.kit import collection
 from compare.kit.campaign import Campaign
 from compare.kit.lock import Lock
 from model import StorageError
@@ -33,7 +33,7 @@ def test_a_second_program_is_refused_until_the_first_is_dead(
     first.communicate()
     for batch in "23":  # the second time there is nothing left to do
         assert cli.main([*command, batch]) == 0
-    assert sweep.collect(tmp_path, tmp_path / "all.h5") == 4
+    assert collection.collect(tmp_path, tmp_path / "all.h5") == 4
     assert not list(tmp_path.glob(".*"))
 
 

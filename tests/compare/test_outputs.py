@@ -9,7 +9,7 @@ import pytest
 
 import analytic
 from compare.commands import cli, options
-from compare.kit import sweep
+from compare.kit import collection
 from compare.kit.campaign import Campaign
 from compare.kit.tasks import Task
 from model import Parameters, StorageError, storage
@@ -117,7 +117,7 @@ def test_runs_are_not_gathered_into_one_of_themselves(whole: Path, tmp_path: Pat
     link.symlink_to(one)
     for output in (one, link):
         with pytest.raises(StorageError, match="can't be the output, too"):
-            sweep.collect(runs, output)
+            collection.collect(runs, output)
     assert one.read_bytes() == before
 
 

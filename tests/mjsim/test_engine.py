@@ -8,8 +8,9 @@ import pytest
 
 import mjsim
 from mjsim import ContactSettings, backend, scene, stepping
-from model import Case, Flow, InputError, Parameters, SimulationError
+from model import Case, Flow, InputError, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
+from model.trajectory import columns
 
 P = Parameters.named("reference")
 
@@ -67,6 +68,39 @@ def test_batch_is_the_single_run() -> None:
     for run in (run for runs in counts for run in runs):
         np.testing.assert_array_equal(run.x, first.x)
         np.testing.assert_array_equal(run.force_B, first.force_B)
+
+
+RIGID = ContactSettings(coordinates="free", law="rigid", servo=0.0, memory=False, order=1)
+
+
+@pytest.mark.parametrize("settings", [None, RIGID], ids=["joints", "free"])
+def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> None:
+    """Also of a run that breaks down, beside others; progress is that of all of them."""
+    sets = [P.replace(omega_0=omega_0) for omega_0 in (5.0, 12.0, 25.0, 40.0, 60.0)]
+    x0s, told = [[0.0, 0, 10.0, 0, 0, 0]] * 4 + [[0, 0, 1e9, 0, 0, 0]], []
+    one, *others = (
+        mjsim.simulate_many(sets, x0s, 0.1, settings=settings, sample_interval=0.01, threads=n, progress=told.append)
+        for n in (1, 2, 3, 1000)
+    )
+    assert min(told) < told[-1] == max(told) == 1.0
+    assert one[-1].complete is (settings is RIGID)
+    for many in others:
+        for run, exact in zip(many, one, strict=True):
+            assert run.header.failure == exact.header.failure
+            for name in columns(Trajectory):
+                np.testing.assert_array_equal(getattr(run, name), getattr(exact, name))
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, 1_000_000, math.nan, "2"])
+def test_a_bad_number_of_threads_is_refused_in_one_line(threads) -> None:
+    with pytest.raises(InputError, match=r"^threads = [^\n]*$"):
+        mjsim.simulate_many([P, P], [np.zeros(8)] * 2, 0.1, threads=threads)
+
+
+def test_runs_need_all_that_makes_them() -> None:
+    for sets, x0s, flow in (([], [], None), ([P], [], None), ([P] * 3, [np.zeros(8)] * 3, [Flow.steady(1.0)] * 2)):
+        with pytest.raises(InputError, match="every run needs parameters, a start and a flow"):
+            mjsim.simulate_many(sets, x0s, 0.1, flow)
 
 
 def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:

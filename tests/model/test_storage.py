@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-import model.trajectory
-from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage
+from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage, versions
 from model.files import write_text
 from model.hdf5 import seal
 from model.trajectory import SAMPLE, columns
@@ -230,7 +229,7 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
     path = tmp_path / "batch.h5"
     storage.save_batch(BATCH, path)
     assert [each.name for each in tmp_path.iterdir()] == ["batch.h5"]
-    assert storage.contents(path) == (model.trajectory.current_versions()["dualball"], ["a", "b", "c"])
+    assert storage.contents(path) == (versions.current_versions()["dualball"], ["a", "b", "c"])
     loaded = storage.load_runs(path)
     for name, run in BATCH.items():
         assert_same(loaded[name], run)

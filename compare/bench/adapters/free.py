@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from compare.bench.case import FACETS, Case, Surface, Vector
-from compare.kit.adapters.adapter import tangent
 from model.arrays import Array
+from model.kinematics import tangent
 
 CHORD = (
     "each step ends along a chord, and the next one takes away what then points into the wall, omega^2 h/2 of the "

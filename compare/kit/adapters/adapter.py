@@ -36,7 +36,8 @@ from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import Motion, frame, from_world, to_world
 from model.parameters import POSITIVE, check_choice, check_number
-from model.trajectory import current_versions, samples, version
+from model.trajectory import samples
+from model.versions import current_versions, version
 
 Floats = Sequence[float]
 _HUGE = 1e8
@@ -138,12 +139,6 @@ class Scene(Protocol):
 
 class BreakdownError(RuntimeError):
     """The engine can't take the next step."""
-
-
-def tangent(radius: float, azimuth: float) -> tuple[Array, Array]:
-    """Point and inward normal, each (3,), of the plane that touches a cylinder about the z axis there."""
-    normal = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-    return -radius * normal, normal
 
 
 def simulate(

@@ -20,9 +20,10 @@ from typing import Any
 import numpy as np
 
 from compare.kit.adapters import adapter
-from compare.kit.adapters.adapter import BreakdownError, Floats, Touch, tangent
+from compare.kit.adapters.adapter import BreakdownError, Floats, Touch
 from model import Parameters
 from model.arrays import Array
+from model.kinematics import tangent
 
 _SIZE = 100.0
 """Edge of the cubes of which a vessel of many facets is made, in units of its radius."""

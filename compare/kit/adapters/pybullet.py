@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from compare.kit.adapters import adapter
-from compare.kit.adapters.adapter import BreakdownError, Floats, Touch, tangent
+from compare.kit.adapters.adapter import BreakdownError, Floats, Touch
 from model import Parameters
 from model.arrays import Array
+from model.kinematics import tangent
 
 
 @dataclass(frozen=True, kw_only=True)

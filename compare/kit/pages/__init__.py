@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import jinja2
-from rich import box
-from rich.console import JustifyMethod
-from rich.table import Table
-from rich.text import Text
+if TYPE_CHECKING:
+    from rich.console import JustifyMethod
+    from rich.table import Table
+    from rich.text import Text
 
 Rows = Sequence[Sequence[str]]
 """A table: its head, then its body."""
@@ -42,6 +41,8 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
 
 def render(package: str, template: str, **values: Any) -> str:
     """A template of a package, filled in; what is not marked safe is escaped, a value that is missing is an error."""
+    import jinja2  # here, because the terminal has no pages
+
     loader = jinja2.ChoiceLoader([jinja2.PackageLoader(package), jinja2.PackageLoader("compare.kit.pages")])
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     return environment.get_template(template).render(**values)
@@ -56,6 +57,9 @@ def markdown(rows: Rows) -> str:
 
 def pairs(rows: Mapping[str, str]) -> Table:
     """Names and what they stand for, for the terminal."""
+    from rich.table import Table  # here, because help has no tables
+    from rich.text import Text
+
     shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for name, text in rows.items():
         shown.add_row(Text(name, "bold"), Text(text))
@@ -73,6 +77,10 @@ def table(
 
     `justify` is for all columns but the first.
     """
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
     usual: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "caption_justify": "left"}
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):

@@ -1,0 +1,253 @@
+"""What many runs settled to, in one file.
+
+`collect` writes one row a run: its parameters, the mean over its last quarter, how sure that is, and its last case. The
+file opens in xarray with the dimension ``run``, along which the parameters that vary are coordinates. `save_means`
+writes the same of a batch whose samples nobody wants.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from rich.table import Table
+
+import analytic
+from compare.kit import pages
+from compare.kit.statistics import settled_case, steady_mean
+from compare.kit.workers import processes
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage
+from model.files import check_writable
+from model.hdf5 import WholeFile, column, dataset, reading, write_columns
+from model.kinematics import VARIABLES
+from model.trajectory import CONVENTIONS, attributes, columns
+from model.versions import current_versions
+
+SCHEMA, SCHEMA_VERSION = "dualball-collection", 1
+MEANS, MEANS_VERSION = "dualball-means", 1
+"""What a file of the means of a batch says of itself."""
+FEWEST = 6
+"""Samples of the last quarter of a run below which it has no mean."""
+NAMED = 5
+"""Most files that can't be gathered, and most runs of a file, that are named one by one."""
+SHARE = 16
+"""Files that a process gathers at a time."""
+Columns = dict[str, npt.NDArray[Any]]
+"""By name, an entry a run. Beside those of a collection: whether the flow is `steady`, a digest of all that determines
+the run, its `identity`, and one of its `numbers`."""
+_HELD = "steady", "identity", "numbers"
+
+
+def collect(directory: Path, output: Path, workers: int = 0) -> int:
+    """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
+
+    One that is stored twice is taken once. So many processes read the files; 0 is this one.
+
+    Raises `StorageError` if there are none, the output can't be written, or, with their names, some can't be read or
+    hold the same run twice.
+    """
+    check_writable(output)
+    if not directory.is_dir():
+        raise StorageError(f"cannot read {directory}: there is no such directory")
+    files = [
+        file for file in sorted(directory.rglob("*.h5")) if file.parent.suffix != ".journal"
+    ]  # of a run that goes on
+    before = [file for file in files if output.exists() and file.samefile(output)]
+    if before:
+        _check_collection(output)
+        files.remove(before[0])
+    shares = [files[k : k + SHARE] for k in range(0, len(files), SHARE)]
+    parts, problems = [], list[str]()
+    with processes(workers) as work:
+        for found, unread in work.map(partial(_gathered, directory), shares):
+            parts += [found] if found else []
+            problems += unread
+    table = {name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0] if parts else ())}
+    rows = np.arange(len(table["run"]) if table else 0)
+    if table:  # the first of each identity, and the numbers of that
+        _, first, which = np.unique(table["identity"], return_index=True, return_inverse=True)
+        for k in np.flatnonzero(table["numbers"] != table["numbers"][first[which]]).tolist():
+            those = (directory / table["run"][i] for i in (first[which[k]], k))
+            problems.append(f"{' and '.join(map(str, those))} hold the same run with different numbers")
+        rows = np.sort(first)
+    if problems:
+        more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
+        raise StorageError("; ".join(problems[:NAMED]) + more)
+    if not table:
+        raise StorageError(f"there are no runs in {directory}")
+    collected = {name: values[rows] for name, values in table.items() if name not in _HELD}
+    coordinates, about = varied(collected), _attributes()
+    with WholeFile(output) as whole:
+        title = f"What {len(rows)} balls settled to, measured over the last part of each run"
+        whole.file.attrs.update(Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION)
+        for name, stored in write_columns(whole.file, collected, "run").items():
+            stored.attrs.update(about[name])
+            if coordinates and name not in ("run", *coordinates):
+                stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
+        whole.finish()
+    return len(rows)
+
+
+def _gathered(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
+    """The columns of all runs of some files, named from the directory on; and what can't be read."""
+    parts, problems = [], []
+    for file in files:
+        try:
+            parts.append(_rows(file, file.relative_to(directory)))
+        except StorageError as error:
+            problems.append(str(error))
+    return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}, problems
+
+
+def _rows(path: Path, shown: Path) -> Columns:
+    """The columns of all runs of a file that is `shown` under a name."""
+    with reading(path) as file:
+        if file.attrs.get("schema") != MEANS:
+            found = None
+        elif file.attrs.get("schema_version") != MEANS_VERSION:
+            raise StorageError(f"it holds means of another version; this program reads {MEANS_VERSION}")
+        else:
+            found = {name: column(dataset(file, name)) for name in file}
+            found = {name: values.astype(str) if values.dtype.kind == "O" else values for name, values in found.items()}
+    found = found or _means(storage.load_runs(path))
+    of = [
+        dict(zip(found, row, strict=True)) for row in zip(*(values.tolist() for values in found.values()), strict=True)
+    ]
+    theory = [_theory(row) for row in of]
+    found |= {f"{name}_theory": np.array([each[name] for each in theory]) for name in VARIABLES}
+    return found | {"run": np.array([str(shown / name) for name in found["run"].tolist()])}
+
+
+def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
+    """Write what runs settled to, by name, without their samples; raises `StorageError` if that can't be done."""
+    with WholeFile(path) as whole:
+        whole.file.attrs.update(
+            schema=MEANS, schema_version=MEANS_VERSION, versions=json.dumps(dict(current_versions()))
+        )
+        write_columns(whole.file, _means(runs), "run")
+        whole.finish()
+
+
+def _means(runs: Mapping[str, Trajectory]) -> Columns:
+    """What runs say of themselves: their parameters, means over their last quarter with uncertainties by drift, and
+    last cases. Those are nan, and the case -1, for a run too short for them."""
+    rows = []
+    for name, run in runs.items():
+        row: dict[str, Any] = {"run": name, "engine": run.header.engine} | dataclasses.asdict(run.header.parameters)
+        row |= {"duration": float(run.time[-1]) if len(run.time) else 0.0, "failure": run.header.failure}
+        length = len(run.time) // 4
+        means = steady_mean(run.x.T, length) if length >= FEWEST else np.full((2, len(VARIABLES)), math.nan)
+        for variable, mean, drift in zip(VARIABLES, *np.array(means).tolist(), strict=True):
+            row |= {variable: mean, f"{variable}_uncertainty": drift}
+        row |= {"case": int(settled_case(run)) if len(run.case) else -1, "steady": run.header.flow.is_steady}
+        about = run.header.attributes() | {"mjcf": run.header.mjcf, "created": "", "failure": ""}
+        row["identity"] = _digest(json.dumps(about, sort_keys=True).encode())
+        row["numbers"] = _digest(*(getattr(run, each).tobytes() for each in columns(Trajectory)))
+        rows.append(row)
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def _theory(row: Mapping[str, Any]) -> dict[str, float]:
+    """The stable stationary solution of a run's case; nan where there is none, where it is free, in unsteady flow."""
+    found = dict.fromkeys(VARIABLES, math.nan)
+    if row["case"] >= 0 and row["steady"]:
+        p = Parameters(**{f.name: row[f.name] for f in dataclasses.fields(Parameters)})
+        with suppress(InputError):  # the case has no stable stationary solution, or not one
+            of = analytic.solution(p, Case(row["case"]))
+            found |= {name: float(x) for name, x in of.state._asdict().items() if name not in of.family}
+    return found
+
+
+def _digest(*parts: bytes) -> str:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
+    return digest.hexdigest()[:32]
+
+
+def _check_collection(output: Path) -> None:
+    """Raise `StorageError` if what is to be overwritten isn't the collection of the last time."""
+    with reading(output) as file:
+        if file.attrs.get("schema") != SCHEMA:
+            raise StorageError("it holds runs to be gathered, and can't be the output, too")
+
+
+def _attributes() -> dict[str, dict[str, Any]]:
+    """Of each column of a collection: units, long_name, and of the case its flags."""
+    about: dict[str, dict[str, Any]] = {
+        f.name: {"units": f.metadata["unit"], "long_name": f.metadata["meaning"]} for f in Parameters.quantities()
+    }
+    texts = {"run": "file and name of the run", "engine": "engine", "drag": "law of drag"}
+    about |= {name: {"long_name": text} for name, text in (texts | {"failure": "why it broke down"}).items()}
+    about["duration"] = {"units": "s", "long_name": "duration of the run"}
+    stored = columns(Trajectory)
+    for name in VARIABLES:
+        units, meaning = (stored[name][key] for key in ("units", "long_name"))
+        about[name] = {"units": units, "long_name": f"{meaning}, mean"}
+        about[f"{name}_uncertainty"] = {"units": units, "long_name": f"{meaning}, uncertainty of the mean"}
+        about[f"{name}_theory"] = {"units": units, "long_name": f"{meaning}, stationary solution of the case"}
+    about["case"] = attributes(stored["case"])  # -1: none prevails
+    return about
+
+
+def varied(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
+    """The parameters that have several values; older files have no law of drag."""
+    return [f.name for f in dataclasses.fields(Parameters) if f.name in of and len(np.unique(of[f.name])) > 1]
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """What a collection or batch holds: names of runs, engines, failures, the range of every column, JSON-able.
+
+    Empty for a file that holds a single run. Raises `StorageError` for one that is not whole or of a newer version.
+    """
+    if path.parent.is_file():  # one run of a batch
+        return {}
+    with reading(path) as file:
+        schema, version = (file.attrs.get(name) for name in ("schema", "schema_version"))
+        if schema == SCHEMA:
+            if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
+                raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
+            return described({name: column(dataset(file, name)) for name in file})
+    if schema not in (MEANS, storage.BATCH):
+        return {}
+    return described({name: values for name, values in _rows(path, path).items() if name not in _HELD})
+
+
+def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
+    """As `describe`, for the columns of a collection by name; `drag` is missing in older ones."""
+    codes, counts = np.unique(of["case"], return_counts=True)
+    finite = {name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"}
+    return {
+        "runs": len(of["run"]),
+        "names": of["run"].tolist(),
+        "engines": sorted(set(of["engine"].tolist())),
+        "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
+        "failures": [text for text in of["failure"].tolist() if text],
+        "drag": sorted(set(of["drag"].tolist())) if "drag" in of else [],
+        "varied": varied(of),
+        "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
+    }
+
+
+def table(about: dict[str, Any]) -> Table:
+    """The description for the terminal."""
+    ranges, names = about["ranges"], about["names"]
+    more = f"\n… and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    rows = {
+        "runs": f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed",
+        "named": "\n".join(names[:NAMED]) + more,
+        "cases": ", ".join(f"{name}: {count}" for name, count in about["cases"].items()),
+        "varied": "\n".join("{} {:g} … {:g}".format(n, *ranges[n]) for n in about["varied"] if n != "drag"),
+        "drag": ", ".join(about["drag"]),
+        "omega_c": "{:.9g} … {:.9g} rad s-1".format(*ranges.get("omega_c", [np.nan, np.nan])),
+    }
+    return pages.pairs(rows)
