@@ -350,7 +350,6 @@ def choices() -> Rows:
         "foreseen, never solved for": {"most": 0},
         "at most 5 solutions": {"most": 5},
         "**rigid**: R = 1e-3": {"rigid": True},
-        "R = 1e-2": {"rigid": True, "softness": 1e-2},
         "foreseen to a hundredth": {"rigid": True, "share": 0.01},
         "loses all its depth in a step": {"rigid": True, "push": 1.0},
         "keeps none": {"rigid": True, "depth": 0.0},
