@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.textpath import text_to_path
 
 from compare import subjects
 from compare.kit import drawing, style
@@ -21,6 +22,8 @@ _WIDEST = 1.5
 """Deviations beyond this multiple of the tolerance are drawn at the edge, as arrows."""
 _MANY = 100
 """From so many points on, they are drawn as pixels: a page of many figures stays small."""
+_WIDTH, _BELOW = 7.0, 0.48
+"""Of a figure of deviations, and of what is below its frame, inches."""
 Checks = tuple[Check, ...]
 
 FORMATS = ("svg", "pdf", "png")
@@ -50,7 +53,8 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     names = list(dict.fromkeys(c.measurement.quantity for c in checks))
     engines = list(dict.fromkeys(c.measurement.engine for c in checks))
     strip = 1 / len(engines)
-    figure = style.figure(7.0, 0.75 + len(names) * (0.15 + 0.12 * len(engines)) + 0.25 * (len(engines) > 1))
+    height = 0.75 + len(names) * (0.15 + 0.12 * len(engines)) + 0.25 * (len(engines) > 1)
+    figure = Figure(figsize=(_WIDTH, height))
     axes = figure.add_subplot()
     for band, grey in ((1, "0.93"), (1 / COVERAGE, "0.86")):
         axes.axvspan(-band, band, color=grey, lw=0, zorder=0)
@@ -76,8 +80,15 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     axes.set_yticks(range(len(names)), [style.symbol(name) for name in names])
     edge = 1.08 * _WIDEST
     axes.set(xlim=(-edge, edge), ylim=(len(names) - 0.5, -0.5), xlabel="(measured − predicted)/tolerance")
+    above = 0.04
     if len(engines) > 1:
-        style.legend(figure, loc="outside upper center", ncols=4)
+        style.legend(figure, loc="upper center", ncols=4)
+        above = 0.33
+    # Placed by hand: there are so many of these figures that a solver of layouts would cost more than drawing them.
+    texts = [(label.get_text(), label.get_fontproperties()) for label in axes.get_yticklabels()]
+    widths = [text_to_path.get_text_width_height_descent(text, font, "$" in text)[0] for text, font in texts]
+    left = 0.15 + max(widths) / 72  # points
+    axes.set_position((left / _WIDTH, _BELOW / height, 1 - (left + 0.04) / _WIDTH, 1 - (_BELOW + above) / height))
     sets = dict.fromkeys(c.measurement.set for c in checks)
     alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
     return figure, (

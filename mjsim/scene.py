@@ -59,25 +59,33 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     return spec
 
 
-def build(p: Parameters, settings: ContactSettings) -> tuple[Any, str]:
+def build(p: Parameters, settings: ContactSettings, shown: bool = False) -> tuple[Any, str]:
     """The scene compiled to an `mujoco.MjModel` of its own, and as the MJCF text that is simulated.
+
+    The model has the textures of the text only if it is to be `shown`: they are 1.7 MB, and no step looks at them.
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
-    model, text = _compiled(p, settings)
+    model, text = _compiled(p, settings, shown)
     return copy.copy(model), text
 
 
 @functools.lru_cache(maxsize=256)
-def _compiled(p: Parameters, settings: ContactSettings) -> tuple[Any, str]:
+def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[Any, str]:
     filled = spec(p, settings)
     try:
+        text = str(filled.to_xml())
+        if not shown:
+            for texture in list(filled.textures):
+                filled.delete(texture)
+            for material in filled.materials:
+                material.textures = [""] * len(material.textures)
         model = filled.compile()
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile the scene: {' '.join(str(error).split())}") from error
     # Without one in the scene, the engine looks at surface velocities only if this flag says so.
     model.flg_surfacevel = settings.shifts_surfaces
-    return model, str(filled.to_xml())
+    return model, text
 
 
 def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:

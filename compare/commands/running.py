@@ -91,11 +91,14 @@ def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
 
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
-    """The run of a ball that the options of `add_engine`, `add_start` and ``--time`` describe."""
+    """The run of a ball that the options of `add_engine`, `add_start`, `add_samples` and ``--time`` describe."""
     chosen = settings(args, p)
-    if step := getattr(chosen, "timestep", None):
-        check_number("time", args.time or step, "s", Range(step), "to hold a time step it")
+    step = getattr(chosen, "timestep", None) or 0.0
+    check_number("time", args.time or step, "s", Range(step), "to hold a time step it")
     given = {"x0": start(args), "t_end": args.time, "settings": chosen} | more
+    if interval := getattr(args, "sample_interval", None):
+        within = Range(step, given["t_end"])
+        given["sample_interval"] = check_number("sample_interval", interval, "s", within, "within this run it")
     return Task(engine=args.engine.name, parameters=p, **given)
 
 
@@ -129,6 +132,12 @@ def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: 
         Campaign(args.output / directory, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
     ):
         yield made
+
+
+def add_samples(parser: argparse.ArgumentParser) -> None:
+    """The option that says how often a run is sampled."""
+    between = "time between samples (default: duration/1000)"
+    parser.add_argument("--sample-interval", type=seconds, help=between)
 
 
 def add_start(parser: argparse.ArgumentParser) -> None:

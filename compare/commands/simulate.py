@@ -13,9 +13,8 @@ from compare.commands import options, running, signals
 from compare.kit import campaign, collection, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.view import inspection
-from model import Flow, InputError, Parameters
+from model import Flow, InputError, Parameters, storage
 from model.files import reading_json, write_text
-from model.parameters import Range, check_number
 
 
 def add(commands: options.Commands) -> None:
@@ -26,8 +25,7 @@ def add(commands: options.Commands) -> None:
     running.add_flow(command)
     running.add_start(command)
     command.add_argument("--time", type=options.seconds, default=10.0, help="duration")
-    between = "time between samples (default: duration/1000)"
-    command.add_argument("--sample-interval", type=options.seconds, help=between)
+    running.add_samples(command)
     command.add_argument("-o", "--output", type=options.HDF5, help="HDF5 file to write (default: none)")
     options.outputs(command, shown="print the description as JSON")
 
@@ -42,6 +40,9 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--hold", type=options.seconds, default=20.0, help="time at each step")
     running.add_engine(command)
     command.add_argument("--time", type=options.seconds, default=30.0, help="duration of a run that is held")
+    running.add_samples(command)
+    means = "store what each run settles to, for collect, and not its samples"
+    command.add_argument("--means-only", action="store_true", help=means)
     running.add_workers(command)
     command.add_argument("--batch", type=options.count, default=campaign.BATCH, help="runs in one MuJoCo batch")
     options.outputs(command, "sweep", "print a summary as JSON")
@@ -49,13 +50,12 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "collect", collect, "sweep -o sweep.h5")
     command.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
     command.add_argument("-o", "--output", type=options.HDF5, default=Path("sweep.h5"), help="HDF5 file to write")
+    running.add_processes(command)
 
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
-    task = running.task(args, options.parameters(args), flow=running.flow(args), sample_interval=args.sample_interval)
-    if args.sample_interval is not None:
-        check_number("sample_interval", args.sample_interval, "s", Range(high=args.time), "with this --time it")
+    task = running.task(args, options.parameters(args), flow=running.flow(args))
     heard: list[int] = []  # the first signal ends the run with its samples, the second without
     with tempfile.TemporaryDirectory() as scratch, signals.answered(heard.append):
         path = args.output or Path(scratch) / "run.h5"
@@ -84,7 +84,8 @@ def grid(args: argparse.Namespace) -> int:
     else:
         sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
-    with running.campaign(args, "sweep", batch=args.batch) as work:
+    how = {"looked_at": False, "save": collection.save_means if args.means_only else storage.save_batch}
+    with running.campaign(args, "sweep", batch=args.batch, **how) as work:
         _keep_apart(args, p)
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
@@ -101,10 +102,12 @@ def grid(args: argparse.Namespace) -> int:
 
 def _keep_apart(args: argparse.Namespace, p: Parameters) -> None:
     """Raise `InputError` if the directory holds another sweep, with which `collect` would mix this one."""
-    names = ("vary", "random", "seed", "direction", "hold", "start", "time", "timestep", "rtol", "restitution")
+    names = ("vary", "random", "seed", "direction", "hold", "start", "time", "timestep", "rtol", "restitution",
+             "sample_interval", "means_only")  # fmt: skip
     asked = {name: getattr(args, name) for name in names} | {"engine": args.engine.name} | dataclasses.asdict(p)
     if (path := args.output / "sweep.json").exists():
         with reading_json(path, "sweep") as held:
+            held = asked | held  # one of an earlier version lacks some
             differ = [f"{name} = {held[name]}, not {value}" for name, value in asked.items() if held[name] != value]
         if differ:
             other = f"{args.output} holds another sweep ({'; '.join(differ)})"

@@ -49,7 +49,7 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
         raise InputError("the viewer shows coordinates = 'polar' only")
     limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
     limits.check_start(x0, p, settings)
-    model, _ = scene.build(p, settings)
+    model, _ = scene.build(p, settings, shown=True)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
     return Polar([model], [p], settings, [x0], 0.0, flow([0.5 * settings.timestep]), batched=False)
 

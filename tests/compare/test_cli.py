@@ -356,7 +356,7 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("simulate --ramp 1 -2e0 -1E-3", "duration = -0.001 s is out of range"),
         ("simulate --start slip=3", "unknown state variable 'slip' (did you mean 'slip_z'?)"),
         ("simulate --start omega_c=fast", "omega_c = 'fast' must be a number in rad s-1"),
-        ("simulate --sample-interval 100 --time 1", "sample_interval = 100 s is out of range: with this --time"),
+        ("simulate --sample-interval 100 --time 1", "sample_interval = 100 s is out of range: within this run"),
         ("simulate --time 1e-9", "time = 1e-09 s is out of range: to hold a time step it must be >= 0.001"),
         ("simulate --sample-interval=1e-9", "sample_interval = 1e-09 s is out of range"),
         ("simulate -o run.csv", "'run.csv' would hold HDF5: its name must end in .h5"),
