@@ -37,7 +37,7 @@ EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
 NOTED = 4096
 """Steps of all runs of which the cases are told at once."""
-SHARE = 16
+RUNS_A_THREAD = 16
 """Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's Python."""
 MOST_THREADS = 1024
 _HUGE = 1e10
@@ -268,7 +268,7 @@ def simulate_many(
     """Simulate many runs at once, in this process; arguments as in `simulate`.
 
     `flow` is one for all, one for each, or None for each one's own omega_0. Each thread steps a MuJoCo batch of its
-    share of the runs; None is a thread for each processor that has `SHARE` of them. Results are the same to the bit
+    share of the runs; None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the same to the bit
     whatever the number. A run that breaks down has a header that says so; the others go on.
 
     Raises
@@ -283,7 +283,7 @@ def simulate_many(
         flows = [flow] * len(parameters) if isinstance(flow, Flow) else flow
     limits.check_counts(parameters, x0s, flows)
     if threads is None:
-        threads = max(1, min(os.cpu_count() or 1, len(flows) // SHARE))
+        threads = max(1, min(os.cpu_count() or 1, len(flows) // RUNS_A_THREAD))
     parts = min(int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True))), len(flows))
     # The softest settings that any of the runs asks for.
     settings = settings or min((ContactSettings.for_problem(p) for p in parameters), key=lambda s: s.solimp)

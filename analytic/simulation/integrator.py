@@ -31,6 +31,8 @@ MAX_RESTARTS = 20
 EPS = math.ulp(1.0)
 LOCAL = 0.25
 """Tolerance of a step of the integrator relative to that asked for: errors of many steps add up."""
+FINEST, FINEST_STIFF = 1e-13, 1e-11
+"""Least relative tolerances of compiled steps: what round-off leaves of explicit ones, and of those of a small slip."""
 
 
 @cache
@@ -102,7 +104,7 @@ class Stretch:
             return
         while t < self.until:
             try:
-                slow, solvers = 0, _solvers()
+                slow, solvers = 0, _solvers() if not failures else None  # scipy's go on where tolerances are extreme
                 steps = self._compiled(solvers, small, t, z, first_step) if solvers else None
                 for step in steps or self._solve(BDF if small else LSODA, t, z, first_step):
                     yield step
@@ -121,6 +123,8 @@ class Stretch:
                 failures += 1
                 if failures > MAX_RESTARTS:
                     raise
+                if solvers:
+                    continue
             small = not small
 
     def _compiled(
@@ -131,6 +135,7 @@ class Stretch:
         taken = int(np.searchsorted(times, start, side="right"))
         samples = np.empty((int(np.searchsorted(times, self.until, side="right")), len(here)))
         scale, level = np.array(chart.scale), np.array(self._level)
+        rtol = max(LOCAL * self.relative, FINEST_STIFF if small else FINEST)
         slips, unit = np.array(chart.slips, dtype=np.int64), float(chart.scale[chart.slips[0]]) if chart.slips else 1.0
         motion = chart.motion._replace(waves=np.array(chart.motion.waves, dtype=float).reshape(-1, 3))
         floor = scale.copy()
@@ -144,8 +149,8 @@ class Stretch:
         while why == solvers.PAUSED:
             before = taken
             why, tau, h, guard, taken = solver(
-                motion, start, tau, h, self.until - start, here, times, taken, samples, LOCAL * self.relative,
-                LOCAL * self.absolute * scale, np.array(self._arm), level, slips, unit, *more,
+                motion, start, tau, h, self.until - start, here, times, taken, samples, rtol,
+                rtol / FINER * scale, np.array(self._arm), level, slips, unit, *more,
             )  # fmt: skip
             if why == solvers.STUCK or not np.isfinite(here).all():
                 raise StalledError(f"steps become too short in case {Case(chart.motion.case).name}")

@@ -34,9 +34,9 @@ DONE, FIRED, OTHER, STUCK, PAUSED = range(5)
 """Why they return: at the end, at a guard, as the other one should go on, with steps too short, for a breath."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 """Of the length of a step: below what its error allows; and by how much it may change."""
-LOOKS = 4
+LOOKS_A_STEP = 4
 """How often in a step guards are looked at."""
-HALVINGS = 200
+ROOT_STEPS = 200
 COLUMNS, USUAL = 10, 6
 """Most columns of an extrapolation, and how many steps aim at."""
 EPS = math.ulp(1.0)
@@ -81,7 +81,7 @@ def _root(
     if below >= 0:
         return high
     stays = 0
-    for n in range(HALVINGS):
+    for n in range(ROOT_STEPS):
         if high - low <= 4 * EPS * max(high, abs(t / h)):
             break
         x = (low * below - high * above) / (below - above)
@@ -126,7 +126,7 @@ def explicit(
     """
     n, slow, rejected = len(z), 0, False
     K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
-    new, now, values, seen = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty((LOOKS + 1, len(arm)))
+    new, now, values, seen = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty((LOOKS_A_STEP + 1, len(arm)))
     equations.rates(start + tau, z, k, K[0])
     if h <= 0:  # by the size of the rates
         rate = 0.0
@@ -187,12 +187,14 @@ def explicit(
                     value += D[j, s] * K[s, i]
                 F[3 + j, i] = h * value
         fired, end = -1, 2.0
-        for look in range(LOOKS + 1):
-            _between(look / LOOKS, z, F, now)
-            equations.guards(start + (tau + look / LOOKS * h), new if look == LOOKS else now, k, seen[look])
+        for look in range(LOOKS_A_STEP + 1):
+            _between(look / LOOKS_A_STEP, z, F, now)
+            equations.guards(
+                start + (tau + look / LOOKS_A_STEP * h), new if look == LOOKS_A_STEP else now, k, seen[look]
+            )
         for guard in range(len(arm)):
-            for look in range(1, LOOKS + 1):
-                share = look / LOOKS
+            for look in range(1, LOOKS_A_STEP + 1):
+                share = look / LOOKS_A_STEP
                 if seen[look, guard] > arm[guard]:
                     level[guard] = 0.0
                 lowest = share
@@ -201,14 +203,18 @@ def explicit(
                     bend = one - 2 * two + three
                     away = (one - three) / (2 * bend) if bend > 0 else 2.0
                     if abs(away) < 1 and two - bend * away * away / 2 < level[guard] + bend:
-                        lowest = share + (away - 1) / LOOKS
+                        lowest = share + (away - 1) / LOOKS_A_STEP
                         _between(lowest, z, F, now)
                         equations.guards(start + (tau + lowest * h), now, k, values)
                         if not values[guard] < level[guard]:
                             lowest = share
                 if lowest < share or seen[look, guard] < level[guard]:
                     high = min(lowest, share)
-                    low = max(share - 1 / LOOKS, 0.0) if high > share - 1 / LOOKS else max(share - 2 / LOOKS, 0.0)
+                    low = (
+                        max(share - 1 / LOOKS_A_STEP, 0.0)
+                        if high > share - 1 / LOOKS_A_STEP
+                        else max(share - 2 / LOOKS_A_STEP, 0.0)
+                    )
                     root = _root(guard, level[guard], low, high, start + tau, h, k, z, F, now, values)
                     if root < end:
                         fired, end = guard, root

@@ -40,7 +40,7 @@ HELD = 2**17
 """Most samples of a batch, some 20 MB, three times that while it is stored; a run with more is written as it comes."""
 READ = 2**18
 """Samples of new runs, and of those read last, that are held in memory, some 45 MB: most are looked at soon after."""
-SHORT = 10.0
+SOON_DONE = 10.0
 """Processor time of a batch, s, that isn't worth a file where runs are removed as soon as they are measured."""
 FAILURES = "failures.json"
 Save = Callable[[Mapping[str, Trajectory], Path], None]
@@ -73,7 +73,7 @@ class Campaign:
     label : what the names of new files begin with, see `reduce`
     save : writes the whole runs of a batch, by key, to a file
     looked_at : whether runs are: new ones are then in memory at first
-    passing : whether `reduce` removes most: batches of less than `SHORT` are then stored only if memory is short
+    passing : whether `reduce` removes most: batches of less than `SOON_DONE` are then stored only if memory is short
     """
 
     directory: Path
@@ -216,7 +216,7 @@ class Campaign:
         pending: dict[Future[list[Ended]], tuple[Task, ...]] = {}
         again: deque[Task] = deque()
         died: Counter[str] = Counter()
-        how = self.save, self.looked_at, SHORT if self.passing else 0.0
+        how = self.save, self.looked_at, SOON_DONE if self.passing else 0.0
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
             batches = list(itertools.islice(fresh, 2 * self._workers.count - len(pending)))

@@ -102,6 +102,8 @@ def one(geom: str, mu: float = 0.6, slope: float = 0.0, height: float = 0.05, st
     )
 
 
+LONG = "heap of 216", "at rest, 1000"
+"""Scenes that are measured with soft contacts only: others take half an hour."""
 BOX, BALL = '<geom type="box" size=".05 .05 .05" mass="1"/>', '<geom type="sphere" size=".05" mass="1"/>'
 FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
 
@@ -228,9 +230,9 @@ def costs() -> Rows:
     }
     rows = [["cost of a step", *ways, "soft, no numba"]]
     for name, measure in scenes.items():
-        found = [f"{measure(way):.2f}" for way in ways.values()]
+        found = [f"{measure(way):.2f}" if not name.startswith(LONG) or way is SOFT else "–" for way in ways.values()]
         with mock.patch.object(doors, "kernels", formulas):
-            rows.append([name, *found, f"{measure(SOFT):.2f}"])
+            rows.append([name, *found, f"{measure(SOFT):.2f}" if not name.startswith(LONG) else "–"])
     return rows
 
 
@@ -344,16 +346,12 @@ def choices() -> Rows:
 
     laws: dict[str, dict[str, Any]] = {
         "**soft**: slip foreseen to a twentieth of gravity": {},
-        "to a fifth": {"share": 0.2},
         "to a hundredth": {"share": 0.01},
         "foreseen, never solved for": {"most": 0},
         "at most 5 solutions": {"most": 5},
         "**rigid**: R = 1e-3": {"rigid": True},
-        "R = 1e-2": {"rigid": True, "softness": 1e-2},
-        "R = 1e-4": {"rigid": True, "softness": 1e-4},
         "foreseen to a hundredth": {"rigid": True, "share": 0.01},
         "loses all its depth in a step": {"rigid": True, "push": 1.0},
-        "loses none": {"rigid": True, "push": 0.0},
         "keeps none": {"rigid": True, "depth": 0.0},
     }
     return [
