@@ -1,14 +1,19 @@
-"""``python -m tests.benchmarks``: speed, as ratios within one run.
+"""``python -m tests.benchmarks``: speed, as ratios within one run, which depend less on the machine than times do.
 
-They depend less on the machine and its load than times do.
+With ``--page docs/campaigns.md`` they are written there; and with ``--growth`` the table of sweeps of 1000 to 100 000
+runs, which takes some minutes.
 """
 
 from __future__ import annotations
 
+import argparse
 import functools
 import importlib.util
 import math
+import os
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,12 +25,16 @@ import numpy as np
 from mujoco.batch import Batch
 from rich.console import Console
 
+import mjsim
 from analytic import stable_solutions
 from compare.kit import pages
 from compare.kit.campaign import Campaign, run_batch
 from compare.kit.engines import MUJOCO
+from compare.kit.pages import Rows
+from compare.kit.sweep import MOST
 from compare.kit.tasks import Task, carry_out
 from compare.kit.workers import Workers, dask, processes
+from docs.studies.tables import write
 from mjsim import scene
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
@@ -41,20 +50,114 @@ SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 
 
 def main() -> None:
-    """Measure the loop over bare steps, alone and in a batch; then campaigns. Show it as a table."""
+    """Measure; show the tables, or write them into a page."""
+    parser = argparse.ArgumentParser(description="Measure speed, as ratios within one run.")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="write the tables there")
+    parser.add_argument("--growth", action="store_true", help="also sweeps of up to 100 000 runs")
+    args = parser.parse_args()
+    measured = {"costs": costs, "start": start_up} | ({"growth": growth} if args.growth else {})
+    for name, rows in measured.items():
+        if args.page:
+            write(args.page, name, rows())
+        else:
+            Console().print(pages.table(name, rows()))
+
+
+def costs() -> Rows:
+    """The loop over bare steps, alone and in a batch; threads; campaigns."""
     rows = [["", "bare mj_step", "whole loop", "ratio"]]
     for name, runs in (("one simulation", 1), (f"batch of {BATCH}", BATCH)):
         bare, whole, ratio = cost(runs)
         rows.append([name, f"{1e6 * bare:.2f} µs", f"{1e6 * whole:.2f} µs", f"{ratio:.2f}"])
+    two_threads, threads_limit = threads()
     two_over_one, machine, dask_over_processes = throughputs()
-    rows += [
+    return [
+        *rows,
+        [f"simulate_many of {4 * BATCH}: two threads against one", "", "", f"{two_threads:.2f}"],
+        ["two processes of bare arithmetic at that time: the machine's limit", "", "", f"{threads_limit:.2f}"],
         ["campaign: two processes against one", "", "", f"{two_over_one:.2f}"],
         ["the same of bare arithmetic: the machine's limit", "", "", f"{machine:.2f}"],
         ["campaign: two Dask workers against two processes", "", "", f"{dask_over_processes:.2f}"],
         ["campaign: bookkeeping of a task", "", f"{1e3 * bookkeeping():.1f} ms", ""],
         [f"campaign: resuming {FINISHED} finished tasks", "", f"{resuming():.1f} s", ""],
     ]
-    Console().print(pages.table("Cost of the study's loop", rows))
+
+
+def threads() -> tuple[float, float]:
+    """Speed of two threads of `mjsim.simulate_many` divided by that of one, and what the machine allows two processes;
+    of the turn in which it allowed most, since other programs take their share."""
+    count = 4 * BATCH
+    sets = [SLIPPING.replace(omega_0=15 + 10 * k / count) for k in range(count)]
+    given = sets, [State()] * count, 2.0
+
+    def many(number: int) -> float:
+        return _seconds(functools.partial(mjsim.simulate_many, *given, sample_interval=0.2, threads=number))
+
+    many(2)
+    turns = []
+    for _ in range(REPEATS):
+        before, one, two = _limit(), many(1), many(2)
+        turns.append((min(before, _limit()), one / two))
+    limit, ratio = max(turns)
+    return ratio, limit
+
+
+def _limit() -> float:
+    """Speed of two processes of bare arithmetic divided by that of one."""
+    loop = [sys.executable, "-c", f"for _ in range({COUNT}): pass"]
+
+    def run(number: int) -> None:
+        for each in [subprocess.Popen(loop) for _ in range(number)]:
+            each.wait()
+
+    return 2 * _seconds(functools.partial(run, 1)) / _seconds(functools.partial(run, 2))
+
+
+def start_up() -> Rows:
+    """Processor time until commands have answered, beside that of importing MuJoCo."""
+    program = [sys.executable, "-m", "compare"]
+    asked = {
+        "import mujoco": [sys.executable, "-c", "import mujoco"],
+        "import mjsim": [sys.executable, "-c", "import mjsim"],
+        "dualball --version": [*program, "--version"],
+        "dualball --help": [*program, "--help"],
+        "dualball predict": [*program, "predict"],
+        "dualball cases": [*program, "cases"],
+    }
+    took = {name: min(_spent(words)[0] for _ in range(REPEATS)) for name, words in asked.items()}
+    first = took["import mujoco"]
+    return [
+        ["", "processor time", "by import mujoco"],
+        *([name, f"{own:.2f} s", f"{own / first:.2f}"] for name, own in took.items()),
+    ]
+
+
+def growth() -> Rows:
+    """What a run of 0.1 s takes in sweeps of more and more of them, of which only means are stored."""
+    rows = [["runs", "sweep: processor time", "memory", "on the disk", "collect: processor time", "memory"]]
+    with tempfile.TemporaryDirectory() as directory:
+        for count in (1000, 10_000, MOST):
+            runs, table = Path(directory) / str(count), Path(directory) / f"{count}.h5"
+            vary = f"sweep --vary omega_0=5:45:{count} --time 0.1 --means-only --quiet --workers 0 -o {runs}"
+            taken = [
+                _spent([sys.executable, "-m", "compare", *words.split()])
+                for words in (vary, f"collect {runs} -o {table} --workers 0")
+            ]
+            size = sum(file.stat().st_size for file in runs.iterdir())
+            (sweep, held), (gather, kept) = taken
+            costs = f"{1e3 * sweep / count:.2f} ms a run", f"{held:.0f} MB", f"{size / count / 1e3:.2f} kB a run"
+            rows.append(
+                [f"{count:,}".replace(",", " "), *costs, f"{1e3 * gather / count:.2f} ms a run", f"{kept:.0f} MB"]
+            )
+    return rows
+
+
+def _spent(words: list[str]) -> tuple[float, float]:
+    """Processor time, s, and largest memory, MB, of a program."""
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    assert status == 0, words
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
 def cost(runs: int, steps: int = 2500) -> list[float]:

@@ -36,8 +36,8 @@ from model.versions import current_versions
 
 BATCH = 64
 """Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
-HELD = 2**17
-"""Most samples of a batch, some 20 MB, three times that while it is stored; a run with more is written as it comes."""
+HELD = 2**16
+"""Most samples of a batch, some 11 MB, three times that while it is stored; a run with more is written as it comes."""
 READ = 2**18
 """Samples of new runs, and of those read last, that are held in memory, some 45 MB: most are looked at soon after."""
 SOON_DONE = 10.0
