@@ -268,8 +268,8 @@ def simulate_many(
     """Simulate many runs at once, in this process; arguments as in `simulate`.
 
     `flow` is one for all, one for each, or None for each one's own omega_0. Each thread steps a MuJoCo batch of its
-    share of the runs; None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the same to the bit
-    whatever the number. A run that breaks down has a header that says so; the others go on.
+    share of the runs; None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the same to the
+    bit whatever the number. A run that breaks down has a header that says so; the others go on.
 
     Raises
     ------

@@ -168,7 +168,9 @@ def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
     return np.asarray((stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...])
 
 
-def write_columns(file: h5py.File, columns: Mapping[str, Sequence[Any]], scale: str) -> dict[str, h5py.Dataset]:
+def write_columns(
+    file: h5py.File, columns: Mapping[str, Sequence[Any] | npt.NDArray[Any]], scale: str
+) -> dict[str, h5py.Dataset]:
     """Write columns (n,) of numbers or of text, of which the first, `scale`, is the scale of their dimension."""
     written = {}
     for name, values in columns.items():

@@ -8,6 +8,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from compare.commands import options, running, signals
 from compare.kit import campaign, collection, sweep
@@ -84,7 +85,7 @@ def grid(args: argparse.Namespace) -> int:
     else:
         sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
-    how = {"looked_at": False, "save": collection.save_means if args.means_only else storage.save_batch}
+    how: dict[str, Any] = {"looked_at": False, "save": collection.save_means if args.means_only else storage.save_batch}
     with running.campaign(args, "sweep", batch=args.batch, **how) as work:
         _keep_apart(args, p)
         failures = work.complete(tasks)
