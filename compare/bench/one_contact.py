@@ -25,8 +25,8 @@ CLOSED = 1e-14
 SPEED_ALONE = (math.inf, 0.01, math.inf)
 """Scales of a body that must not move: a creep of 0.1 mm/s passes, and how far it sinks into its floor is left out."""
 _UP = np.array([0.0, 0.0, 1.0])
-Course = Callable[..., tuple[Array, Array, Array]]
-"""Position, velocity and spin, each (n, 3), at times (n,)."""
+Course = Callable[..., tuple[Array, ...]]
+"""Position, velocity and spin, each (n, 3), at times (n,); then those of a body under the first."""
 
 
 def cases() -> tuple[Case, ...]:
@@ -46,6 +46,7 @@ def closed(
     scales: tuple[float, float, float],
     contacts: Callable[[float], str],
     source: str,
+    under: Mapping[str, Any] | None = None,
     **forces: Any,
 ) -> Case:
     """A case whose course is a closed form, sampled 25 times; `wrong` are other constants of the course."""
@@ -58,7 +59,8 @@ def closed(
     return Case(
         name=name,
         about=about,
-        body=Body(*start, **body),
+        body=Body(*start[:3], **body),
+        under=under and Body(*start[3:], **under),
         surfaces=surfaces,
         times=times,
         exact=states(),

@@ -68,7 +68,7 @@ class Dart(Free):
             joint.setCommand(0, turning)
         self.world.step()
 
-    def state(self) -> State:
+    def read(self) -> State:
         return self.node.getCOM(), self.node.getLinearVelocity(), self.node.getAngularVelocity()
 
     def push(self, force: Vector) -> None:

@@ -47,7 +47,7 @@ class Rapier(Free):
     def advance(self) -> None:
         self.world.step()
 
-    def state(self) -> State:
+    def read(self) -> State:
         body = self.world.rigid_bodies[self.body]
         position, velocity, spin = ([v.x, v.y, v.z] for v in (body.translation, body.linvel, body.angvel))
         return position, velocity, spin
