@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import analytic
-from compare.bench import one_contact
+from compare.bench import mechanisms, one_contact
 from compare.bench.case import TOLERANCE, VERSION, Body, Case, Surface
 from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
 from model import Parameters, State, Trajectory
@@ -37,7 +37,7 @@ BOUND = 1e-10
 @cache
 def cases() -> tuple[Case, ...]:
     """All of them: those with one contact first."""
-    return (*one_contact.cases(), *_grooves(), *_vessel())
+    return (*one_contact.cases(), *_grooves(), *_vessel(), *mechanisms.cases())
 
 
 def write(directory: Path) -> None:

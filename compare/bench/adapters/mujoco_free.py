@@ -18,6 +18,8 @@ from model.arrays import Array
 FEATURES = ("two bodies", "moving surface", "dry joint", "tripod")
 HEAVY = 1e6
 """Mass of a wall that moves divided by that of the body, which it doesn't feel."""
+SOLIMP = 0.999
+"""Impedance of dry friction in joints: an engine's own bears a share 1 - d less than it should."""
 WALL = 2.0
 """Half edges of the piece of wall that goes with the body, in radii: what rolls on a wall of the size of the body is
 told from what stays where it is."""
@@ -111,8 +113,10 @@ def studied(spec: Any, case: Case, timestep: float) -> None:
 
 
 def rigid(spec: Any, case: Case, timestep: float) -> None:
-    """An elliptic cone, solved to round-off; a piece of wall that moves in the place of facets."""
+    """An elliptic cone, solved to round-off; dry joints that stop within a step; a piece of wall that moves for facets."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
+    for joint in spec.joints:
+        joint.solref_friction, joint.solimp_friction = (-1.0, -SOLIMP / timestep), (SOLIMP, SOLIMP, 1.0, 0.5, 2.0)
     for surface in case.surfaces:
         if not surface.radius:
             continue
