@@ -254,7 +254,7 @@ def _rocking() -> Case:
         (Surface("floor", 1.0),),
         rocks,
         {"nothing is lost in a blow": {"kept": 1.0}, "inertia of a point": {"moment": arm**2}},
-        until=1.0,
+        until=0.8,
         scales=(0.2, 1.0, 1.0),
         contacts=lambda t: "T",
         source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, moments of momentum at the new edge",
