@@ -1,4 +1,4 @@
-"""The set of exact cases: those with two contacts, all of them, and all as files for engines that don't speak Python.
+"""The set of exact cases: those of a body in two surfaces, all, and all as files for engines that don't speak Python.
 
 Two contacts have bodies in a straight groove, in closed form, and the study's ball on floor and wall. The ball's motion
 is that of `analytic.simulate`, event-driven, at its sharpest; its wrong answers are the motions of other parameters.
@@ -36,7 +36,7 @@ BOUND = 1e-10
 
 @cache
 def cases() -> tuple[Case, ...]:
-    """All of them: those with one contact first."""
+    """All of them: those of version 1 first, of these those with one contact."""
     return (*one_contact.cases(), *_grooves(), *_vessel(), *mechanisms.cases())
 
 
@@ -44,9 +44,8 @@ def write(directory: Path) -> None:
     """JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises `StorageError`."""
     make_directory(directory)
     check_ours(directory / "README.md", beside=directory / "cases.h5")
-    count = [len(case.surfaces) for case in cases()]
     said = {"version": VERSION, "tolerance": TOLERANCE, "dualball": current_versions()["dualball"]}
-    said |= {"count": len(count), "one": count.count(1), "two": count.count(2)}
+    said |= {"count": len(cases()), "new": sum(bool(case.needs) for case in cases())}
     with WholeFile(directory / "cases.h5") as whole:
         file = whole.file
         file.attrs.update({"schema": "dualball-cases", "version": VERSION, "tolerance": TOLERANCE})
@@ -59,7 +58,7 @@ def write(directory: Path) -> None:
             group["time"], group["exact"] = case.times, case.exact
             group["contacts"] = np.array(case.contacts, dtype="S")
             group["time"].attrs["units"] = "s"
-            group["exact"].attrs["columns"] = "position (m), velocity (m s-1), spin (rad s-1)"
+            group["exact"].attrs["columns"] = "position (m), velocity (m s-1), spin (rad s-1), of each body"
         whole.finish()
     write_text(directory / "README.md", README.read_text("utf-8").format(**said))
 
