@@ -248,13 +248,17 @@ class Case:
         return np.array([[letter in letters for letter in sample] for sample in self.contacts])
 
     def mjcf(self, timestep: float = 1e-3) -> str:
-        """The scene for MuJoCo with all of its contact parameters as they come; `force` and restitution are not in it."""
-        parts, qpos, qvel = [], [], []
+        """The scene for MuJoCo with all of its contact parameters as they come; it lacks `force` and restitution."""
+        parts: list[str] = []
+        qpos: list[float] = []
+        qvel: list[float] = []
         for surface, name, point, normal in self.planes(FACETS):
             moves = (*_into(upright(normal), np.array(surface.velocity)), 0.0, 0.0, surface.turning)
             pose = f'pos="{_text(point)}" quat="{_text(upright(normal))}"'
             belt = f'surfacevel="{_text(moves)}" ' if any(moves) else ""
-            parts.append(f'<geom name="{name}" type="plane" size="0 0 1" {pose} {belt}friction="{surface.friction} 0 0"/>')
+            parts.append(
+                f'<geom name="{name}" type="plane" size="0 0 1" {pose} {belt}friction="{surface.friction} 0 0"/>'
+            )
         for name, body in reversed([*zip(("body", "under"), self.bodies, strict=False)]):
             joint = f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>' if self.joint else ""
             shape, size = ("sphere", body.size[:1]) if body.shape == "tripod" else (body.shape, body.size)
@@ -271,7 +275,9 @@ class Case:
             free = [*body.position, *body.orientation], [*body.velocity, *_into(body.orientation, body.spin)]
             start = ([0.0], [float(np.dot(self.joint, body.velocity))]) if self.joint else free
             qpos, qvel = qpos + start[0], qvel + start[1]
-        pair = f'<pair geom1="under" geom2="body" friction="{self.between} {self.between} 0 0 0"/>' if self.under else ""
+        pair = (
+            f'<pair geom1="under" geom2="body" friction="{self.between} {self.between} 0 0 0"/>' if self.under else ""
+        )
         return f"""<mujoco model="{self.name}">
   <option timestep="{timestep}" gravity="0 0 {-self.g}"/>
   <worldbody>

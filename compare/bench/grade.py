@@ -36,7 +36,8 @@ from model.kinematics import slip_speeds
 GOOD_SPEED = 1e-4
 """Creep up to which a number is shown as good, m/s."""
 CAPTION = (
-    "dualball: rigid contacts under Coulomb's law (mjsim.Coulomb). MuJoCo: its defaults, the ball in the vessel in the study's scene. "
+    "dualball: free bodies, rigid contacts under Coulomb's law. "
+    "MuJoCo: its defaults, the ball in the vessel in the study's scene. "
     "mujoco-defaults: as it comes, a free ball in a wall of flat facets."
 )
 Cell = tuple[str, bool | None]

@@ -87,7 +87,11 @@ def measure(
 def kind(case: Case) -> str:
     """What a case is about: landing if a contact closes, else sticking if the body rests, sliding if it slips."""
     alike = zip(*case.contacts, strict=True)
-    if "restitution" in case.needs or "T" in case.contacts or any("N" in letters and set(letters) != {"N"} for letters in alike):
+    if (
+        "restitution" in case.needs
+        or "T" in case.contacts
+        or any("N" in letters and set(letters) != {"N"} for letters in alike)
+    ):
         return "landing"
     if (abs(case.exact[:, 3:]).max(axis=1) == 0).any():
         return "sticking"

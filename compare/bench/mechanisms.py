@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk, ellipkinc
 
 from compare.bench.case import Case, Surface
-from compare.bench.one_contact import G, SPEED_ALONE, along, block, closed, slope, sphere
+from compare.bench.one_contact import SPEED_ALONE, G, along, block, closed, slope, sphere
 from model.arrays import Array
 
 _UP, _WAY = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -52,6 +52,7 @@ def _tripod() -> Case:
 
         start, end = np.array([0.0, 0.0, 0.0, speed, 0.0, spin]), float(max(t[-1], 1e-3))
         found = solve_ivp(rates, (0.0, end), start, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True)
+        assert found.sol is not None
         x, y, _, v_x, v_y, turning = found.sol(t)
         none = 0 * t
         place = np.stack([x, y, none + foot + down], axis=1)
@@ -238,12 +239,10 @@ def _rocking() -> Case:
             angle[own], rate[own] = side * (psi - math.pi + alpha), -side * 2 * p * k * cn
             done |= own
             begin, side, first = peak + quarter, -side, False
-            height = math.cos(alpha) + kept**2 * (math.cos(alpha - top) - math.cos(alpha))  # of the centre, divided by arm
-            top = alpha - math.acos(height)
-        side = np.sign(angle)
-        tilt = side * alpha - angle  # of the way from the edge to the centre, from the vertical
-        edge = side * half_x
-        place = np.stack([edge - arm * np.sin(tilt), 0 * t, arm * np.cos(tilt)], axis=1)
+            risen = kept**2 * (math.cos(alpha - top) - math.cos(alpha))  # of the centre, divided by arm
+            top = alpha - math.acos(math.cos(alpha) + risen)
+        tilt = np.sign(angle) * alpha - angle  # of the way from the edge to the centre, from the vertical
+        place = np.stack([np.sign(angle) * half_x - arm * np.sin(tilt), 0 * t, arm * np.cos(tilt)], axis=1)
         velocity = np.stack([arm * np.cos(tilt) * rate, 0 * t, arm * np.sin(tilt) * rate], axis=1)
         return place, velocity, np.outer(rate, [0.0, 1.0, 0.0])
 
@@ -257,7 +256,7 @@ def _rocking() -> Case:
         until=0.8,
         scales=(0.2, 1.0, 1.0),
         contacts=lambda t: "T",
-        source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, moments of momentum at the new edge",
+        source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, momentum about the new edge",
     )
 
 
@@ -288,4 +287,3 @@ def _bounce() -> Case:
         contacts=lambda t: "N",
         source="Newton's law of restitution, parabolas between",
     )
-

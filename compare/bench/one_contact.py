@@ -60,7 +60,7 @@ def closed(
         name=name,
         about=about,
         body=Body(*start[:3], **body),
-        under=under and Body(*start[3:], **under),
+        under=Body(*start[3:], **under) if under else None,
         surfaces=surfaces,
         times=times,
         exact=states(),

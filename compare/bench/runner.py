@@ -5,11 +5,11 @@ An engine is anything with three functions, a module most simply:
 * ``build(case, timestep)`` makes the scene of a `Case` anew, its body at the start;
 * ``step(n)`` takes n steps of that length, setting ``case.force(t, position, velocity)`` before each where
   ``case.forced``;
-* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and world axes; then those
-  of the second body, if there is one.
+* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and world axes, then
+  those of the one under it, if there is one.
 
-``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. Cases that need what
-version 1 of them had not (`Case.needs`) are given to an engine only if its ``FEATURES`` name that. It may say of itself:
+``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It is not asked for
+cases that need what version 1 of them had not (`Case.needs`) unless its ``FEATURES`` name that. It may say of itself:
 ``NAME``, ``PRECISION`` (``f64`` or ``f32``), ``DECLARED`` (in words, all that isn't a free body in plain geometry under
 the engine's own settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
 `TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``).
@@ -182,7 +182,9 @@ class EngineProcess:
         if about.missing:
             return replace(found, skipped=about.missing)
         if lacking := [need for need in case.needs if need not in about.features]:
-            return replace(found, skipped=f"{about.name} doesn't say in FEATURES that it can do this: {', '.join(lacking)}")
+            return replace(
+                found, skipped=f"{about.name} doesn't say in FEATURES that it can do this: {', '.join(lacking)}"
+            )
         runs: list[tuple[Array | None, float, str]] = []
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:

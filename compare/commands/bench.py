@@ -98,7 +98,8 @@ def listed(args: argparse.Namespace) -> int:
             "surfaces": "\n".join(map(_fields, chosen.surfaces)),
             "joint": f"along {_numbers(chosen.joint)}, dry friction {chosen.dry:g} N" if chosen.joint else "",
             "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull {_numbers(chosen.pull)} N, growth "
-            f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s, spring {chosen.spring:g} N/m",
+            f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s, "
+            f"spring {chosen.spring:g} N/m",
             "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); inf: not compared",
             "source": f"{chosen.source}; error below {chosen.bound:g}",
             "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),

@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 import analytic
 from compare.bench import cases
-from compare.bench.case import TIME_STEPS, TOLERANCE, reach
+from compare.bench.case import TIME_STEPS, TOLERANCE
+from compare.bench.case import reach as reached
 from model import Case as Kinds
 
 ALL = pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
@@ -85,7 +86,7 @@ def newton(case, letters):
                 normal = -np.array([x[0], x[1], 0.0]) / rho
                 turn = np.cross(UP, normal)
                 curvature = (x[3:6] @ turn) ** 2 / rho  # of the centre's path along the wall
-            yield surface, letter, normal, curvature, float(reach(body, normal[None])[0])
+            yield surface, letter, normal, curvature, float(reached(body, normal[None])[0])
 
     def unaccelerated(x, forces, t):
         """Accelerations of centre and spin under forces at the contacts."""

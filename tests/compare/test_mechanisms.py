@@ -238,7 +238,10 @@ def test_files_of_cases_are_read_whatever_their_version(tmp_path, capsys):
     (old := tmp_path / "old.json").write_text(json.dumps(data))
     assert read(old).bodies == CASES["box-stops"].bodies
     for change, says in (
-        ({"version": VERSION + 1}, f"is of version {VERSION + 1} of the exact cases; this program reads 1 to {VERSION}"),
+        (
+            {"version": VERSION + 1},
+            f"is of version {VERSION + 1} of the exact cases; this program reads 1 to {VERSION}",
+        ),
         ({"schema": "dualball-trajectory"}, "is no exact case: its schema is 'dualball-trajectory'"),
     ):
         (other := tmp_path / "other.json").write_text(json.dumps(data | change))

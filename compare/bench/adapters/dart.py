@@ -37,7 +37,10 @@ class Dart(Free):
         for surface, name, point, normal in self.planes():
             skeleton = bodies.Skeleton(name)
             if rate := surface.turning or math.hypot(*surface.velocity):
-                turns, slides = skeleton.createRevoluteJointAndBodyNodePair, skeleton.createPrismaticJointAndBodyNodePair
+                turns, slides = (
+                    skeleton.createRevoluteJointAndBodyNodePair,
+                    skeleton.createPrismaticJointAndBodyNodePair,
+                )
                 joint, node = turns() if surface.turning else slides()
                 joint.setAxis([0.0, 0.0, 1.0] if surface.turning else np.array(surface.velocity) / rate)
                 joint.setActuatorType(bodies.ActuatorType.VELOCITY)

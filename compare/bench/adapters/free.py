@@ -32,9 +32,9 @@ class Free(ABC):
     FEATURES: tuple[str, ...] = ()
     """Of `Case.needs`, what it can do."""
     AHEAD = 0.5
-    """Share of a step by which the positions that its contacts and forces belong to are ahead of velocities. Semi-implicit
-    steps are leapfrog, of second order, once one says so: in the best settings the body starts so far on, and what is
-    read of it is taken back."""
+    """Share of a step by which positions, where contacts and forces are found, are ahead of velocities. Semi-implicit
+    steps are leapfrog, of second order, once one says so: in the best settings bodies start so far on, and what is read
+    of them is taken back."""
 
     def __init__(self, name: str, note: str, best: str = "") -> None:
         """`note`: what is worst, and why; `best` declares settings other than the engine's own; empty for those."""
@@ -62,7 +62,11 @@ class Free(ABC):
                     self.push(case.force(self.now, position, velocity))
                 for surface in case.surfaces if turns else ():
                     if surface.radius:
-                        self.turn(*tangent(surface.radius, math.atan2(position[1], position[0])))
+                        # Halfway through the step: then its way is a chord of the cylinder.
+                        x, y = (
+                            at + self.timestep / 2 * rate for at, rate in zip(position[:2], velocity[:2], strict=True)
+                        )
+                        self.turn(*tangent(surface.radius, math.atan2(y, x)))
             self.advance()
             self.now += self.timestep
 
@@ -96,4 +100,3 @@ class Free(ABC):
     def turn(self, point: Array, normal: Array) -> None:
         """Move the plane that stands for the cylinder."""
         raise NotImplementedError("its planes can't be moved")
-

@@ -1,4 +1,4 @@
-"""MuJoCo with free bodies in a case's own MJCF, as it comes, with settings, or under Coulomb's law with rigid contacts."""
+"""MuJoCo with free bodies in a case's own MJCF: as it comes, with settings, or under Coulomb's law."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ told from what stays where it is."""
 class Bodies(Free):
     """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step."""
 
-    FEATURES = FEATURES
+    FEATURES: tuple[str, ...] = FEATURES
 
     def __init__(
         self, name: str, note: str, best: str = "", tune: Callable[[Any, Case, float], None] | None = None
@@ -82,11 +82,13 @@ class Lawful(Bodies):
 
     def turn(self, point: Array, normal: Array) -> None:
         (x, y, z), velocity, spin = self.read()
-        out, half, wall = -normal, self.timestep / 2, self.model.body("wall")
-        rate, azimuth = (x * velocity[1] - y * velocity[0]) / (x * x + y * y), math.atan2(y, x)
-        wall.pos, wall.quat = [*point[:2], z], [math.cos(azimuth / 2), 0.0, 0.0, math.sin(azimuth / 2)]
+        rho, half, wall = math.hypot(x, y), self.timestep / 2, self.model.body("wall")
+        out, azimuth = np.array([x / rho, y / rho, 0.0]), math.atan2(y, x)
+        rate = (out[0] * velocity[1] - out[1] * velocity[0]) / rho
+        wall.pos = np.hypot(*point[:2]) * out + [0.0, 0.0, z]
+        wall.quat = math.cos(azimuth / 2), 0.0, 0.0, math.sin(azimuth / 2)
         self.data.qpos[-2:] = 0.0
-        self.data.qvel[-2:] = half * rate**2 * math.hypot(x, y), -half * rate * self.case.body.size[0] * (spin @ out)
+        self.data.qvel[-2:] = half * rate**2 * rho, -half * rate * self.case.body.size[0] * (spin @ out)
 
 
 def pairs(spec: Any, case: Case) -> Iterator[tuple[str, Any]]:
@@ -113,7 +115,7 @@ def studied(spec: Any, case: Case, timestep: float) -> None:
 
 
 def rigid(spec: Any, case: Case, timestep: float) -> None:
-    """An elliptic cone, solved to round-off; dry joints that stop within a step; a piece of wall that moves for facets."""
+    """An elliptic cone, solved to round-off; dry joints that stop within a step; for facets a wall that moves."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
     for joint in spec.joints:
         joint.solref_friction, joint.solimp_friction = (-1.0, -SOLIMP / timestep), (SOLIMP, SOLIMP, 1.0, 0.5, 2.0)

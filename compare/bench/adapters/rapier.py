@@ -8,6 +8,7 @@ scalar; with `FrictionModel.COULOMB` a block on a plane has hardly any friction.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import rapier3d as engine
 
@@ -41,7 +42,7 @@ class Rapier(Free):
             self.wall = self.world.add_body(kind, [shape])  # the last one is the one that moves
         self.bodies = []
         for body, friction in zip(case.bodies, (1.0, case.between), strict=False):
-            shapes = []
+            shapes: list[Any] = []
             for at in body.parts.tolist():
                 box, ball = engine.Collider.cuboid, engine.Collider.ball
                 shape = (box(*body.size) if body.shape == "box" else ball(body.size[0])).translation(at).density(0.0)
