@@ -18,7 +18,7 @@ from compare.bench.one_contact import SPEED_ALONE, G, along, block, closed, slop
 from model.arrays import Array
 
 _UP, _WAY = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
-Motion = tuple[Array, ...]
+_Motion = tuple[Array, ...]
 
 
 def cases() -> tuple[Case, ...]:
@@ -32,7 +32,7 @@ def _tripod() -> Case:
     moments = (0.004, 0.004, 0.006)
     angles = math.tau / 3 * np.arange(3)
 
-    def courses(t: Array, mu: float = mu, height: float = foot + down, share: float = 1.0) -> Motion:
+    def courses(t: Array, mu: float = mu, height: float = foot + down, share: float = 1.0) -> _Motion:
         """Rates of (x, y, turn, v_x, v_y, spin): each foot bears what keeps the tripod from tilting.
 
         The loads N of three feet at p follow from sum N = m g and the two moments of weight and friction about the
@@ -90,7 +90,7 @@ def plate(mass: float, tilt: float = 0.0, size: tuple[float, float, float] = PLA
 def _stacks() -> list[Case]:
     above, below, speed, mass = 0.4, 0.1, 2.0, 2.0
 
-    def dragged(t: Array, above: float = above, below: float = below, load: float = 1.0) -> Motion:
+    def dragged(t: Array, above: float = above, below: float = below, load: float = 1.0) -> _Motion:
         """Block and plank: the block slows by mu g, and draws the plank until both go together, then stop.
 
         `load` is what of the block's weight the floor bears under the plank.
@@ -111,7 +111,7 @@ def _stacks() -> list[Case]:
     stop = meet + (speed - above * G * meet) / (below * G)
     tilt = math.atan(0.9 * 0.5)
 
-    def stays(t: Array, mu: float = 0.5) -> Motion:
+    def stays(t: Array, mu: float = 0.5) -> _Motion:
         way, normal = slope(tilt)
         a = max(G * (math.sin(tilt) - mu * math.cos(tilt)), 0.0)
         under, half = 0.1, 0.2
@@ -158,7 +158,7 @@ def _belt() -> Case:
     tilt, mu, belt, speed = math.atan(0.3), 0.5, 1.0, 0.8
     way, normal = slope(tilt)
 
-    def rides(t: Array, mu: float = mu, belt: float = belt) -> Motion:
+    def rides(t: Array, mu: float = mu, belt: float = belt) -> _Motion:
         """Down at first, slowed by g (mu cos - sin) until it goes up with the belt."""
         a = G * (mu * math.cos(tilt) - math.sin(tilt))
         slid = np.minimum(t, (speed + belt) / a)
@@ -183,7 +183,7 @@ def _belt() -> Case:
 def _joint() -> Case:
     stiffness, dry, start = 100.0, 4.0, 0.3
 
-    def swings(t: Array, dry: float = dry, stiffness: float = stiffness) -> Motion:
+    def swings(t: Array, dry: float = dry, stiffness: float = stiffness) -> _Motion:
         """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, until the spring can't overcome it."""
         rate, shift = math.sqrt(stiffness), dry / stiffness
         half = np.floor(t * rate / math.pi)
@@ -218,7 +218,7 @@ def _rocking() -> Case:
     body = plate(1.0, lean, size)
     about = body["inertia"][1] + arm**2
 
-    def rocks(t: Array, kept: float = 1 - arm**2 / about * (1 - math.cos(2 * alpha)), moment: float = about) -> Motion:
+    def rocks(t: Array, kept: float = 1 - arm**2 / about * (1 - math.cos(2 * alpha)), moment: float = about) -> _Motion:
         """A pendulum upside down about the edge it stands on: from rest at an angle to upright and, slower, beyond.
 
         With the angle psi of the centre from straight below the edge, psi = pi - alpha + lean, it is sin(psi/2) =
@@ -263,7 +263,7 @@ def _rocking() -> Case:
 def _bounce() -> Case:
     share, drop = 0.7, 1.8
 
-    def bounces(t: Array, share: float = share) -> Motion:
+    def bounces(t: Array, share: float = share) -> _Motion:
         """Parabolas: each blow leaves `share` of the speed."""
         speed, begin = math.sqrt(2 * G * drop), math.sqrt(2 * drop / G)
         z, v = drop - G * t**2 / 2, -G * t

@@ -16,11 +16,11 @@ from compare.bench.case import FACETS, Case, Vector
 from model.arrays import Array
 
 FEATURES = ("two bodies", "moving surface", "dry joint", "tripod")
-HEAVY = 1e6
+_HEAVY = 1e6
 """Mass of a wall that moves divided by that of the body, which it doesn't feel."""
-SOLIMP = 0.999
+_SOLIMP = 0.999
 """Impedance of dry friction in joints: an engine's own bears a share 1 - d less than it should."""
-WALL = 2.0
+_WALL = 2.0
 """Half edges of the piece of wall that goes with the body, in radii: what rolls on a wall of the size of the body is
 told from what stays where it is."""
 
@@ -118,15 +118,15 @@ def rigid(spec: Any, case: Case, timestep: float) -> None:
     """An elliptic cone, solved to round-off; dry joints that stop within a step; for facets a wall that moves."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
     for joint in spec.joints:
-        joint.solref_friction, joint.solimp_friction = (-1.0, -SOLIMP / timestep), (SOLIMP, SOLIMP, 1.0, 0.5, 2.0)
+        joint.solref_friction, joint.solimp_friction = (-1.0, -_SOLIMP / timestep), (_SOLIMP, _SOLIMP, 1.0, 0.5, 2.0)
     for surface in case.surfaces:
         if not surface.radius:
             continue
         for k in range(FACETS):
             spec.delete(spec.geom(f"{surface.name}{k}"))
-        own, half = spec.worldbody.add_body(name=surface.name), WALL * case.body.size[0]
+        own, half = spec.worldbody.add_body(name=surface.name), _WALL * case.body.size[0]
         for axis in ([-1, 0, 0], [0, 0, 1]):
-            own.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=HEAVY * case.body.mass)
+            own.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=_HEAVY * case.body.mass)
         box, friction = mujoco.mjtGeom.mjGEOM_BOX, [surface.friction, 0.0, 0.0]
         own.add_geom(name=surface.name, type=box, size=[half] * 3, pos=[half, 0, 0], friction=friction, mass=1e-9)
         spec.add_exclude(bodyname1="world", bodyname2=surface.name)

@@ -18,7 +18,7 @@ from model.kinematics import rotated
 warp.config.quiet = True
 
 
-WORST = (
+_WORST = (
     "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft friction creeps; "
     "nothing is seen of single precision beside that"
 )
@@ -33,7 +33,7 @@ class Warp(mujoco_free.Bodies):
     FEATURES = ("moving surface", "tripod")
 
     def __init__(self, name: str, declared: str, tune: Any = None) -> None:
-        super().__init__(name, WORST, tune=tune)
+        super().__init__(name, _WORST, tune=tune)
         self.DECLARED = declared
 
     def make(self) -> None:
