@@ -1,4 +1,4 @@
-"""The set of exact cases: those with two contacts, all of them, and all as files for engines that don't speak Python.
+"""The set of exact cases: those of a body in two surfaces, all, and all as files for engines that don't speak Python.
 
 Two contacts have bodies in a straight groove, in closed form, and the study's ball on floor and wall. The ball's motion
 is that of `analytic.simulate`, event-driven, at its sharpest; its wrong answers are the motions of other parameters.
@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import analytic
-from compare.bench import one_contact
-from compare.bench.case import TOLERANCE, VERSION, Answers, Body, Case, Surface
+from compare.bench import mechanisms, one_contact
+from compare.bench.case import TOLERANCE, VERSION, Body, Case, Surface
 from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
 from model import Parameters, State, Trajectory
 from model.arrays import Array
@@ -36,17 +36,16 @@ BOUND = 1e-10
 
 @cache
 def cases() -> tuple[Case, ...]:
-    """All of them: those with one contact first."""
-    return (*one_contact.cases(), *_grooves(), *_vessel())
+    """All of them: those of version 1 first, of these those with one contact."""
+    return (*one_contact.cases(), *_grooves(), *_vessel(), *mechanisms.cases())
 
 
 def write(directory: Path) -> None:
     """JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises `StorageError`."""
     make_directory(directory)
     check_ours(directory / "README.md", beside=directory / "cases.h5")
-    count = [len(case.surfaces) for case in cases()]
     said = {"version": VERSION, "tolerance": TOLERANCE, "dualball": current_versions()["dualball"]}
-    said |= {"count": len(count), "one": count.count(1), "two": count.count(2)}
+    said |= {"count": len(cases()), "new": sum(bool(case.needs) for case in cases())}
     with WholeFile(directory / "cases.h5") as whole:
         file = whole.file
         file.attrs.update({"schema": "dualball-cases", "version": VERSION, "tolerance": TOLERANCE})
@@ -59,7 +58,7 @@ def write(directory: Path) -> None:
             group["time"], group["exact"] = case.times, case.exact
             group["contacts"] = np.array(case.contacts, dtype="S")
             group["time"].attrs["units"] = "s"
-            group["exact"].attrs["columns"] = "position (m), velocity (m s-1), spin (rad s-1)"
+            group["exact"].attrs["columns"] = "position (m), velocity (m s-1), spin (rad s-1), of each body"
         whole.finish()
     write_text(directory / "README.md", README.read_text("utf-8").format(**said))
 
@@ -90,7 +89,6 @@ def _grooves() -> list[Case]:
         closed(
             "groove-rolls",
             "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
-            "rolling",
             sphere(),
             planes(gentle, 0.5),
             partial(descends, angle=gentle, size=0.1),
@@ -103,7 +101,6 @@ def _grooves() -> list[Case]:
         closed(
             "groove-rests",
             "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
-            "sticking",
             cube | {"orientation": orientation},
             planes(steep, 0.5),
             partial(descends, angle=steep, size=0.1, lever=math.inf),
@@ -127,29 +124,28 @@ def _vessel() -> list[Case]:
     hits = State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3)
     rides = State(y=0.1, v_y=0.1, omega_c=22.0, slip_x=5.0)
     return [
-        ball("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)", "rolling", SMOOTH, 12.0,
+        ball("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)", SMOOTH, 12.0,
              State(omega_c=8.0), 4.0, rolling),
         ball("from-rest", "from rest it slips on the wall, then rolls on both, ever faster (RS, RR)",
-             "sliding", SMOOTH, 12.0, State(), 8.0, rolling),
+             SMOOTH, 12.0, State(), 8.0, rolling),
         ball("slips-on-both", "slipping on floor and wall it comes to its stationary state (SS)",
-             "sliding", SMOOTH, 25.0, kicked, 2.0, slipping),
+             SMOOTH, 25.0, kicked, 2.0, slipping),
         ball("rides-the-wall", "the wall alone carries it, and it rolls there (NR)",
-             "rolling", ROUGH, 25.0, rides, 1.0, rolling),
+             ROUGH, 25.0, rides, 1.0, rolling),
         ball("onset-of-slip", "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
-             "sliding", SMOOTH, 20.0, State(omega_c=8.0), 3.0, slipping),
+             SMOOTH, 20.0, State(omega_c=8.0), 3.0, slipping),
         ball("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
-             "landing", SMOOTH, 12.0, lands, 0.5, landing),
+             SMOOTH, 12.0, lands, 0.5, landing),
         ball("hits-the-wall", "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
-             "landing", SMOOTH, 12.0, hits, 0.5, landing),
+             SMOOTH, 12.0, hits, 0.5, landing),
         ball("falls-in", "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
-             "landing", SMOOTH, 12.0, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, landing),
+             SMOOTH, 12.0, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, landing),
     ]  # fmt: skip
 
 
 def ball(
     name: str,
     about: str,
-    kind: str,
     p: Parameters,
     omega_0: float,
     x0: State,
@@ -170,22 +166,20 @@ def ball(
         changed = {key: factor * getattr(p, key) for key, factor in factors.items()}
         return run(p.replace(**changed), 1e-9, restitution)[0]
 
-    def answers() -> Answers:
-        exact, motion = run(p, SHARP)
-        contacts = tuple(case.name for case in motion.cases[1:])
-        return Answers(motion.time[1:], exact, contacts, {text: mistaken(**how) for text, how in wrong.items()})
-
+    exact, motion = run(p, SHARP)
     place, velocity, spin = (part.tolist() for part in to_world(x0, 0.0, p))
     return Case(
         name=name,
         about=f"a ball in a vessel: {about}",
-        kind=kind,
         body=Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3),
         surfaces=(Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)),
-        work_out=answers,
+        times=motion.time[1:],
+        exact=exact,
+        contacts=tuple(case.name for case in motion.cases[1:]),
         bound=BOUND,
         source=f"analytic.simulate, event-driven, rtol {SHARP:g}",
         scales=(p.R, p.R * omega_0, p.R * omega_0 / p.r),
+        wrong={text: mistaken(**how) for text, how in wrong.items()},
         g=p.g,
         drag=p.c,
         flow=omega_0,

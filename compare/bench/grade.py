@@ -20,7 +20,7 @@ from rich.text import Text
 
 import analytic
 from compare.bench import league
-from compare.bench.adapters import mujoco_free, simulators
+from compare.bench.adapters import mujoco_free
 from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import TOLERANCE
 from compare.bench.exact import SMOOTH, cases
@@ -36,7 +36,8 @@ from model.kinematics import slip_speeds
 GOOD_SPEED = 1e-4
 """Creep up to which a number is shown as good, m/s."""
 CAPTION = (
-    "dualball: the study's settings. MuJoCo: its defaults, the ball in the vessel in the study's scene. "
+    "dualball: free bodies, rigid contacts under Coulomb's law. "
+    "MuJoCo: its defaults, the ball in the vessel in the study's scene. "
     "mujoco-defaults: as it comes, a free ball in a wall of flat facets."
 )
 Cell = tuple[str, bool | None]
@@ -49,7 +50,7 @@ class Graded(Simulated):
     """MuJoCo with settings of its own: the ball in the vessel on the study's joints, other bodies free."""
 
     def __init__(self, native: Native) -> None:
-        super().__init__(NEWCOMER.name, mujoco_free.Bodies(native.tune))
+        super().__init__(NEWCOMER.name, mujoco_free.Bodies(NEWCOMER.name, "", tune=native.tune))
         self._native = native
 
     def engine(self, timestep: float) -> Engine:
@@ -90,7 +91,7 @@ class Column:
 
 
 OTHERS: dict[str, tuple[Any, float]] = {
-    "dualball": (simulators.mujoco, ContactSettings.timestep),
+    "dualball": (mujoco_free.best, ContactSettings.timestep),
     "MuJoCo": (Graded(Native()), Native.timestep),
     "mujoco-defaults": (mujoco_free, Native.timestep),
 }

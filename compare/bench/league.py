@@ -26,7 +26,7 @@ _OWN = "compare.bench.adapters"
 ENTRIES: dict[str, str] = {
     "event": f"{_OWN}.simulators:event",
     "time-stepping": f"{_OWN}.simulators:time_stepping",
-    "mujoco": f"{_OWN}.simulators:mujoco",
+    "mujoco": f"{_OWN}.mujoco_free:best",
     "mujoco-plain": f"{_OWN}.simulators:mujoco_plain",
     "mujoco-defaults": f"{_OWN}.mujoco_free",
     "siconos": f"{_OWN}.simulators:siconos",

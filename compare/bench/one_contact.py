@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.bench.case import Answers, Body, Case, Surface, Vector
+from compare.bench.case import Body, Case, Surface, Vector
 from model import Parameters, State
 from model.arrays import Array
 
@@ -25,8 +25,8 @@ CLOSED = 1e-14
 SPEED_ALONE = (math.inf, 0.01, math.inf)
 """Scales of a body that must not move: a creep of 0.1 mm/s passes, and how far it sinks into its floor is left out."""
 _UP = np.array([0.0, 0.0, 1.0])
-Course = Callable[..., tuple[Array, Array, Array]]
-"""Position, velocity and spin, each (n, 3), at times (n,)."""
+Course = Callable[..., tuple[Array, ...]]
+"""Position, velocity and spin, each (n, 3), at times (n,); then those of a body under the first."""
 
 
 def cases() -> tuple[Case, ...]:
@@ -37,7 +37,6 @@ def cases() -> tuple[Case, ...]:
 def closed(
     name: str,
     about: str,
-    kind: str,
     body: Mapping[str, Any],
     surfaces: tuple[Surface, ...],
     course: Course,
@@ -47,30 +46,29 @@ def closed(
     scales: tuple[float, float, float],
     contacts: Callable[[float], str],
     source: str,
+    under: Mapping[str, Any] | None = None,
     **forces: Any,
 ) -> Case:
     """A case whose course is a closed form, sampled 25 times; `wrong` are other constants of the course."""
+    times: Array = np.arange(1.0, 26.0) * (until / 25)
 
-    def answers() -> Answers:
-        times: Array = np.arange(1.0, 26.0) * (until / 25)
-
-        def states(**constants: Any) -> Array:
-            return np.concatenate([np.broadcast_to(part, (25, 3)) for part in course(times, **constants)], axis=1)
-
-        mistaken = {text: states(**constants) for text, constants in wrong.items()}
-        return Answers(times, states(), tuple(map(contacts, times.tolist())), mistaken)
+    def states(**constants: Any) -> Array:
+        return np.concatenate([np.broadcast_to(part, (25, 3)) for part in course(times, **constants)], axis=1)
 
     start: Any = [tuple(np.broadcast_to(part, (1, 3))[0].tolist()) for part in course(np.zeros(1))]
     return Case(
         name=name,
         about=about,
-        kind=kind,
-        body=Body(*start, **body),
+        body=Body(*start[:3], **body),
+        under=Body(*start[3:], **under) if under else None,
         surfaces=surfaces,
-        work_out=answers,
+        times=times,
+        exact=states(),
+        contacts=tuple(contacts(t) for t in times.tolist()),
         bound=CLOSED,
         source=source,
         scales=scales,
+        wrong={text: states(**constants) for text, constants in wrong.items()},
         g=G,
         **forces,
     )
@@ -112,17 +110,16 @@ def _blocks() -> list[Case]:
             t = np.minimum(t, -v / a)
         return along(way, v * t + a * t**2 / 2, v + a * t, 0 * t, BLOCK[2] * np.array(normal))
 
-    def on_slope(name: str, about: str, kind: str, tangent: float, v: float, **more: Any) -> Case:
+    def on_slope(name: str, about: str, tangent: float, v: float, **more: Any) -> Case:
         angle = math.atan(tangent)
         floor, course = Surface("floor", mu, normal=slope(angle)[1]), partial(slides, angle=angle, v=v)
         source = "Coulomb's law with Newton's second, integrated by hand"
-        return closed(name, about, kind, block(angle), (floor,), course, source=source, **more)
+        return closed(name, about, block(angle), (floor,), course, source=source, **more)
 
     found = [
         on_slope(
             "block-rests",
             "a block on a slope whose tangent is 0.9 of its friction must not move",
-            "sticking",
             0.9 * mu,
             0.0,
             contacts=lambda t: "R",
@@ -133,7 +130,6 @@ def _blocks() -> list[Case]:
         on_slope(
             "block-slides",
             "a block on a slope whose tangent is 1.25 of its friction slides down at g (sin - mu cos)",
-            "sliding",
             1.25 * mu,
             0.0,
             contacts=lambda t: "S",
@@ -148,7 +144,6 @@ def _blocks() -> list[Case]:
         on_slope(
             "box-stops",
             "a box that is pushed off at 2 m/s slides v^2/(2 mu g) on a level floor, stops and stays",
-            "sticking",
             0.0,
             2.0,
             contacts=lambda t: "S" if t < 2.0 / (mu * G) else "R",
@@ -167,7 +162,6 @@ def _blocks() -> list[Case]:
         closed(
             "growing-pull",
             "a block under a force that grows by 10 N a second breaks away at mu m g and then slides",
-            "sticking",
             block(),
             (Surface("floor", mu),),
             pulled,
@@ -190,7 +184,6 @@ def _blocks() -> list[Case]:
         closed(
             "pinched-block",
             "a block is pressed against a vertical wall, half of the friction there is carries it: it must not move",
-            "sticking",
             block(),
             (Surface("wall", mu, normal=(-1.0, 0.0, 0.0)),),
             held,
@@ -227,7 +220,6 @@ def _spheres() -> list[Case]:
         closed(
             "sphere-slides-rolls",
             "a sphere that is pushed off at 2 m/s without spin slides, then rolls on at 5/7 of its speed",
-            "sliding",
             sphere(),
             (Surface("floor", 0.2),),
             rolls_at_last,
@@ -240,7 +232,6 @@ def _spheres() -> list[Case]:
         closed(
             "sphere-rolls-down",
             "a sphere rolls down a slope from rest at 5/7 g sin",
-            "rolling",
             sphere(),
             (Surface("slope", 0.5, normal=slope(gentle)[1]),),
             partial(descends, angle=gentle),
@@ -253,7 +244,6 @@ def _spheres() -> list[Case]:
         closed(
             "sphere-slips-down",
             "a sphere on a slope too steep for rolling, tan > 7/2 mu, slips down and is spun up by friction",
-            "sliding",
             sphere(),
             (Surface("slope", 0.5, normal=slope(steep)[1]),),
             partial(descends, angle=steep),
@@ -266,7 +256,6 @@ def _spheres() -> list[Case]:
         closed(
             "drilling-sphere",
             "a sphere spins about the vertical on a point, where friction has no arm: it spins for ever",
-            "rolling",
             sphere(),
             (Surface("floor", 0.5),),
             spins,
@@ -293,7 +282,6 @@ def _turntable() -> Case:
     return closed(
         "turntable",
         "a ball rolls on a table that turns at 3 rad/s, and circles at 2/7 of that",
-        "rolling",
         sphere(),
         (Surface("table", 0.5, turning=turning),),
         circles,
@@ -321,7 +309,6 @@ def _cylinder() -> Case:
     return closed(
         "cylinder",
         "a ball rolls round inside a vertical cylinder: it comes down and rises again, at sqrt(2/7) of its orbit",
-        "rolling",
         sphere(),
         (Surface("wall", 1.0, radius=orbit + RADIUS),),
         rises,

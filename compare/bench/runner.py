@@ -5,9 +5,11 @@ An engine is anything with three functions, a module most simply:
 * ``build(case, timestep)`` makes the scene of a `Case` anew, its body at the start;
 * ``step(n)`` takes n steps of that length, setting ``case.force(t, position, velocity)`` before each where
   ``case.forced``;
-* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and world axes.
+* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and world axes, then
+  those of the one under it, if there is one.
 
-``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It may say of itself:
+``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It is not asked for
+cases that need what version 1 of them had not (`Case.needs`) unless its ``FEATURES`` name that. It may say of itself:
 ``NAME``, ``PRECISION`` (``f64`` or ``f32``), ``DECLARED`` (in words, all that isn't a free body in plain geometry under
 the engine's own settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
 `TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``).
@@ -62,6 +64,8 @@ class About:
     version: str = ""
     """Of its package, and the version with which it is known to work if that is another."""
     steps: tuple[float, ...] = TIME_STEPS
+    features: tuple[str, ...] = ()
+    """Of `Case.needs`, what it can do."""
     missing: str = ""
     """Why it can't be used here; empty if it can."""
 
@@ -177,6 +181,10 @@ class EngineProcess:
         about, found = self.about, Result(case.name, self.about)
         if about.missing:
             return replace(found, skipped=about.missing)
+        if lacking := [need for need in case.needs if need not in about.features]:
+            return replace(
+                found, skipped=f"{about.name} doesn't say in FEATURES that it can do this: {', '.join(lacking)}"
+            )
         runs: list[tuple[Array | None, float, str]] = []
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:
@@ -227,6 +235,7 @@ def _load(given: Any) -> tuple[Any, About]:
         name=name,
         precision=precision,
         declared=getattr(engine, "DECLARED", ""),
+        features=tuple(getattr(engine, "FEATURES", ())),
         note=getattr(engine, "NOTE", ""),
         version=_version(given, engine),
         steps=tuple(
@@ -289,9 +298,10 @@ def _attempt(engine: Any, case: Case, step: float) -> Any:
                 found = engine.state()
                 parts = [] if found is None else [np.array(part, dtype=float) for part in found]
                 spent, done = spent + time.process_time() - begin, at
-                shapes = [part.shape for part in parts]
-                if shapes != [(3,)] * 3:
-                    return None, math.nan, f"state() must return position, velocity and spin, not shapes {shapes}"
+                shapes, count = [part.shape for part in parts], len(case.bodies)
+                if shapes != [(3,)] * 3 * count:
+                    of = "" if count == 1 else " of both bodies"
+                    return None, math.nan, f"state() must return position, velocity and spin{of}, not shapes {shapes}"
                 now = np.concatenate(parts)
                 if not (np.abs(now) < 1e8).all():
                     return None, math.nan, f"diverged by t = {t:g} s at a step of {1e3 * step:g} ms"

@@ -196,7 +196,8 @@ def radii(model: Any) -> Array:
 
 
 def _body(model: Any, body: int) -> str:
-    return f"body {model.body(body).name or int(body)}"
+    name = model.body(body).name
+    return f"body {name!r}" if name else f"body {int(body)}"
 
 
 def few(names: Sequence[str]) -> str:

@@ -40,20 +40,23 @@ def listed(args: argparse.Namespace) -> int:
             "case": chosen.name,
             "about": chosen.about,
             "body": _fields(chosen.body),
+            "under it": _fields(chosen.under) + f", between them {chosen.between:g}" if chosen.under else "",
             "surfaces": "\n".join(map(_fields, chosen.surfaces)),
+            "joint": f"along {_numbers(chosen.joint)}, dry friction {chosen.dry:g} N" if chosen.joint else "",
             "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull {_numbers(chosen.pull)} N, growth "
-            f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s",
+            f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s, "
+            f"spring {chosen.spring:g} N/m",
             "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); inf: not compared",
             "source": f"{chosen.source}; error below {chosen.bound:g}",
             "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),
             "ends at": f"t = {chosen.times[-1]:g} s: position {_numbers(chosen.exact[-1, :3])} m, velocity "
-            f"{_numbers(chosen.exact[-1, 3:6])} m/s, spin {_numbers(chosen.exact[-1, 6:])} rad/s",
+            f"{_numbers(chosen.exact[-1, 3:6])} m/s, spin {_numbers(chosen.exact[-1, 6:9])} rad/s",
             "more": "all states, JSON, HDF5 and MJCF: dualball cases -o DIR",
         }
-        shown: list[Any] = [pages.pairs(about)]
+        shown: list[Any] = [pages.pairs({name: text for name, text in about.items() if text})]
     else:
         rows = [["case", "contacts", "kind", "what happens"]]
-        rows += [[c.name, str(len(c.surfaces)), c.kind, c.about] for c in own.values()]
+        rows += [[c.name, str(len(c.contacts[0])), c.kind, c.about] for c in own.values()]
         shown = [pages.table(f"Exact contact cases, version {VERSION}", rows, justify="left")]
     options.show(None, False, *shown, *([f"written to {args.output}"] if args.output else []))
     return 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compare.bench import cases, run
-from compare.bench.adapters.free import upright
+from compare.bench.case import upright
 from model import InputError
 from model.kinematics import rotated
 
@@ -16,15 +16,14 @@ OWN = "compare.bench.adapters"
 
 @pytest.mark.parametrize("name", ["dart", "drake", "pybullet", "rapier", "sapien"])
 def test_an_engine_reaches_its_order(name: str) -> None:
-    """Semi-implicit steps are of first order where a sphere slides; a block that friction can hold rests."""
+    """Semi-implicit steps are leapfrog where a sphere slides; a block that friction can hold rests."""
     try:
         module = importlib.import_module(f"{OWN}.{name}")
     except ImportError as error:
         pytest.skip(str(error))
     best = "free" if hasattr(module, "free") else "best"
     falls = run(CASES["sphere-slips-down"], f"{OWN}.{name}:{best}")
-    assert falls.passed
-    assert 0.9 < falls.order < 1.7  # substeps of Rapier
+    assert falls.error < 2e-3  # substeps of Rapier, and single precision
     assert run(CASES["block-rests"], f"{OWN}.{name}:{best}").passed
     turns = run(CASES["cylinder"], f"{OWN}.{name}:{best}", steps=(2e-3, 1e-3))
     assert turns.error < 0.08  # of the orbit: omega^2 h/2 a second

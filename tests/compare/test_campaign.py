@@ -109,7 +109,7 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
     """Runs of 201 samples each; the numbers are those of runs that were stored at once."""
     for where, room, short, files in (("held", 2**18, 1e9, 0), ("tight", 500, 1e9, 3), ("slow", 2**18, 0.0, 5)):
         monkeypatch.setattr("compare.kit.campaign.READ", room)
-        monkeypatch.setattr("compare.kit.campaign.SHORT", short)
+        monkeypatch.setattr("compare.kit.campaign.SOON_DONE", short)
         with Campaign(tmp_path / where, workers=0, batch=2, passing=True) as campaign:
             runs = campaign.run(tasks())
             assert len(list((tmp_path / where).glob("*.h5"))) == files

@@ -63,7 +63,7 @@ def test_creep_and_hovering_are_as_predicted(columns: list[Column]) -> None:
     assert any("hovering at A" in item for item in yours.advice)
     assert not any("pyramidal" in item for item in yours.advice)
     # MuJoCo's defaults, but for the cone, fail where the study's settings pass.
-    assert {"rides-the-wall", "lands", "hits-the-wall", "slips-on-both"} <= {*columns[1].passed} - {*yours.passed}
+    assert {"rides-the-wall", "lands", "slips-on-both"} <= {*columns[1].passed} - {*yours.passed}
 
 
 def test_card_as_table_and_page(columns: list[Column]) -> None:

@@ -82,7 +82,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     "words",
     [
         "simulate --engine event --time 0.1 -o new.h5",
-        "collect runs -o new.h5",
+        "collect runs --workers 0 -o new.h5",
         "inspect run.h5 --plot new.png",
         "inspect run.h5 --plot new.pdf",
         "inspect run.h5 --plot run.svg",

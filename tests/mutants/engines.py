@@ -9,6 +9,8 @@ from dataclasses import replace
 from typing import Any
 from unittest import mock
 
+import mujoco
+
 import mjsim
 from compare.kit.engines import ENGINES, MUJOCO, Engine
 from mjsim import ContactSettings, scene
@@ -16,6 +18,8 @@ from model import Parameters
 
 LEAST = 1e-5
 """The engine's least friction coefficient."""
+CROOKED = 0.01
+"""Angle of a wall that isn't tangent, rad."""
 Stretch = Callable[[], AbstractContextManager[Any]]
 
 
@@ -53,16 +57,35 @@ def _no_impacts() -> AbstractContextManager[Any]:
     return mock.patch.object(ContactSettings, "slowest_fall", return_value=math.inf)
 
 
-def _smooth_floor() -> AbstractContextManager[Any]:
-    """The floor carries the ball, but the contact with it has no friction."""
+def _altered(change: Callable[[Any], None]) -> AbstractContextManager[Any]:
+    """The scene is built with another model."""
     built = scene.build
 
-    def without(p: Parameters, settings: ContactSettings) -> Any:
+    def altered(p: Parameters, settings: ContactSettings) -> Any:
         model, mjcf = built(p, settings)
-        model.pair_friction[0] = LEAST
+        change(model)
         return model, mjcf
 
-    return mock.patch.object(scene, "build", without)
+    return mock.patch.object(scene, "build", altered)
+
+
+def _smooth_floor() -> AbstractContextManager[Any]:
+    """The floor carries the ball, but the contact with it has no friction."""
+
+    def smooth(model: Any) -> None:
+        model.pair_friction[0] = LEAST
+
+    return _altered(smooth)
+
+
+def _crooked_wall() -> AbstractContextManager[Any]:
+    """The plane of the wall is turned about the vertical by `CROOKED`, so that it drives the ball round."""
+
+    def turn(model: Any) -> None:
+        wall, upright = model.geom("wall"), (math.cos(CROOKED / 2), 0.0, 0.0, math.sin(CROOKED / 2))
+        mujoco.mju_mulQuat(wall.quat, upright, wall.quat.copy())
+
+    return _altered(turn)
 
 
 WRONG_ENGINES: tuple[Engine, ...] = (
@@ -71,6 +94,7 @@ WRONG_ENGINES: tuple[Engine, ...] = (
     _wrong("inertia 1 % high", lambda p: p.replace(j=1.01 * p.j)),
     _wrong("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
     _wrong("the friction of the floor is missing", fault=_smooth_floor),
+    _wrong("the plane of the wall turned by 0.01 rad", fault=_crooked_wall),
     _wrong("no servo of the margins", servo=0.0),
     _wrong("no memory of friction", memory=False),
     _wrong("forces taken at the beginning of a step", order=1),

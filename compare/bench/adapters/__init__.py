@@ -9,7 +9,6 @@ KNOWN = {
     "pybullet": "pybullet 3.2.7",
     "rapier": "rapier3d 0.36.1",
     "sapien": "sapien 3.0.3",
-    "simulators:mujoco": "mujoco 4.0.0",
     "simulators:mujoco_plain": "mujoco 4.0.0",
 }
 """Packages and versions with which they are known to work: here, so that it can be said where one can't be imported."""

@@ -6,6 +6,7 @@ of a box on a plane so that it neither rocks nor sinks in; friction is the lesse
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import dartpy as engine
@@ -20,8 +21,10 @@ from model.kinematics import rotated
 class Dart(Free):
     """As in `Free`."""
 
+    FEATURES = ("two bodies", "moving surface", "restitution", "tripod")
+
     def make(self) -> None:
-        case, body, bodies = self.case, self.case.body, engine.dynamics
+        case, bodies = self.case, engine.dynamics
         self.world = engine.simulation.World()
         self.world.setTimeStep(self.timestep)
         self.world.setGravity([0.0, 0.0, -case.g])
@@ -33,54 +36,73 @@ class Dart(Free):
         self.tables: list[tuple[Any, float]] = []
         for surface, name, point, normal in self.planes():
             skeleton = bodies.Skeleton(name)
-            if surface.turning:
-                joint, node = skeleton.createRevoluteJointAndBodyNodePair()
-                joint.setAxis([0.0, 0.0, 1.0])
+            if rate := surface.turning or math.hypot(*surface.velocity):
+                turns, slides = (
+                    skeleton.createRevoluteJointAndBodyNodePair,
+                    skeleton.createPrismaticJointAndBodyNodePair,
+                )
+                joint, node = turns() if surface.turning else slides()
+                joint.setAxis([0.0, 0.0, 1.0] if surface.turning else np.array(surface.velocity) / rate)
                 joint.setActuatorType(bodies.ActuatorType.VELOCITY)
-                self.tables.append((joint, surface.turning))
+                self.tables.append((joint, rate))
             else:
                 _, node = skeleton.createWeldJointAndBodyNodePair()
             self.wall = bodies.PlaneShape(normal, point)  # the last one is the one that moves
-            self.add(skeleton, node, self.wall, surface.friction)
-        skeleton = bodies.Skeleton("body")
-        joint, self.node = skeleton.createFreeJointAndBodyNodePair()
-        pose = np.eye(4)
-        pose[:3, :3] = rotated(np.array(body.orientation), np.eye(3)).T
-        pose[:3, 3] = body.position
-        joint.setTransform(engine.math.Isometry3(pose))
-        joint.setLinearVelocity(body.velocity)
-        joint.setAngularVelocity(body.spin)
-        self.node.setInertia(bodies.Inertia(body.mass, np.zeros(3), np.diag(body.inertia)))
-        size = np.array(body.size)
-        self.add(
-            skeleton, self.node, bodies.SphereShape(*size) if body.shape == "sphere" else bodies.BoxShape(2 * size)
-        )
+            self.add(skeleton, node, self.wall, surface.friction, restitution=surface.restitution)
+        self.nodes: list[Any] = []
+        for body, friction in zip(case.bodies, (1e3, case.between), strict=False):
+            skeleton = bodies.Skeleton(f"body{len(self.nodes)}")
+            joint, node = skeleton.createFreeJointAndBodyNodePair()
+            pose = placed(body.position)
+            pose[:3, :3] = rotated(np.array(body.orientation), np.eye(3)).T
+            joint.setTransform(engine.math.Isometry3(pose))
+            joint.setLinearVelocity(body.velocity)
+            joint.setAngularVelocity(body.spin)
+            node.setInertia(bodies.Inertia(body.mass, np.zeros(3), np.diag(body.inertia)))
+            size = np.array(body.size)
+            for at in body.parts:
+                shape = bodies.BoxShape(2 * size) if body.shape == "box" else bodies.SphereShape(size[0])
+                self.add(skeleton, node, shape, friction, at)
+            self.nodes.append(node)
 
-    def add(self, skeleton: Any, node: Any, shape: Any, friction: float = 1e3) -> None:
+    def add(
+        self, skeleton: Any, node: Any, shape: Any, friction: float, at: Any = (0, 0, 0), restitution: float = 1.0
+    ) -> None:
         """A shape that touches others."""
         frame = node.createShapeNode(shape)
+        frame.setRelativeTransform(engine.math.Isometry3(placed(at)))
         frame.createCollisionAspect()
-        frame.createDynamicsAspect().setFrictionCoeff(friction)
-        self.world.addSkeleton(skeleton)
+        dynamics = frame.createDynamicsAspect()
+        dynamics.setFrictionCoeff(friction)
+        dynamics.setRestitutionCoeff(restitution)
+        if not self.world.hasSkeleton(skeleton):
+            self.world.addSkeleton(skeleton)
 
     def advance(self) -> None:
         for joint, turning in self.tables:
             joint.setCommand(0, turning)
         self.world.step()
 
-    def state(self) -> State:
-        return self.node.getCOM(), self.node.getLinearVelocity(), self.node.getAngularVelocity()
+    def read(self) -> State:
+        return sum(((n.getCOM(), n.getLinearVelocity(), n.getAngularVelocity()) for n in self.nodes), ())
 
     def push(self, force: Vector) -> None:
-        self.node.setExtForce(force, np.zeros(3), False, True)
+        self.nodes[0].setExtForce(force, np.zeros(3), False, True)
 
     def turn(self, point: Array, normal: Array) -> None:
         self.wall.setNormalAndPoint(normal, point)
 
 
+def placed(position: Any) -> Array:
+    """A pose that isn't turned, (4, 4)."""
+    pose = np.eye(4)
+    pose[:3, 3] = position
+    return pose
+
+
 defaults = Dart("dart-defaults", "boxes rock and creep, since FCL places their contacts anew in every step")
 best = Dart(
     "dart",
-    f"of first order in everything, worst round the cylinder: {CHORD}",
+    f"worst round the cylinder: {CHORD}",
     "contacts by ODE's collision detector, Coulomb's cone by NSGS, overlaps taken out by split impulses",
 )

@@ -67,7 +67,7 @@ class Drake(Free):
     def advance(self) -> None:
         self.x = self.own.after(self.x, self.force)
 
-    def state(self) -> State:
+    def read(self) -> State:
         return self.x[self.q + 4 :][:3], self.x[self.v + 3 :][:3], self.x[self.v :][:3]
 
     def push(self, force: Vector) -> None:

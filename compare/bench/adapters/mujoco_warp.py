@@ -12,10 +12,16 @@ import warp
 
 from compare.bench.adapters import mujoco_free
 from compare.bench.adapters.free import State
-from compare.bench.case import Case
+from compare.bench.case import Vector
 from model.kinematics import rotated
 
 warp.config.quiet = True
+
+
+_WORST = (
+    "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft friction creeps; "
+    "nothing is seen of single precision beside that"
+)
 
 
 class Warp(mujoco_free.Bodies):
@@ -23,37 +29,32 @@ class Warp(mujoco_free.Bodies):
 
     PRECISION = "f32"
     TIMESTEPS = (4e-3, 2e-3)  # a step takes 5 ms, a thousand times MuJoCo's
-    NOTE = (
-        "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft friction creeps; "
-        "nothing is seen of single precision beside that"
-    )
+
+    FEATURES = ("moving surface", "tripod")
 
     def __init__(self, name: str, declared: str, tune: Any = None) -> None:
-        super().__init__(tune)
-        self.NAME, self.DECLARED = name, declared
+        super().__init__(name, _WORST, tune=tune)
+        self.DECLARED = declared
 
-    def build(self, case: Case, timestep: float) -> None:
-        super().build(case, timestep)
-        model, data = self._model, self._data
+    def make(self) -> None:
+        super().make()
+        model, data = self.model, self.data
         mujoco.mj_forward(model, data)
-        self._now, self._timestep, self._body = 0.0, timestep, model.body("body").id
+        self.number = model.body("body").id
         with warp.ScopedDevice("cpu"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that the friction of one geom is less than MuJoCo likes: a pair's counts
-            self._model, self._data = engine.put_model(model), engine.put_data(model, data, nconmax=32, njmax=128)
+            self.model, self.data = engine.put_model(model), engine.put_data(model, data, nconmax=32, njmax=128)
 
-    def step(self, n: int) -> None:
-        for _ in range(n):
-            if self._case.forced:
-                position, velocity, _ = self.state()
-                force = self._case.force(self._now, position, velocity)
-                self._data.xfrc_applied.numpy()[0, self._body, :3] = force  # on a processor the engine's own memory
-            with warp.ScopedDevice("cpu"):
-                engine.step(self._model, self._data)
-            self._now += self._timestep
+    def advance(self) -> None:
+        with warp.ScopedDevice("cpu"):
+            engine.step(self.model, self.data)
 
-    def state(self) -> State:
-        q, v = (np.asarray(each.numpy()[0], float) for each in (self._data.qpos, self._data.qvel))
+    def read(self) -> State:
+        q, v = (np.asarray(each.numpy()[0], float) for each in (self.data.qpos, self.data.qvel))
         return q[-7:-4], v[-6:-3], rotated(q[-4:], v[-3:])
+
+    def push(self, force: Vector) -> None:
+        self.data.xfrc_applied.numpy()[0, self.number, :3] = force  # on a processor the engine's own memory
 
 
 defaults = Warp("mujoco-warp-defaults", mujoco_free.DECLARED)

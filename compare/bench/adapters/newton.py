@@ -16,8 +16,8 @@ import newton as engine
 import numpy as np
 import warp
 
-from compare.bench.adapters.free import CHORD, Free, State, upright
-from compare.bench.case import Vector
+from compare.bench.adapters.free import CHORD, Free, State
+from compare.bench.case import Vector, upright
 from model.arrays import Array
 
 warp.config.quiet = True
@@ -70,7 +70,7 @@ class Newton(Free):
         self.old, self.new = self.new, self.old
         self.old.clear_forces()
 
-    def state(self) -> State:
+    def read(self) -> State:
         place, rate = self.old.body_q.numpy()[0].astype(float), self.old.body_qd.numpy()[0].astype(float)
         return place[:3], rate[:3], rate[3:]
 

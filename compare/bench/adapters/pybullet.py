@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pybullet as engine
 
-from compare.bench.adapters.free import CORNERS, Free, State, upright
+from compare.bench.adapters.free import CORNERS, Free, State
 from compare.bench.adapters.simulators import Simulated
-from compare.bench.case import Vector
+from compare.bench.case import Vector, upright
 from compare.kit.adapters.pybullet import DEFAULTS, Server, Settings
 from model.arrays import Array
 
@@ -41,7 +41,7 @@ class PyBullet(Free):
     def advance(self) -> None:
         engine.stepSimulation(**self.own.here)
 
-    def state(self) -> State:
+    def read(self) -> State:
         return self.own.state(self.body)
 
     def push(self, force: Vector) -> None:

@@ -8,6 +8,7 @@ scalar; with `FrictionModel.COULOMB` a block on a plane has hardly any friction.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import rapier3d as engine
 
@@ -20,9 +21,11 @@ class Rapier(Free):
     """As in `Free`."""
 
     PRECISION = "f32"
+    FEATURES = ("two bodies", "moving surface", "restitution", "tripod")
+    AHEAD = 1 / 32  # it takes 16 steps in each
 
     def make(self) -> None:
-        case, body = self.case, self.case.body
+        case = self.case
         self.world = engine.PhysicsWorld(gravity=(0.0, 0.0, -case.g))
         settings, multiply = self.world.integration_parameters, engine.CoefficientCombineRule.MULTIPLY
         settings.dt = self.timestep
@@ -31,29 +34,34 @@ class Rapier(Free):
             settings.length_unit, settings.normalized_max_linear_velocity = 0.01, 1e6
             settings.contact_softness = settings.static_contact_softness = engine.SpringCoefficients(200.0, 10.0)
         for surface, _, point, normal in self.planes():
-            kind = engine.RigidBody.kinematic_velocity_based() if surface.turning else engine.RigidBody.fixed()
-            shape = (
-                engine.Collider.halfspace(normal.tolist()).friction(surface.friction).friction_combine_rule(multiply)
-            )
-            kind = kind.translation(point.tolist()).angvel((0.0, 0.0, surface.turning))
+            moves = surface.turning or any(surface.velocity)
+            kind = engine.RigidBody.kinematic_velocity_based() if moves else engine.RigidBody.fixed()
+            shape = engine.Collider.halfspace(normal.tolist()).friction(surface.friction / (case.between or 1.0))
+            shape = shape.friction_combine_rule(multiply).restitution(surface.restitution)
+            kind = kind.translation(point.tolist()).angvel((0.0, 0.0, surface.turning)).linvel(surface.velocity)
             self.wall = self.world.add_body(kind, [shape])  # the last one is the one that moves
-        shape = engine.Collider.ball(*body.size) if body.shape == "sphere" else engine.Collider.cuboid(*body.size)
-        shape = shape.density(0.0).friction(1.0).friction_combine_rule(multiply)
-        start = engine.Isometry3(body.position, engine.Quaternion(*body.orientation))
-        moving = engine.RigidBody.dynamic().position(start).linvel(body.velocity).angvel(body.spin)
-        moving = moving.additional_mass_properties(engine.MassProperties((0, 0, 0), body.mass, body.inertia))
-        self.body = self.world.add_body(moving, [shape])
+        self.bodies = []
+        for body, friction in zip(case.bodies, (1.0, case.between), strict=False):
+            shapes: list[Any] = []
+            for at in body.parts.tolist():
+                box, ball = engine.Collider.cuboid, engine.Collider.ball
+                shape = (box(*body.size) if body.shape == "box" else ball(body.size[0])).translation(at).density(0.0)
+                shape = shape.friction(friction).friction_combine_rule(multiply)
+                shapes.append(shape.restitution(1.0).restitution_combine_rule(multiply))
+            start = engine.Isometry3(body.position, engine.Quaternion(*body.orientation))
+            moving = engine.RigidBody.dynamic().position(start).linvel(body.velocity).angvel(body.spin)
+            moving = moving.additional_mass_properties(engine.MassProperties((0, 0, 0), body.mass, body.inertia))
+            self.bodies.append(self.world.add_body(moving, shapes))
 
     def advance(self) -> None:
         self.world.step()
 
-    def state(self) -> State:
-        body = self.world.rigid_bodies[self.body]
-        position, velocity, spin = ([v.x, v.y, v.z] for v in (body.translation, body.linvel, body.angvel))
-        return position, velocity, spin
+    def read(self) -> State:
+        own = [self.world.rigid_bodies[body] for body in self.bodies]
+        return tuple([v.x, v.y, v.z] for body in own for v in (body.translation, body.linvel, body.angvel))
 
     def push(self, force: Vector) -> None:
-        body = self.world.rigid_bodies[self.body]
+        body = self.world.rigid_bodies[self.bodies[0]]
         body.reset_forces()
         body.add_force(force)
 

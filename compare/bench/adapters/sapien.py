@@ -10,8 +10,8 @@ import math
 import warnings
 from typing import Any
 
-from compare.bench.adapters.free import CHORD, CORNERS, Free, State, upright
-from compare.bench.case import Vector
+from compare.bench.adapters.free import CHORD, CORNERS, Free, State
+from compare.bench.case import Vector, upright
 from model.arrays import Array
 
 with warnings.catch_warnings():
@@ -62,7 +62,7 @@ class Sapien(Free):
     def advance(self) -> None:
         self.scene.step()
 
-    def state(self) -> State:
+    def read(self) -> State:
         return self.entity.pose.p, self.body.linear_velocity, self.body.angular_velocity
 
     def push(self, force: Vector) -> None:

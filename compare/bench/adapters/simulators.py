@@ -30,6 +30,7 @@ class Simulated:
         own = getattr(free, "DECLARED", "")
         self.DECLARED = "; ".join(filter(None, (JOINTS if free else "", declared or own)))
         self.NOTE = note or getattr(free, "NOTE", "")
+        self.FEATURES = getattr(free, "FEATURES", ())
         if "timestep" not in ENGINES[name].options:
             self.TIMESTEPS = TIME_STEPS[-1:]
         self._states: Array | None = None
@@ -76,17 +77,10 @@ class Simulated:
         return tuple(self._states[self._at])
 
 
-_STUDY = "elliptic cone, contact settings of the study"
-mujoco = Simulated(
-    "mujoco",
-    mujoco_free.Bodies(mujoco_free.studied, coulomb=True),
-    f"{_STUDY}, corrections between the steps",
-    "friction rows that are slow enough not to hover follow, ten steps late, a friction that turns or sets in",
-)
 mujoco_plain = Simulated(
     "mujoco-plain",
-    mujoco_free.Bodies(mujoco_free.studied),
-    _STUDY,
+    mujoco_free.Bodies("mujoco-plain", "", tune=mujoco_free.studied),
+    "elliptic cone, contact settings of the study",
     "contacts soft enough for sliding let a ball that lands sink in and throw it back",
 )
 event = Simulated(

@@ -1,0 +1,253 @@
+"""The exact cases of version 2 by other ways: equations of motion in space, integrated, and balances."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from compare.bench import cases, run
+from compare.bench.case import TOLERANCE, VERSION, read
+from compare.commands import cli
+from model import InputError, StorageError
+from model.kinematics import rotated
+
+CASES = {case.name: case for case in cases()}
+SHARP = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12}
+
+
+def tripod(case):
+    """All six equations of a body in space, with three loads that keep the feet on the floor, unknown together.
+
+    State: position, quaternion, velocity, spin in world axes. Nothing is used of what the legs bear or where they are
+    but their places on the body.
+    """
+    body, (floor,) = case.body, case.surfaces
+
+    def rates(t, state):
+        quaternion, velocity, spin = state[3:7], state[7:10], state[10:]
+        axes = rotated(quaternion, np.eye(3)).T
+        inertia = axes @ np.diag(body.inertia) @ axes.T
+        arms = rotated(quaternion, body.parts) - [0.0, 0.0, body.size[0]]
+        slip = (velocity + np.cross(spin, arms))[:, :2]
+        push = np.column_stack([-floor.friction * slip / np.linalg.norm(slip, axis=1)[:, None], np.ones(3)])
+        matrix, right = np.zeros((9, 9)), np.zeros(9)
+        matrix[:3, :3], matrix[:3, 6:] = body.mass * np.eye(3), -push.T
+        matrix[3:6, 3:6], matrix[3:6, 6:] = inertia, -np.cross(arms, push).T
+        for k, arm in enumerate(arms):  # its vertical acceleration: a + alpha x arm
+            matrix[6 + k, :6] = [0, 0, 1, arm[1], -arm[0], 0]
+        right[2], right[3:6] = -body.mass * case.g, -np.cross(spin, inertia @ spin)
+        found = np.linalg.solve(matrix, right)
+        assert (found[6:] > 0).all()
+        w, *axis = quaternion
+        turning = 0.5 * np.array([-spin @ axis, *(w * spin + np.cross(spin, axis))])
+        return np.concatenate([velocity, turning, found[:6]])
+
+    start = np.concatenate([body.position, body.orientation, body.velocity, body.spin])
+    found = solve_ivp(rates, (0, case.times[-1]), start, t_eval=case.times, **SHARP).y.T
+    return np.concatenate([found[:, :3], found[:, 7:]], axis=1)
+
+
+def switched(rates, start, times, ends, change):
+    """Integrate to the samples; wherever `ends` falls to zero the state becomes what `change` makes of it."""
+    begin, state, out = 0.0, np.array(start, float), []
+    while begin < times[-1]:
+
+        def falls(t, x, begin=begin):
+            return ends(x) if t > begin + 1e-7 else 1.0
+
+        falls.terminal, falls.direction = True, -1
+        found = solve_ivp(rates, (begin, times[-1]), state, events=falls, dense_output=True, max_step=0.02, **SHARP)
+        out += [found.sol(t) for t in times[(times > begin) & (times <= found.t[-1])]]
+        begin, state = found.t[-1], change(found.y[:, -1])
+    return np.array(out)
+
+
+def sliding(case):
+    """Blocks in translation: the lowest on floor or belt, the next one on it, by steps in time.
+
+    The friction of both contacts is found together from velocities at the end of a step, by projection on Coulomb's
+    bounds: nothing knows when what sticks or slides. Forces are constant but in the steps of a change.
+    """
+    (surface,), bodies = case.surfaces, case.bodies[::-1]
+    normal = np.array(surface.normal)
+    way, h, press = np.array([normal[2], 0.0, -normal[0]]), 4e-5, case.g * normal[2]
+    masses = np.array([body.mass for body in bodies])
+    bounds = press * np.array([surface.friction * masses.sum(), case.between * masses[-1]][: len(masses)])
+    belt, v = float(np.dot(surface.velocity, way)), np.array([np.dot(body.velocity, way) for body in bodies])
+    s, out, done, f = np.zeros(len(v)), [], 0, np.zeros(len(v))
+    for t in case.times:
+        for _ in range(round(t / h) - done):
+            free = v - h * case.g * way[2]
+            for _ in range(400):
+                last = f.copy()
+                for k in range(len(f)):
+                    now = free + h * (f - np.append(f[1:], 0.0)) / masses
+                    slip = now[k] - (now[k - 1] if k else belt)
+                    share = 1 / masses[k] + (1 / masses[k - 1] if k else 0.0)
+                    f[k] = np.clip(f[k] - slip / (h * share), -bounds[k], bounds[k])
+                if abs(f - last).max() <= 1e-13 * bounds.max():
+                    break
+            new = free + h * (f - np.append(f[1:], 0.0)) / masses
+            s, v = s + h * (v + new) / 2, new
+        done = round(t / h)
+        out.append(np.concatenate([
+            part for k in range(len(f))[::-1] for part in (bodies[k].position + s[k] * way, v[k] * way, np.zeros(3))
+        ]))  # fmt: skip
+    return np.array(out)
+
+
+def swinging(case):
+    """The mass on spring and slide: friction keeps its sign until the speed is zero, and then holds if it can."""
+    dry, k, m = case.dry, case.spring, case.body.mass
+
+    def begins(x):
+        pull = -k * x[0]
+        return np.array([x[0], 0.0, 0.0 if abs(pull) <= dry else math.copysign(1.0, pull)])
+
+    def rates(t, x):
+        return [x[1], (-k * x[0] - x[2] * dry) / m if x[2] else 0.0, 0.0]
+
+    start = begins([case.body.position[0]])
+    found = switched(rates, start, case.times, lambda x: x[1] * x[2] if x[2] else 1.0, begins)
+    places = np.array(case.body.position) + np.outer(found[:, 0] - start[0], [1.0, 0.0, 0.0])
+    return np.concatenate([places, np.outer(found[:, 1], [1.0, 0.0, 0.0]), np.zeros_like(places)], axis=1)
+
+
+def rocking(case):
+    """The block in its plane, (x, z, angle) and rates, with the force at the edge from what keeps that in place.
+
+    At a blow the impulse at the other edge is what stops it, the first edge bears none.
+    """
+    body = case.body
+    half, (m, moment) = np.array([body.size[0], body.size[2]]), (body.mass, body.inertia[1])
+
+    def arm(angle, side):
+        x, z = side * half[0], -half[1]
+        return np.array([math.cos(angle) * x + math.sin(angle) * z, -math.sin(angle) * x + math.cos(angle) * z])
+
+    def lever(r):  # a turn w about y moves r by w (r_z, -r_x)
+        return np.array([[1, 0, r[1]], [0, 1, -r[0]]])
+
+    def held(r):
+        across = lever(r)
+        weight = np.diag([m, m, moment])
+        return np.block([[weight, -across.T], [across, np.zeros((2, 2))]])
+
+    def rates(t, x):
+        r, w = arm(x[2], x[6]), x[5]
+        right = np.concatenate([[0, -m * case.g, 0], w * w * r])  # the edge doesn't move: a + alpha x r - w^2 r = 0
+        return np.concatenate([x[3:6], np.linalg.solve(held(r), right)[:3], [0.0]])
+
+    def blow(x):
+        r = arm(x[2], -x[6])
+        after = np.linalg.solve(held(r), np.concatenate([m * x[3:5], [moment * x[5]], [0, 0]]))[:3]
+        return np.concatenate([x[:3], after, [-x[6]]])
+
+    lean = 2 * math.asin(body.orientation[2])
+    start = [body.position[0], body.position[2], lean, 0, 0, 0, 1.0]
+    found = switched(rates, start, case.times, lambda x: x[2] * x[6], blow)
+    x, z, _, v_x, v_z, w, _ = found.T
+    none = 0 * x
+    return np.stack([x, none, z, v_x, none, v_z, none, w, none], axis=1)
+
+
+def bouncing(case):
+    """A fall, integrated from blow to blow."""
+    (floor,), radius = case.surfaces, case.body.size[0]
+    start = [case.body.position[2], case.body.velocity[2]]
+    found = switched(
+        lambda t, x: [x[1], -case.g], start, case.times, lambda x: x[0] - radius,
+        lambda x: np.array([radius, -floor.restitution * x[1]]),
+    )  # fmt: skip
+    states = np.zeros((len(found), 9))
+    states[:, 2], states[:, 5] = found.T
+    return states
+
+
+WAYS = {
+    "tripod-turns": (tripod, 1e-9),
+    "plank": (sliding, 1e-4),
+    "thousandfold": (sliding, 1e-9),
+    "belt": (sliding, 1e-4),
+    "dry-joint": (swinging, 1e-6),
+    "rocking-block": (rocking, 1e-6),
+    "bounce": (bouncing, 1e-6),
+}
+"""Another way to each case, and by how much that is wrong: of what starts or stops within a step, a step; of what is
+switched, the time after a switch in which none is looked for."""
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_another_way_leads_to_the_same_motion_and_not_to_a_wrong_one(name):
+    case, (way, bound) = CASES[name], WAYS[name]
+    found = way(case)
+    assert case.error(found) < bound
+    for text, states in case.wrong.items():
+        assert dataclasses.replace(case, exact=states).error(found) > 2 * TOLERANCE, text
+
+
+def test_every_new_case_has_another_way():
+    assert {name for name, case in CASES.items() if case.needs} | {"rocking-block"} == WAYS.keys()
+
+
+@pytest.mark.parametrize(("name", "switches"), [("rocking-block", 7), ("bounce", 5)])
+def test_no_sample_is_near_a_blow(name, switches):
+    """Where an engine is late by a step, it is not to be wrong by the whole jump."""
+    case = CASES[name]
+    fine = np.arange(1, 20000) * (case.times[-1] / 20000)
+    found = (rocking if name == "rocking-block" else bouncing)(dataclasses.replace(case, times=fine))
+    jumps = np.abs(np.diff(found[:, switches])) > 0.02
+    assert jumps.any()
+    assert np.abs(case.times[:, None] - fine[1:][jumps]).min() > 5e-3
+
+
+OLD = """
+def build(case, timestep):
+    globals().update(case=case, now=0.0, timestep=timestep)
+def step(n):
+    globals().update(now=now + n * timestep)
+def state():
+    return case.exact[abs(case.times - now).argmin()].reshape(-1, 3)
+"""
+
+
+def test_an_adapter_of_version_1_takes_what_it_took_and_is_not_asked_for_more(tmp_path, monkeypatch):
+    (tmp_path / "of_version_1.py").write_text(OLD)
+    (tmp_path / "of_version_2.py").write_text(f"FEATURES = ('two bodies',){OLD}")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert run(CASES["box-stops"], "of_version_1").passed
+    asked = run(CASES["plank"], "of_version_1")
+    assert asked.skipped == "of_version_1 doesn't say in FEATURES that it can do this: two bodies"
+    assert not asked.errors
+    assert run(CASES["plank"], "of_version_2").passed
+
+
+def test_files_of_cases_are_read_whatever_their_version(tmp_path, capsys):
+    assert cli.main(["cases", "-o", str(tmp_path)]) == 0
+    for name, case in CASES.items():
+        again = read(tmp_path / f"{name}.json")
+        assert again.error(case.exact) == 0
+        assert (again.bodies, again.surfaces, again.needs) == (case.bodies, case.surfaces, case.needs)
+    data = json.loads((tmp_path / "box-stops.json").read_text())
+    new = ("spring", "joint", "dry", "under", "between")
+    data = {key: value for key, value in data.items() if key not in new} | {"version": 1}
+    data["surfaces"] = [{k: v for k, v in s.items() if k not in ("velocity", "restitution")} for s in data["surfaces"]]
+    (old := tmp_path / "old.json").write_text(json.dumps(data))
+    assert read(old).bodies == CASES["box-stops"].bodies
+    for change, says in (
+        (
+            {"version": VERSION + 1},
+            f"is of version {VERSION + 1} of the exact cases; this program reads 1 to {VERSION}",
+        ),
+        ({"schema": "dualball-trajectory"}, "is no exact case: its schema is 'dualball-trajectory'"),
+    ):
+        (other := tmp_path / "other.json").write_text(json.dumps(data | change))
+        with pytest.raises(InputError, match=says):
+            read(other)
+    for text in ("[]", "{}", "no", '{"schema": "dualball-case", "version": 1}'):
+        other.write_text(text)
+        with pytest.raises(StorageError, match="holds no exact case"):
+            read(other)
