@@ -121,11 +121,8 @@ class Classifier:
         band = settings.regularisation_speed(load) * settings.rolls
         saturated = friction >= (1 - _SATURATED) * limit
         # A rotation that slips at both contacts alike while one of them holds is creep, too: the load moves from one
-        # to the other, as it may where both roll, and slip would be stopped by the one that holds. Rigid contacts
-        # have no band and don't creep, but on a wall that a step turns by h omega_c a ball that rolls shows the step
-        # times its load, h omega_c^2 R.
-        below = np.where(band > 0, _SHARED * speed[..., ::-1], _SLIDES * settings.timestep * normal / self._m)
-        held = ((normal > 0) & ~saturated)[..., ::-1] & (speed < below)
+        # to the other, as it may where both roll, and slip would be stopped by the one that holds.
+        held = ((normal > 0) & ~saturated)[..., ::-1] & (speed < _SHARED * speed[..., ::-1])
         slips = saturated & (speed > 3 * band) & ~held
         rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
         shown: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)

@@ -12,16 +12,20 @@ from mjsim import compiled, corrections, free
 from mjsim.corrections import Ball
 from mjsim.coulomb import Coulomb
 from mjsim.coulomb import compiled as kernels
+from mjsim.recorder import SENSORS, SLIPS
 from model.arrays import Array
 
-_driven, _unwrapped = register_jitable(free.driven), register_jitable(free.unwrapped)
+_driven, _spun, _against, _slip, _unwrapped = (
+    register_jitable(each) for each in (free.driven, free.spun, free.against, free.slip, free.unwrapped)
+)
+_A_x, _A_y, _B_x, _B_y = (SLIPS - SENSORS).tolist()
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 @compiled.named_after(corrections, free, kernels)
 def _advance(
-    m: int, d: int, head: int, ball: Any, fluid: Array,
-    qpos: Array, qvel: Array, applied: Array, wall: Array, sensors: Array, seen: Array, theta: float,
+    m: int, d: int, head: int, ball: Any, ahead: float, fluid: Array,
+    qpos: Array, qvel: Array, applied: Array, wall: Array, at: Array, sensors: Array, seen: Array, theta: float,
 ) -> float:  # fmt: skip
     for number in range(len(fluid)):
         x, y = qpos[0], qpos[1]
@@ -30,6 +34,10 @@ def _advance(
             applied[i] = forces[i]
         theta = _unwrapped(math.atan2(y, x), theta)
         wall[0], wall[3] = math.cos(theta / 2), math.sin(theta / 2)
+        spin = _spun(qpos[3:], qvel)
+        slip = _slip(qpos, qvel, spin, ahead, ball)
+        qvel[6], qvel[7] = _against(theta, qvel, spin, ahead, ball)
+        at[2], qpos[7], qpos[8] = qpos[2], 0.0, 0.0
         seen[number, -2], seen[number, -1] = qpos[2] - ball.r, ball.R - math.hypot(x, y)
         kernels.mj_step1(m, d)
         kernels.control_linked(m, d, head)
@@ -37,10 +45,14 @@ def _advance(
         kernels.retain_linked(m, d, head)
         for i in range(len(sensors)):
             seen[number, i] = sensors[i]
+        seen[number, _A_x], seen[number, _A_y], seen[number, _B_x], seen[number, _B_y] = slip
     return theta
 
 
-def advance(law: Coulomb, data: Any, ball: Ball, fluid: Array, seen: Array, theta: float) -> float:
-    """As `mjsim.free` takes steps, one for each omega_0; return the azimuth before the last."""
-    state = data.qpos, data.qvel, data.qfrc_applied, data.mocap_quat[0], data.sensordata
-    return float(_advance(*law.addresses(data), Ball(*map(float, ball)), fluid, *state, seen, theta))
+def advance(
+    law: Coulomb, data: Any, wall: Array, at: Array, ball: Ball, ahead: float, fluid: Array, seen: Array, theta: float
+) -> float:
+    """As `mjsim.free` takes steps, one for each omega_0, with places `ahead` of velocities, and the quaternion and the
+    place of the wall; return the azimuth before the last step."""
+    state = data.qpos, data.qvel, data.qfrc_applied, wall, at, data.sensordata
+    return float(_advance(*law.addresses(data), Ball(*map(float, ball)), ahead, fluid, *state, seen, theta))

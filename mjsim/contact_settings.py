@@ -51,6 +51,8 @@ _CHOICES = {
     "wall": ("tangent", "prism"),
     "law": ("soft", "rigid"),
 }
+FORESEEN = 0.05
+"""Share of a force to which a step foresees what rigid contacts slip: `Law.share` of mjsim.coulomb, by a test."""
 _LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
 """`contact_decay` beyond which contacts are made slower; and `solref` with its time in steps, the fastest first: stable
 up to mu eta = 1.03, 2.1, 5 and 9."""
@@ -209,20 +211,24 @@ class ContactSettings:
         return self.softness * load * (1 + kept) / (friction * self.b_f)
 
     def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f."""
-        return np.asarray(self.softness / self.impratio * np.asarray(load, dtype=float) / self.b_f)
+        """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f.
+
+        Of rigid contacts it is what a step changes by a share `FORESEEN` of the force: so well they know their slip.
+        """
+        time = FORESEEN * self.timestep if self.rigid else self.softness / self.impratio / self.b_f
+        return np.asarray(time * np.asarray(load, dtype=float))
 
     @property
     def rolls(self) -> float:
-        """Share of `regularisation_speed` below which a contact rolls: without memory one that does creeps so fast.
-
-        0 if contacts are rigid: one that rolls bears less than the limit of friction, or another one holds the ball.
-        """
-        return 0.0 if self.rigid else 1e-3 if self.memory else 0.4
+        """Share of `regularisation_speed` below which a contact rolls: without memory one that does creeps so fast."""
+        return 1.0 if self.rigid else 1e-3 if self.memory else 0.4
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory."""
-        return self.regularisation_speed(load) * (0.0 if self.memory or self.rigid else 1.0)
+        """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory.
+
+        Rigid contacts may slip so fast where two of them hold a ball by forces that the balances leave open.
+        """
+        return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)
 
     @property
     def midpoint(self) -> float:

@@ -24,7 +24,7 @@ from mjsim.corrections import Ball, followed, resistance
 from mjsim.coulomb import Coulomb
 from model import Parameters, State
 from model.arrays import Array
-from model.kinematics import Motion, from_world, rotated, slip_speeds, to_world
+from model.kinematics import Motion, from_world, rotated, to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -56,6 +56,42 @@ def driven(place: Any, turned: Any, velocity: Any, omega_0: float, ball: Ball) -
     )
 
 
+def spun(turned: Any, velocity: Any) -> tuple[float, float, float]:
+    """Spin of a free ball along the vessel's axes, rad/s."""
+    w, a, b, c = turned[0], turned[1], turned[2], turned[3]
+    x, y, z = velocity[3], velocity[4], velocity[5]
+    return (
+        (1 - 2 * (b * b + c * c)) * x + 2 * (a * b - w * c) * y + 2 * (a * c + w * b) * z,
+        2 * (a * b + w * c) * x + (1 - 2 * (a * a + c * c)) * y + 2 * (b * c - w * a) * z,
+        2 * (a * c - w * b) * x + 2 * (b * c + w * a) * y + (1 - 2 * (a * a + b * b)) * z,
+    )
+
+
+def against(azimuth: float, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tuple[float, float]:
+    """Velocity of the wall inwards and upwards, m/s, at which what is at rest against it is so against the cylinder
+    once velocities are where the place is at the end of the step.
+
+    By then the azimuth has grown by h/2 Omega: of the velocity along the wall h/2 Omega^2 R will point into it, and
+    where ball and wall touch the turning about the normal will show as h/2 Omega r o_n of slip.
+    """
+    out_x, out_y = math.cos(azimuth), math.sin(azimuth)
+    rate = (out_x * velocity[1] - out_y * velocity[0]) / ball.R
+    return ahead * rate * rate * ball.R, -ahead * rate * ball.r * (out_x * spin[0] + out_y * spin[1])
+
+
+def slip(place: Any, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tuple[float, float, float, float]:
+    """Velocities along floor (2) and wall (round, up) at the points of contact where the ball is `ahead` s before."""
+    x, y = place[0] - ahead * velocity[0], place[1] - ahead * velocity[1]
+    rho, r = math.hypot(x, y), ball.r
+    out_x, out_y = x / rho, y / rho
+    return (
+        velocity[0] - r * spin[1],
+        velocity[1] + r * spin[0],
+        out_x * velocity[1] - out_y * velocity[0] + r * spin[2],
+        velocity[2] + r * (spin[0] * out_y - spin[1] * out_x),
+    )
+
+
 def unwrapped(azimuth: float, last: float) -> float:
     """The turn of an azimuth that is nearest to the last one; that one in a run that has diverged."""
     return azimuth + math.tau * round((last - azimuth) / math.tau) if math.isfinite(azimuth) else last
@@ -76,23 +112,19 @@ class Free:
         self.margins, self.given_up = np.zeros((2, len(models))), np.full(len(models), np.inf)
 
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
-        slips = np.zeros((len(self._balls), 2))
         if row is not None:
             for k, ball in enumerate(self._balls):
                 x = ball.read()  # coordinates of the joint chain, with the orientation upright
                 joints = recorder.joint_state(x, ball.theta, ball.p)
                 row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = joints
-                slips[k] = slip_speeds(x, ball.p)
         fluid = np.array(list(omega_0))
         seen = np.empty((*fluid.shape, recorder.NSENSOR)) if sensors is None else sensors
         for k, ball in enumerate(self._balls):
             ball.advance(fluid[:, k], seen[:, k])
             self.margins[:, k] = ball.model.pair_margin[:2]
         if row is not None and sensors is not None:
-            row[:, recorder.SENSORS : -1], row[:, -1] = sensors[0], 0.0
-            for k, ball in enumerate(self._balls):
-                if ball.law:
-                    row[k, recorder.SLIPS] = slips[k, 0], 0.0, slips[k, 1], 0.0
+            row[:, recorder.SENSORS : -1] = sensors[0]
+            row[:, -1] = [ball.ahead for ball in self._balls]
 
     def state(self) -> dict[str, Array]:
         kept = np.empty((len(self._balls), mujoco.mj_stateSize(self._balls[0].model, _INTEGRATION)))
@@ -120,23 +152,27 @@ class _Ball:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)
         self.p, self._ball, self.theta = p, Ball.of(p, settings), theta_0
-        start = to_world(x, theta_0, p)
-        self.data.qpos[:] = [*start.position, 1.0, 0.0, 0.0, 0.0]
-        self.data.qvel[:] = [*start.velocity, *start.spin]
-        self._turns = settings.wall == "tangent"
-        self._reach = settings.touching(p.g)
         self.law = Coulomb(self.model, rigid=True) if settings.rigid else None
+        self.ahead = settings.timestep / 2 if self.law else 0.0
+        now, x = to_world(x, theta_0, p), State.of(x)
+        there = x._replace(y=x.y + self.ahead * x.v_y, h=x.h + self.ahead * x.v_h)
+        place = to_world(there, theta_0 + self.ahead * float(x.omega_c), p).position
+        self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
+        self.data.qvel[:6] = [*now.velocity, *now.spin]
+        self._turns = settings.wall == "tangent"
+        wall = self.model.body("wall") if self.law else None
+        self._wall = wall.quat if wall else self.data.mocap_quat[0]
+        self._at = wall.pos if wall else np.zeros(3)
+        self._reach = settings.touching(p.g)
 
     def read(self) -> State:
-        """The state; of rigid contacts velocities along the axes of the wall as the last step held it.
-
-        At the end of a step a ball that rolls on the wall doesn't slip against that. At the beginning of the next the
-        wall has turned by h omega_c, and what that shows, h omega_c^2 R, is no slip of the ball.
-        """
-        (place, quaternion), (velocity, spin) = (np.split(v, [3]) for v in (self.data.qpos, self.data.qvel))
-        spin, azimuth = rotated(quaternion, spin), math.atan2(place[1], place[0])
-        if self.law:
-            half = (azimuth - self.theta) / 2
+        """The state, with a place that is `ahead` of the velocities; these are along the axes of where the ball was."""
+        qpos, qvel = self.data.qpos, self.data.qvel
+        place, velocity, spin = qpos[:3], qvel[:3], rotated(qpos[3:7], qvel[3:6])
+        azimuth = math.atan2(place[1], place[0])
+        if self.ahead:
+            x, y = place[:2] - self.ahead * velocity[:2]
+            half = (azimuth - math.atan2(y, x)) / 2
             turn = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
             velocity, spin = rotated(turn, velocity), rotated(turn, spin)
         self.unwrap(azimuth)
@@ -149,29 +185,35 @@ class _Ball:
     def advance(self, fluid: Array, seen: Array) -> None:
         """Take a step for each omega_0; `seen` (steps, `NSENSOR`) takes the sensors and the gaps of A and B, m."""
         if self.law and (loop := loops()):
-            self.theta = loop(self.law, self.data, self._ball, fluid, seen, self.theta)
+            self.theta = loop(
+                self.law, self.data, self._wall, self._at, self._ball, self.ahead, fluid, seen, self.theta
+            )
             return
-        for number, omega_0 in enumerate(fluid.tolist()):
-            gaps = self._step(omega_0)
-            seen[number] = *self.data.sensordata, *gaps
+        for row, omega_0 in zip(seen, fluid.tolist(), strict=False):
+            self._step(omega_0, row)
 
-    def _step(self, omega_0: float) -> tuple[float, float]:
+    def _step(self, omega_0: float, seen: Array) -> None:
         data, p, gain = self.data, self.p, self._ball.gain
-        place, turned = data.qpos[:3].tolist(), data.qpos[3:].tolist()
-        data.qfrc_applied[:] = driven(place, turned, data.qvel.tolist(), omega_0, self._ball)
+        place, turned, velocity = data.qpos[:3].tolist(), data.qpos[3:7].tolist(), data.qvel[:6].tolist()
+        data.qfrc_applied[:6] = driven(place, turned, velocity, omega_0, self._ball)
         gaps = place[2] - p.r, p.R - math.hypot(place[0], place[1])
         self.unwrap(math.atan2(place[1], place[0]))
         if self._turns:
-            data.mocap_quat[0] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
+            self._wall[:] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
         if gain:
             for contact, gap in enumerate(gaps):
                 if gap < self._reach:
                     self.model.pair_margin[contact] = followed(self.model.pair_margin[contact], gap, gain)
         if self.law:
+            spin = spun(turned, velocity)
+            self._at[2], data.qpos[7:] = place[2], 0.0
+            data.qvel[6:] = against(self.theta, velocity, spin, self.ahead, self._ball)
             self.law.step(data)
         else:
             mujoco.mj_step(self.model, data)
-        return gaps
+        seen[:] = *data.sensordata, *gaps
+        if self.law:  # the engine has them of a wall that is ahead
+            seen[recorder.SLIPS - recorder.SENSORS] = slip(place, velocity, spin, self.ahead, self._ball)
 
     def unwrap(self, azimuth: float) -> None:
         """Take the turn of this azimuth that is nearest to the last one; leave it in a run that has diverged."""

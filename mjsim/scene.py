@@ -16,6 +16,8 @@ from model import InputError, Parameters
 
 SCENE = Path(__file__).with_name("scene.xml")
 
+_HEAVY = 1e6
+"""Mass of a wall that moves, divided by that of the ball."""
 _MAXFORCE = 2
 """Code of reduce="maxforce" in a contact sensor."""
 
@@ -41,6 +43,16 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         for each in (*map(spec.sensor, ("gap A", "gap B")), *map(spec.joint, ("azimuth", "inward", "upward", "spin"))):
             spec.delete(each)
         body.add_freejoint(name="free")
+    if settings.rigid:  # the wall is the face of a block that goes with the ball, so heavy that it isn't moved
+        option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
+        half, (box, slide) = 4 * p.R, (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_SLIDE)
+        moving = spec.worldbody.add_body(name="wall")
+        for axis in ([-1, 0, 0], [0, 0, 1]):
+            moving.add_joint(type=slide, axis=axis, armature=_HEAVY * p.m)
+        rgba = list(wall.rgba)
+        spec.delete(wall)
+        part = moving.add_geom(name="wall", type=box, size=[half] * 3, pos=(p.R + p.r + half, 0, 0), rgba=rgba)
+        part.mass, part.contype, part.conaffinity = p.m / _HEAVY, 0, 0
     if settings.wall == "prism":  # of fixed planes, tangent to the vessel's cylinder
         sensor = spec.sensor("B")
         for facet in range(settings.facets):

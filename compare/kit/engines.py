@@ -260,7 +260,7 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
     A contact that rolls creeps at a speed proportional to its friction force, with a factor that the settings give; a
     hundredth more than that is creep, too, since it lags behind a force that still changes. A ball that rolls on both
     moves its load from one contact to the other, so that one may be at the limit of friction while the other holds:
-    where one of two contacts creeps, the other slips no faster than it. Rigid contacts don't creep.
+    where one of two contacts creeps, the other slips no faster than it.
     """
     m = run.header.parameters.m
     if ENGINES[run.header.engine].settings is not ContactSettings:

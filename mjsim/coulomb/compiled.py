@@ -695,7 +695,7 @@ def _stiffen(m: int, d: int, head: int) -> None:
     islands = _at(ISLAND_R) >= 0 and _number(d, NISLAND) > 0  # they have copies, but not in MuJoCo 3.3.0
     place = _whole(d, ISLAND_PLACE if islands else COLIND)
     island_softness, island_stiffness = _array(d, ISLAND_R if islands else R), _array(d, ISLAND_D if islands else D)
-    slow = h * _gravity(m)
+    slow, depth = h * _gravity(m), numbers[DEPTH] * (h / law.USUAL) ** 2
     for i in range(counts[COUNT]):
         a, length, gap = places[4 * i + FIRST], places[4 * i + LENGTH], kept[W * i + law.GAP]
         edges = length > 1 and not elliptic
@@ -705,7 +705,7 @@ def _stiffen(m: int, d: int, head: int) -> None:
         lasting = min(load, kept[W * i + law.BORE])  # not the force of a blow
         kept[W * i + law.BORE] = load
         one, other = bound[int(kept[W * i])], bound[int(kept[W * i + 1])]
-        deep = max(-gap - numbers[DEPTH] * (min(one, other) or max(one, other)), 0.0)  # planes have no radius
+        deep = max(-gap - depth * (min(one, other) or max(one, other)), 0.0)  # planes have no radius
         goal = -gap / h if gap > 0 else min(numbers[PUSH] * deep / h, max(slow, h * diagonal[a] * lasting))
         r, above = ROW * places[4 * i + AT] + RESIDUAL, max(gap, 0.0)
         fall = h * max(-(rows[r] + rows[r + ROW]) / 2 if edges else -rows[r], 0.0)

@@ -351,7 +351,7 @@ class Simulation:
             load = load + np.where(self._length > 1, self._memory[self._other[self._first]], 0.0)
         bound = model.geom_rbound[kept[law.GEOMS : law.PLACE].astype(int)]  # planes have none
         smaller = np.where(bound.min(axis=0) > 0, bound.min(axis=0), bound.max(axis=0))
-        deep = np.maximum(-gap - numbers.depth * smaller, 0.0)
+        deep = np.maximum(-gap - numbers.depth * (h / law.USUAL) ** 2 * smaller, 0.0)
         lasting, kept[law.BORE] = np.minimum(load, kept[law.BORE]), load  # not the force of a blow
         push = np.minimum(numbers.push * deep / h, np.maximum(slow, h * estimate * lasting))
         goal = np.where(gap > 0, -gap / h, push)

@@ -27,6 +27,8 @@ STILL = 1e-9
 """Most that contacts and bodies may move, m or rad, for what depends on their poses to stay as it is."""
 APART = 1e9
 """Approach that a contact allows which is open, m s-2."""
+USUAL = 2e-3
+"""MuJoCo's own time step, s."""
 CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
 
@@ -48,7 +50,8 @@ class Law:
     push: float = 0.1
     """Share of its depth that a rigid contact loses in a step."""
     depth: float = 1e-5
-    """Depth that it keeps, in units of the smaller radius: without any, colliders drop points of what rests."""
+    """Depth that it keeps at `USUAL`, in units of the smaller radius; it falls with the square of the step. Without
+    any, colliders drop points of what rests."""
     calm: float = 1e-5
     """Acceleration below which the solver starts from none, m s-2 or rad s-2."""
     near: float = 0.01

@@ -124,6 +124,7 @@ def rigid(spec: Any, case: Case, timestep: float) -> None:
             continue
         for k in range(FACETS):
             spec.delete(spec.geom(f"{surface.name}{k}"))
+        spec.option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
         own, half = spec.worldbody.add_body(name=surface.name), _WALL * case.body.size[0]
         for axis in ([-1, 0, 0], [0, 0, 1]):
             own.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=_HEAVY * case.body.mass)
