@@ -1,4 +1,4 @@
-"""Exact contact cases, engines on trial on them, grades of a person's settings, and the league."""
+"""Exact contact cases, engines on trial on them, and the league."""
 
 from compare.bench.case import read
 from compare.bench.exact import cases

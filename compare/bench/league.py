@@ -62,7 +62,7 @@ CAPTION = (
 
 
 def measure(
-    engines: Mapping[str, str], steps: Sequence[float] | None, workers: int, show: Show
+    engines: Mapping[str, Any], steps: Sequence[float] | None, workers: int, show: Show
 ) -> dict[str, list[Result]]:
     """Results by engine, one for each case; engines that can't be used have results that say why."""
     asked, done = cases(), 0

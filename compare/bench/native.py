@@ -1,4 +1,4 @@
-"""Contact settings as MuJoCo itself has them: given by option, or read from a person's MJCF file.
+"""Contact settings as MuJoCo itself has them, read from a person's MJCF file, for `dualball league --settings`.
 
 `mjsim.ContactSettings` holds what the study needs and refuses what can't work. This is for settings of which nobody
 knows yet whether they work.
@@ -15,12 +15,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.adapters.mujoco_free import pairs
+from compare.bench.adapters.mujoco_free import Bodies, pairs
 from compare.bench.case import Case
-from compare.bench.contact_law import impedance, reference
 from compare.bench.settled import load
-from mjsim import ContactSettings, scene
-from model import InputError, Parameters
+from model import InputError
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
 
 _FEW = Range(0, 1e5, whole=True)
@@ -84,19 +82,6 @@ class Native:
         for name, known in CHOICES.items():
             check_choice(name, getattr(self, name), list(known))
 
-    def loop(self, **changes: Any) -> ContactSettings:
-        """Settings of the study's loop round the engine, with all its corrections off."""
-        return ContactSettings.at(self.timestep, memory=False, servo=0.0, order=1, cone=self.cone, **changes)
-
-    def build(self, p: Parameters, loop: ContactSettings) -> tuple[Any, str]:
-        """As `mjsim.scene.build`, with these settings in the place of those of the loop."""
-        spec = scene.spec(p, loop)
-        self.set(spec, ((self.A if pair.name == "A" else self.B, pair) for pair in spec.pairs))
-        try:
-            return spec.compile(), str(spec.to_xml())
-        except ValueError as error:
-            raise InputError(f"MuJoCo refuses these settings: {' '.join(str(error).split())}") from error
-
     def tune(self, spec: Any, case: Case, timestep: float) -> None:
         """Set an exact case's scene: a wall as the wall, all else as the floor."""
         own = ((self.B if name == "wall" else self.A, pair) for name, pair in pairs(spec, case))
@@ -112,26 +97,13 @@ class Native:
             for field in dataclasses.fields(Pair):
                 setattr(pair, field.name, getattr(own, field.name))
 
-    def theory(self, pair: Pair, load: float) -> ContactSettings:
-        """Settings with one impedance that a contact amounts to under the normal force m `load` (m s-2).
 
-        The impedance is that at the depth of rest; time constants follow from b = 2/(dmax tc) and
-        k = d/(dmax tc dr)^2, and are those that the engine puts in the place of ones shorter than two steps.
-        """
-        solimp = np.array([pair.solimp])
-        of_friction = pair.solreffriction if any(pair.solreffriction) else pair.solref
-        refs, discrete = np.array([pair.solref, of_friction]), self.integrator == "discrete"
-        (stiffness, _), (b, b_f) = reference(refs, solimp[[0, 0]], self.timestep, discrete)
-        depth = np.zeros(1)
-        impratio = min(max(self.impratio, 0.1), 1e7)
-        bare = ContactSettings(timestep=1e-12, impratio=impratio, memory=False, servo=0.0, order=1)
-        for _ in range(50):
-            d = impedance(solimp, depth).item()
-            tc = 2 / (d * b)
-            solref = float(tc), float(1 / (tc * d * np.sqrt(stiffness)))
-            formal = dataclasses.replace(bare, solimp=d, solref=solref, solreffriction=float(2 / (d * b_f)))
-            depth = np.array([formal.margin(load)])
-        return formal
+def entry(path: Path) -> Bodies:
+    """An engine for the league: MuJoCo with the settings of a file, at its own time step; errors as of `read`."""
+    settings = read(path)
+    made = Bodies(path.stem, settings.note, tune=settings.tune)
+    made.TIMESTEPS = (settings.timestep,)
+    return made
 
 
 def read(path: Path) -> Native:
@@ -155,7 +127,7 @@ def read(path: Path) -> Native:
     if not spheres:
         raise InputError(f"{path}: there is no ball: it needs a geom of type sphere in a body with a joint")
     if len(spheres) > 1 and not named:
-        raise InputError(f"{path}: there are {len(spheres)} spheres that move; name the one to be graded 'ball'")
+        raise InputError(f"{path}: there are {len(spheres)} spheres that move; name the one that counts 'ball'")
     floors, walls = _contacts(model, (named or spheres)[0])
     if not floors + walls:
         raise InputError(

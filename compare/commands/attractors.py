@@ -1,4 +1,4 @@
-"""``dualball attractors``, ``basins``, ``search``: what balls come to, over starts and over parameters."""
+"""``dualball attractors``, ``basins``: what balls come to, over starts and over parameters."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import argparse
 import itertools
 import shlex
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,18 +16,16 @@ from analytic.orbits.fates import LASTING, Attractor
 from analytic.orbits.periodic import Orbit
 from analytic.simulation.ensemble import interval
 from compare.commands import options, running
-from compare.kit import pages, progress
+from compare.kit import drawing, pages
 from compare.kit.engines import EVENT
 from compare.kit.statistics import plain
 from compare.kit.sweep import Axis, grid
 from compare.kit.tasks import carry_out
-from compare.subjects.attractors import search
-from compare.subjects.attractors.search import BOX, FATES, AttractorSearch, Searched
+from compare.subjects.attractors.basins import FATES, basins
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import POSITIVE
 
 
 def add(commands: options.Commands) -> None:
@@ -48,17 +45,6 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--page", type=options.MARKDOWN, help="write the tables as Markdown, too (default: don't)")
     options.outputs(command, shown="print as JSON")
 
-    command = options.command(commands, "search", searched, "--sets 200 --range mu=0.5:1")
-    command.add_argument("--sets", type=options.count, default=500, help="parameter sets")
-    command.add_argument("--starts", type=options.count, default=5, help="random starts of each")
-    command.add_argument("--seed", type=options.seed, default=0, help="seed of the random sets and starts")
-    options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
-    running.add_workers(command)
-    command.add_argument("--kept", type=Path, nargs="+", help="show what --save wrote instead")
-    command.add_argument("--save", type=options.JSON, help="write the sets with hopping as JSON")
-    command.add_argument("--page", type=options.MARKDOWN, help="write the table as Markdown")
-    options.outputs(command, "search", "print the sets with hopping as JSON")
-
     example = "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21"
     command = options.command(commands, "basins", plane, example)
     options.add_parameters(command)
@@ -71,6 +57,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
     running.add_workers(command)
     command.add_argument("--save", type=options.JSON, help="write the map as JSON")
+    command.add_argument("--plot", type=options.FIGURE, help="draw the map: png, svg or pdf (default: don't)")
     options.outputs(command, "basins", "print the shares as JSON")
 
 
@@ -193,34 +180,19 @@ def _largest(row: dict[str, Any]) -> float:
     return max((abs(complex(*each)) for each in row["multipliers"]), default=float("nan"))
 
 
-def searched(args: argparse.Namespace) -> int:
-    """Search what hasn't been searched yet, and show the table."""
-    if args.kept:
-        searches = [Searched.load(path) for path in args.kept]
-    else:
-        axes = Axis.several(args.range, dict.fromkeys(BOX, "1"), "group", POSITIVE)
-        asked = AttractorSearch(BOX | {axis.name: axis.ends for axis in axes}, args.starts, args.seed)
-        with progress.shown(args.quiet or args.json) as show:
-            searches = [search.run(args.output, asked, args.sets, running.workers(args), show)]
-    if args.save:
-        searches[0].save(args.save)
-    tables = [(search.summary(each), search.table(each)) for each in searches]
-    if args.page:
-        write_text(args.page, "\n\n".join(f"{text}\n\n{pages.markdown(rows)}" for text, rows in tables) + "\n")
-    shown = (pages.table("Where the ball hops for ever", rows, caption=text) for text, rows in tables)
-    options.show(searches, args.json, *shown)
-    return 0
-
-
 def plane(args: argparse.Namespace) -> int:
     """Map the basins and show their shares."""
     p, start = options.parameters(args), running.start(args)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     with running.campaign(args, "basins") as campaign:
-        mapped = search.basins(campaign, p, start._asdict(), across, up, args.mujoco, args.timestep)
+        mapped = basins(campaign, p, start._asdict(), across, up, args.mujoco, args.timestep)
     if args.save:
         mapped.save(args.save)
+    if args.plot:
+        from compare.view import planes  # here, because drawing takes a second to load
+
+        drawing.save(planes.draw(mapped), args.plot)
     shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
     differ = mapped.differences().tolist() if args.mujoco else []
     said = []

@@ -1,9 +1,8 @@
-"""Contacts and engines: ``forecast`` for any MuJoCo model, ``grade`` for one's own settings, ``league``."""
+"""Contacts and engines: ``forecast`` for any MuJoCo model; ``league``, which takes one's own settings, too."""
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import itertools
 import json
 import re
@@ -12,27 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
-import numpy as np
 from rich.text import Text
 
-from compare.bench import forecast, forecast_page, grade, league, native, settled
-from compare.bench.native import CHOICES, NUMBERS, Native
+from compare.bench import forecast, forecast_page, league, native, settled
 from compare.commands import options, running
-from compare.kit import engines, pages, progress
-from mjsim import ContactSettings
+from compare.kit import pages, progress
 from model import InputError
 from model.files import check_ours, make_directory, write_text
 from model.parameters import POSITIVE, check_names
 
 LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
-_PAIR: dict[str, tuple[Any, Any, str]] = {
-    "solref": (2, ("TIMECONST", "DAMPRATIO"), "spring and damper of a contact"),
-    "solreffriction": (2, ("TIMECONST", "DAMPRATIO"), "the same of its friction"),
-    "solimp": ("+", "D", "impedance: dmin dmax width midpoint power"),
-    "margin": (None, "m", "distance from which on there is a contact"),
-}
-"""Numbers of a contact: how many there are, their names, and more help."""
 
 
 def add(commands: options.Commands) -> None:
@@ -51,88 +40,26 @@ def add(commands: options.Commands) -> None:
     command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write")
     options.outputs(command)
 
-    command = options.command(commands, "grade", graded, "mine.xml -o card.html")
-    mine = "MJCF file with a ball and its contacts"
-    command.add_argument("file", type=Path, nargs="?", metavar="FILE.xml", help=mine)
-    group = command.add_argument_group("settings", "as in MJCF; where not given, those of FILE.xml or MuJoCo's own")
-    for name, (unit, allowed, meaning) in NUMBERS.items():
-        kind, metavar = options.Number(unit, allowed), "s" if unit == "s" else "N"
-        group.add_argument(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=meaning)
-    for name, known in CHOICES.items():
-        group.add_argument(f"--{name}", metavar="NAME", help=", ".join(known))
-    for name, (count, metavar, meaning) in _PAIR.items():
-        group.add_argument(f"--{name}", type=options.number, nargs=count, metavar=metavar, help=meaning)
-    running.add_engine_name(command)
-    command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write (default: none)")
-    options.outputs(command)
-
     command = options.command(commands, "league", ranked, "--quick")
     command.add_argument("--quick", action="store_true", help="one time step")
     named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENTRIES)}"
     command.add_argument("--engine", action="append", metavar="NAME", help=named)
+    mine = "MuJoCo with the options of an MJCF file and the contacts of its ball, too; beside it MuJoCo alone"
+    command.add_argument("--settings", type=Path, metavar="FILE.xml", help=mine)
     running.add_processes(command)
     options.outputs(command, "results")
-
-
-def graded(args: argparse.Namespace) -> int:
-    """Grade the settings and show the card."""
-    if args.engine is engines.MUJOCO:
-        yours, described = _of_mujoco(args)
-        others = grade.OTHERS
-    else:
-        yours, (others, described) = None, _of_another(args)
-    with progress.shown(quiet=args.json) as show:
-        columns = grade.grade(yours, others, show)
-    if args.output:
-        write_text(args.output, grade.html(columns, described))
-    advice = (Text(f"• {item}") for item in columns[0].advice)
-    data = [vars(own) | {"passed": own.passed, "cost": own.cost} for own in columns]
-    options.show(data, args.json, grade.table(columns), *advice)
-    return 0
-
-
-def _of_mujoco(args: argparse.Namespace) -> tuple[Native, str]:
-    """The settings that the options name, also in words."""
-    base = native.read(args.file) if args.file else Native()
-    if base.note:
-        print(f"dualball: {base.note}", file=sys.stderr)
-    own, pair = options.given(args, (*NUMBERS, *CHOICES)), options.given(args, _PAIR)
-    said = [f"{name} {value}" for name, value in own.items()]
-    said += [f"{name} {' '.join(f'{v:g}' for v in np.atleast_1d(value))}" for name, value in pair.items()]
-    source = f"Settings of {args.file}" if args.file else "MuJoCo's defaults"
-    described = f"{source}, with {', '.join(said)}." if said else f"{source}."
-    if len(values := pair.get("solimp", [])) > 5:
-        raise InputError(f"solimp has {len(values)} numbers, but at most 5: dmin dmax width midpoint power")
-    if "solimp" in pair:
-        pair["solimp"] = [*values, *base.A.solimp[len(values) :]]
-    pair = {name: tuple(v) if isinstance(v, list) else v for name, v in pair.items()}
-    A, B = (dataclasses.replace(each, **pair) for each in (base.A, base.B))
-    yours = dataclasses.replace(base, **own, A=A, B=B)
-    return yours, f"{described} {yours.note}".rstrip()
-
-
-def _of_another(args: argparse.Namespace) -> tuple[dict[str, tuple[Any, float]], str]:
-    """Another engine in its best settings and as it comes, also in words."""
-    engine: engines.Engine = args.engine
-    if engine.missing:
-        raise InputError(engine.missing)
-    if "timestep" not in engine.options:
-        raise InputError(f"{engine.name} has no time step, and no settings to grade")
-    if args.file or options.given(args, (*NUMBERS, *CHOICES, *_PAIR)).keys() - {"timestep"}:
-        raise InputError(f"a file and contact settings are MuJoCo's; of {engine.name} only --timestep can be given")
-    step = options.given(args, ["timestep"]).get("timestep", ContactSettings.timestep)
-    names = [name for name in (engine.name, engine.as_it_comes, "mujoco") if name in league.ENTRIES]
-    those = {name: (league.ENTRIES[name], step) for name in dict.fromkeys(names)}
-    return those, f"{engine.name} in its best known settings and as it comes, step {1e3 * step:g} ms."
 
 
 def ranked(args: argparse.Namespace) -> int:
     """Measure, show the table, write JSON and page."""
     from compare.report.pictures import address, svg  # here, because drawing takes a second to load
 
-    chosen = {name: league.ENTRIES.get(name, name) for name in args.engine or league.ENTRIES}
+    usual = [name for name in league.ENTRIES if not args.settings or re.match(r"mujoco(-plain|-defaults)?$", name)]
+    chosen: dict[str, Any] = {name: league.ENTRIES.get(name, name) for name in args.engine or usual}
     modules = {name for name in chosen if re.search(r"[.:]", name) or Path(f"{name}.py").exists()}
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
+    if args.settings:
+        chosen = {args.settings.stem: native.entry(args.settings)} | chosen
     make_directory(args.output)
     check_ours(args.output / LEAGUE_PAGE, beside=args.output / LEAGUE_JSON)
     with progress.shown(quiet=args.json or args.quiet) as show:

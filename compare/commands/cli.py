@@ -21,14 +21,14 @@ from typing import NoReturn
 from compare.commands import options, signals
 from compare.kit import pages
 from model import InputError, SimulationError
+from model.errors import suggestion
 from model.files import leave
 from model.versions import version
 
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "study": {
         "validate": ("validate", "hold simulation against theory, claim by claim; the main job"),
-        "judge": ("validate", "judge the stored measurements of a validation again"),
-        "report": ("look", "judge stored measurements again and write report.html anew"),
+        "judge": ("validate", "judge the stored measurements of a validation again and write report.html anew"),
         "figures": ("look", "draw the paper's figures, with measured points where there are results"),
     },
     "the ball": {
@@ -40,19 +40,23 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "collect": ("simulate", "gather the runs of a directory into one file for xarray"),
         "attractors": ("attractors", "what balls come to from many starts: stationary, periodic, chaotic motions"),
         "basins": ("attractors", "what becomes of the ball from each start of a plane of states, resumable"),
-        "search": ("attractors", "where in parameter space the ball hops for ever, resumable"),
         "design": ("design", "the best meter for a fluid and a range of flows, within bounds"),
         "render": ("look", "a picture or film of a run: the scene, contact forces, slip, case"),
         "view": ("look", "the ball in MuJoCo's viewer, driven by the study's own loop"),
     },
     "contacts and engines": {
         "forecast": ("bench", "what the contacts of a MuJoCo model will do: depth, creep, hovering, largest step"),
-        "grade": ("bench", "a score card for contact settings: yours, dualball's, MuJoCo's own; or another engine"),
         "cases": ("cases", "the exact contact cases: listed, shown, or as files for engines in any language"),
         "league": ("bench", "all installed engines on the exact cases, as they come and in the best settings known"),
     },
 }
 """The commands, as help groups them: the module of each, loaded for nothing else, and what it is for."""
+GONE = {
+    "report": "'dualball judge' writes report.html anew, too",
+    "search": "it is 'python -m docs.studies.search' in a clone",
+    "grade": "'dualball league --settings FILE.xml' puts settings on the exact cases, 'dualball forecast' any model",
+}
+"""Commands of earlier versions, and what to use now."""
 
 
 def program() -> NoReturn:
@@ -116,7 +120,7 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     """Carry out a command, whose arguments are added to `args`."""
     # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
     words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in argv]
-    _parser(words).parse_args(words, args)
+    _parser(words).parse_args(words or ["--help"], args)
     args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
     with options.no_empty_directories(args), signals.raised():
         return int(args.run(args))
@@ -138,6 +142,10 @@ def _parser(words: Sequence[str]) -> options.Parser:
         importlib.import_module(f"compare.commands.{module}").add(commands)
         commands.choices[words[0]].description = what
         return parser
+    if words and words[0] in GONE:
+        raise InputError(f"there is no command {words[0]!r} any more: {GONE[words[0]]}")
+    if words and not words[0].startswith("-"):
+        raise InputError(f"there is no command {words[0]!r}{suggestion(words[0], known)}; see 'dualball --help'")
     listed = []
     for title, group in GROUPS.items():
         listed.append(f"\n{title.capitalize()}:")

@@ -1,14 +1,12 @@
-"""Shows what is stored: ``report``, ``figures``, ``inspect``, ``compare``, ``render``; and ``view``, a live ball."""
+"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``view``, a live ball."""
 
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 from compare.commands import options, running
 from compare.kit import collection, drawing
-from compare.report import results
 from compare.view import inspection
 from mjsim import ContactSettings
 from model import Flow, InputError, storage
@@ -17,10 +15,7 @@ from model.parameters import NOT_NEGATIVE, POSITIVE, Range
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(commands, "report", report, "results")
     stored = "directory of a validation"
-    command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR", help=stored)
-
     command = options.command(commands, "figures", figures, "--format pdf")
     command.add_argument(
         "-o", "--output", type=options.results, default=Path("figures"), metavar="DIR", help="directory to write to"
@@ -63,15 +58,6 @@ def add(commands: options.Commands) -> None:
     running.add_start(command)
     command.add_argument("--timestep", type=options.seconds, help="time step (default: that of the study)")
     command.add_argument("--speed", type=options.Number(allowed=Range(1e-3, 1e3)), default=1.0, help="1 is real time")
-
-
-def report(args: argparse.Namespace) -> int:
-    """Judge the stored measurements anew and write the page."""
-    from compare import validation  # here, because drawing takes a second to load
-
-    validation.judge_stored(args.directory, workers=os.cpu_count() or 1)
-    print(args.directory / results.REPORT)
-    return 0
 
 
 def figures(args: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -189,13 +190,16 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
 
 
 def terminal(**look: Any) -> Console:
-    """A console that leaves it to the program what to do where nobody reads on."""
+    """A console that leaves it to the program what to do where nobody reads on; wide enough for any table off a
+    terminal."""
     from rich.console import Console  # here, because help needs none
 
     class Terminal(Console):
         def on_broken_pipe(self) -> NoReturn:
             raise BrokenPipeError
 
+    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
+        look.setdefault("width", 1000)
     return Terminal(**look)
 
 

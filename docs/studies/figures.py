@@ -10,8 +10,10 @@ from pathlib import Path
 import matplotlib
 
 from compare.kit import drawing
-from compare.subjects.attractors.search import Basins, Searched
+from compare.subjects.attractors.basins import Basins
+from compare.view import planes
 from docs.studies import cases, hopping
+from docs.studies.search import Searched
 from model.files import make_directory, write_text
 
 DOCS = Path(__file__).parents[1]
@@ -30,7 +32,7 @@ def main() -> None:
     write_text(DOCS / "hopping.md", hopping.page(search, *others))
     basins = Basins.load(DATA / "basins.json")
     hopping.draw_where(search).savefig(DOCS / "attractors" / "where.png", dpi=110)
-    drawing.save(hopping.draw_plane(basins), DOCS / "attractors" / "basins.png")
+    drawing.save(planes.draw(basins), DOCS / "attractors" / "basins.png")
     print(hopping.caption_where(search), hopping.caption_plane(basins), sep="\n")
 
 

@@ -1,24 +1,21 @@
-"""Where the ball hops for ever, and the basins of its attractors: drawn from what `--save` of `dualball search` and
-`dualball basins` wrote."""
+"""Where the ball hops for ever, and the basins of its attractors: drawn from what `docs.studies.search` and
+`dualball basins` saved."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from compare.kit import pages, style
-from compare.subjects.attractors.search import FATES, LOGARITHMIC, Basins, Searched, share, summary, table
+from compare.subjects.attractors.basins import FATES, Basins
+from docs.studies.search import LOGARITHMIC, Searched, share, summary, table
 from model.kinematics import UNITS, VARIABLES
 
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
 _CELLS = 8
 _AXES, _SYMBOLS = style.SYMBOLS | {"Omega_0": style.FREE_0}, style.SYMBOLS | {"Omega_0": "Ω₀"}
-_COLOURS = ("#F0E442", "#0072B2", "#D55E00", "#009E73", "#000000")
-"""Of `FATES`."""
 
 
 def draw_where(record: Searched) -> Figure:
@@ -70,44 +67,13 @@ def page(*searches: Searched) -> str:
         "# Where the ball hops for ever",
         "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are "
         "the friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). An attractor with a small basin is "
-        "missed by a few starts. `python -m docs.studies.figures` writes this page from what `dualball search --save` "
-        "kept.",
+        "missed by a few starts. `python -m docs.studies.figures` writes this page from what "
+        "`python -m docs.studies.search --save` kept.",
     ]
     for record in searches:
         least, most = record.search.box["kappa"]
         text += [f"## Drag from kappa = {least:.3g} to {most:.3g}", summary(record), pages.markdown(table(record))]
     return "\n\n".join(text) + "\n"
-
-
-def draw_plane(basins: Basins) -> Figure:
-    """The map by time stepping, and a point for each run of MuJoCo."""
-    figure = style.figure(6.2, 4.4)
-    axes = figure.subplots()
-    look: dict[str, Any] = {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(FATES) - 0.5, "alpha": 0.55}
-    axes.pcolormesh(basins.x, basins.y, basins.fates, shading="nearest", rasterized=True, **look)
-    present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
-    handles: list[object] = [Patch(color=_COLOURS[k], alpha=0.55, label=FATES[k]) for k in sorted(present)]
-    if basins.coarse:
-        x, y = np.meshgrid(basins.x[:: basins.coarse], basins.y[:: basins.coarse])
-        for k in sorted(set(basins.mujoco.ravel().tolist())):
-            own = basins.mujoco == k
-            axes.plot(x[own], y[own], "o", ms=4, color=_COLOURS[k], mec="k", mew=0.4)
-        differ = basins.mujoco != basins.fates[:: basins.coarse, :: basins.coarse]
-        if np.any(differ):
-            handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
-        handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
-    axes.set(xlabel=f"{_VARIABLES[basins.across]} at the start", ylabel=f"{_VARIABLES[basins.up]} at the start")
-    axes.legend(
-        handles=handles, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(handles), frameon=False
-    )
-    return figure
-
-
-_VARIABLES = {
-    "omega_c": style.OMEGA_C,
-    **{f"slip_{axis}": f"$\\tilde\\omega_{axis}$ (rad/s)" for axis in "xyz"},
-    **{"y": "y (m)", "v_y": "$v_y$ (m/s)", "h": "h (m)", "v_h": "$v_h$ (m/s)"},
-}
 
 
 def caption_plane(basins: Basins) -> str:

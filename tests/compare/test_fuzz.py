@@ -151,7 +151,7 @@ def results_of(measurements: Path) -> Path:
         ("collection", "inspect FILE"),
         ("measurements", "inspect FILE"),
         ("measurements", "judge RESULTS"),
-        ("measurements", "report RESULTS"),
+        ("measurements", "judge RESULTS --verbose"),
         ("measurements", "figures --results RESULTS -o DIRECTORY"),
     ],
 )

@@ -91,7 +91,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "basins --across omega_c=1:2:2 --up y=0:0.01:2 --workers 0 --quiet -o new/map --save new.json",
         "cases -o new/cases",
         "sweep --vary eta=0.1,0.2 --time 0.01 --workers 0 --quiet -o new/runs",
-        "search --sets 1 --starts 1 --workers 0 --quiet -o new",
     ],
 )
 def test_a_full_disk_leaves_nothing_behind(

@@ -30,11 +30,9 @@ LONG = {
     "collect": "runs -o new.h5",
     "attractors": "--set hopping --starts 1000",
     "basins": "--across omega_c=0:150:21 --up slip_x=-900:900:21 --workers 2",
-    "search": "--workers 2",
     "design": "meter.toml -o new.html",
     "render": "run.h5 -o new.gif",
     "forecast": "scene.xml --try",
-    "grade": "-o new.html",
     "cases": "-o cases",
     "league": "--engine event --engine mujoco --workers 2",
 }
@@ -126,7 +124,7 @@ def test_every_command_ends_while_it_begins(whole: Path, tmp_path: Path, number:
 
 
 @BOTH
-@pytest.mark.parametrize("command", ["attractors", "search"])
+@pytest.mark.parametrize("command", ["attractors", "basins"])
 def test_work_ends(whole: Path, tmp_path: Path, command: str, number: signal.Signals) -> None:
     end(command, number, 3.0, shutil.copytree(whole, tmp_path / "here"))
 

@@ -12,7 +12,7 @@ import numpy as np
 
 import mjsim
 from compare.bench.adapters.free import CORNERS, Free, State
-from compare.bench.case import FACETS, Case, Vector
+from compare.bench.case import FACETS, TIME_STEPS, Case, Vector
 from model.arrays import Array
 
 FEATURES = ("two bodies", "moving surface", "dry joint", "tripod")
@@ -29,6 +29,7 @@ class Bodies(Free):
     """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step."""
 
     FEATURES: tuple[str, ...] = FEATURES
+    TIMESTEPS: tuple[float, ...] = TIME_STEPS
 
     def __init__(
         self, name: str, note: str, best: str = "", tune: Callable[[Any, Case, float], None] | None = None

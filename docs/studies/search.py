@@ -1,19 +1,19 @@
-"""Where the ball hops for ever: over a box of parameters, and over a plane of starts. Both go on where they stopped.
+"""Where in parameter space the ball hops for ever: ``python -m docs.studies.search --save found.json``.
 
 A search screens random starts of sets, the points of a scrambled Sobol sequence over mu, eta, j, r/R, kappa =
 c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g), by time stepping; the event-driven simulation confirms what still hops. A
-chunk of sets is a file, named by the hash of all that determines it; a longer search contains the shorter ones.
-
-A map of basins says where the ball ends from each start of a plane of states, on a fine grid by time stepping and on
-a coarse one by MuJoCo. The two should differ only at the boundaries of basins, where the smallest error decides.
+chunk of sets is a file, named by the hash of all that determines it: a search goes on where it stopped, and a longer
+one contains the shorter ones. `docs.studies.figures` makes the page of what was found.
 """
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import hashlib
 import json
 import math
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
@@ -22,27 +22,20 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
-from analytic import Settings
 from analytic.orbits import fates
 from analytic.simulation.ensemble import interval
-from analytic.simulation.settings import fitting_step, start_state
-from compare.kit import pages
-from compare.kit.campaign import Campaign
-from compare.kit.engines import EVENT, MOREAU, MUJOCO
+from compare.kit import pages, progress
+from compare.kit.engines import EVENT
 from compare.kit.progress import Show
-from compare.kit.statistics import hops
 from compare.kit.sweep import Axis, sobol
-from compare.kit.tasks import Task, sources
-from compare.kit.workers import Workers
+from compare.kit.tasks import sources
+from compare.kit.workers import Workers, processes
 from compare.subjects.attractors.measure import with_groups
-from mjsim import ContactSettings
-from model import Case, Contact, Flow, InputError, Parameters, SimulationError, State
+from model import Parameters, SimulationError, State
 from model.arrays import Array
 from model.files import make_directory, reading_json, write_text
-from model.kinematics import VARIABLES
-from model.parameters import check_names
+from model.parameters import POSITIVE
 
 CHUNK = 50
 """Sets in a file."""
@@ -57,8 +50,6 @@ BOX = {
 """The box that is searched, unless another one is named."""
 LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""
-FATES = ("hops", "RR", "SS", "off the floor", "undecided")
-"""Where a ball may end. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
 
 
 @dataclass(frozen=True)
@@ -206,101 +197,25 @@ def summary(record: Searched) -> str:
     ).format(*share(count, record.sets))
 
 
-@dataclass(frozen=True, eq=False)
-class Basins:
-    """Fates over a plane of starts."""
-
-    parameters: Parameters
-    start: tuple[float, ...]
-    """State (8,) whose other variables all starts share."""
-    across: str
-    """Names of the two variables that vary."""
-    up: str
-    x: Array
-    """Their values, shapes (n,) and (m,)."""
-    y: Array
-    fates: npt.NDArray[np.int64]
-    """Indices of `FATES`, by time stepping, shape (m, n)."""
-    coarse: int
-    """MuJoCo has computed every `coarse`-th point along both axes; 0 for none."""
-    mujoco: npt.NDArray[np.int64]
-    """Its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s."""
-    timestep: float
-
-    def share(self, fate: str) -> tuple[int, int]:
-        """Points of the plane that come to a fate, by time stepping, and all of them."""
-        return int(np.sum(self.fates == FATES.index(fate))), self.fates.size
-
-    def differences(self) -> Array:
-        """Distances from a boundary of the points at which the two differ, in cells of the fine map (1: next to it)."""
-        from scipy.ndimage import distance_transform_cdt  # slow to import
-
-        distance = np.zeros(self.fates.shape)
-        for fate in np.unique(self.fates):
-            own = np.pad(self.fates == fate, 1, mode="edge")
-            distance += distance_transform_cdt(own, metric="chessboard")[1:-1, 1:-1]  # 0 outside its basin
-        coarse = np.s_[:: self.coarse, :: self.coarse]
-        return np.asarray(distance[coarse][self.fates[coarse] != self.mujoco])
-
-    def save(self, path: Path) -> None:
-        """Write it as JSON."""
-        write_text(path, json.dumps(dataclasses.asdict(self), default=np.ndarray.tolist))
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
-        with reading_json(path, "basins") as data:
-            arrays: dict[str, Any] = {name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")}
-            p, start = Parameters.from_mapping(data.pop("parameters")), tuple(data.pop("start"))
-            return cls(parameters=p, start=start, **data, **arrays)
+def main() -> None:
+    """Search, and print what was found."""
+    parser = argparse.ArgumentParser(description="Where in parameter space the ball hops for ever.")
+    parser.add_argument("--sets", type=int, default=500)
+    parser.add_argument("--starts", type=int, default=5, help="random starts of each")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--range", nargs="*", default=[], metavar="NAME=FROM:TO", help=f"of {', '.join(BOX)}")
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("-o", "--output", type=Path, default=Path("search"), help="directory of the chunks")
+    parser.add_argument("--save", type=Path, help="write the sets with hopping as JSON")
+    args = parser.parse_args()
+    axes = Axis.several(args.range, dict.fromkeys(BOX, "1"), "group", POSITIVE)
+    asked = AttractorSearch(BOX | {axis.name: axis.ends for axis in axes}, args.starts, args.seed)
+    with progress.shown(False) as show:
+        found = run(args.output, asked, args.sets, processes(args.workers), show)
+    if args.save:
+        found.save(args.save)
+    print(summary(found), pages.markdown(table(found)), sep="\n\n")
 
 
-def basins(
-    campaign: Campaign,
-    p: Parameters,
-    start: Mapping[str, float],
-    across: Axis,
-    up: Axis,
-    coarse: int = 0,
-    timestep: float = 2.5e-4,
-) -> Basins:
-    """Fates of starts on a plane of two state variables, all others as in `start`, else zero, after 10/c.
-
-    Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
-    """
-    check_names((*start, across.name, up.name), VARIABLES, "state variable")
-    if across.name == up.name:
-        raise InputError(f"across and up are both {up.name}: a plane needs two state variables")
-    if p.c == 0:
-        raise InputError("c = 0 1/s: without drag a ball doesn't settle, and there are no basins")
-    x, y, lasts = np.array(across.points), np.array(up.points), 10.0 / p.c
-    base = np.array(State(**start))
-    states = np.tile(base, (len(y), len(x), 1))
-    states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
-    few = states[::coarse, ::coarse] if coarse else states[:0, :0]
-    step = fitting_step(140, p, Flow.steady(p.omega_0), lasts)
-    tasks = [
-        Task(engine=engine, parameters=p, x0=x0, t_end=lasts, settings=settings, sample_interval=lasts / 500)
-        for engine, settings, chosen in (
-            (MOREAU.name, Settings(method=MOREAU.name, timestep=step), states),
-            (MUJOCO.name, ContactSettings.for_problem(p, timestep), few),
-        )
-        for x0 in (start_state(x, p, Settings()) for x in chosen.reshape(-1, len(VARIABLES)))
-    ]
-    broken = {failure.task.key for failure in campaign.complete(tasks)}
-    fates = []
-    for task in tasks:
-        fate = "undecided"
-        if task.key not in broken:
-            run = campaign.load(task.key)
-            case = run.cases[-1]
-            if hops(run, 0.3):
-                fate = "hops"
-            elif case in (Case.RR, Case.SS):
-                fate = case.name
-            elif case is Case.SR or case.A is Contact.N:
-                fate = "off the floor"
-        fates.append(FATES.index(fate))
-    fine, other = np.split(np.array(fates), [len(y) * len(x)])
-    maps = fine.reshape(states.shape[:2]), coarse, other.reshape(few.shape[:2])
-    return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, *maps, timestep)
+if __name__ == "__main__":
+    main()

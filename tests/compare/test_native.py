@@ -1,4 +1,4 @@
-"""The score card: good settings score, bad ones don't, theory predicts creep, and bad files are refused by name."""
+"""Settings of an MJCF file reach the engine as MuJoCo itself reads them, and bad files are refused by name."""
 
 import json
 import re
@@ -9,18 +9,14 @@ import mujoco
 import numpy as np
 import pytest
 
-import analytic
-from compare.bench import cases, grade, native
+from compare.bench import cases, native
+from compare.bench.adapters.mujoco_free import Bodies
 from compare.bench.contact_law import impedance
-from compare.bench.exact import SMOOTH
-from compare.bench.grade import Column
 from compare.bench.native import Native, Pair
 from compare.commands import cli
 from mjsim import ContactSettings, scene
-from mjsim.scene import SCENE
-from model import Case, InputError, Parameters
+from model import InputError, Parameters
 
-ELLIPTIC = Native(cone="elliptic", impratio=100.0)
 BALL = '<body name="ball"><freejoint/><geom name="ball" type="sphere" size="0.01"/></body>'
 WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
 FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
@@ -41,71 +37,47 @@ def read(tmp_path: Path) -> Callable[[str], Native]:
     return read
 
 
-@pytest.fixture(scope="module")
-def columns() -> list[Column]:
-    return grade.grade(ELLIPTIC, {"dualball": grade.OTHERS["dualball"]})
-
-
-def test_creep_and_hovering_are_as_predicted(columns: list[Column]) -> None:
-    yours = columns[0]
-    p = SMOOTH
-    rolling = analytic.solution(p, Case.RR)
-    contacts = (
-        (ELLIPTIC.A, rolling.force_A[1], np.hypot(*rolling.force_A[[0, 2]])),
-        (ELLIPTIC.B, rolling.force_B[0], np.hypot(*rolling.force_B[[1, 2]])),
-    )
-    creeps = [
-        float(ELLIPTIC.theory(touch, float(load) / p.m).creep_speed(float(friction) / p.m))
-        for touch, load, friction in contacts
-    ]
-    # Rolling leaves one force free, and speeds up: which contact carries which share is the engine's choice.
-    assert 0.1 * max(creeps) < yours.of("rolls-on-both").creep < 10 * max(creeps)
-    assert any("hovering at A" in item for item in yours.advice)
-    assert not any("pyramidal" in item for item in yours.advice)
-    # MuJoCo's defaults, but for the cone, fail where the study's settings pass.
-    assert {"rides-the-wall", "lands", "slips-on-both"} <= {*columns[1].passed} - {*yours.passed}
-
-
-def test_card_as_table_and_page(columns: list[Column]) -> None:
-    page = grade.html(columns, "cone <elliptic>")
-    assert "cone &lt;elliptic&gt;" in page
-    assert page.count("<td") >= len(grade.lines(columns)) * len(columns)
-    assert grade.table(columns).row_count >= len(grade.lines(columns))
-    assert grade.headline(columns[1]).startswith(f"dualball: {len(columns[1].passed)} of {len(cases())} exact cases")
-
-
-def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsys) -> None:
-    asked = []
-
-    def measured(yours: Native, others: object, show: object) -> list[Column]:
-        asked.append(yours)
-        return columns
-
-    monkeypatch.setattr(grade, "grade", measured)
-    page = tmp_path / "card.html"
-    argv = ["grade", str(SCENE), "--solimp", "0.5", "0.6", "--cone", "pyramidal", "-o", str(page), "--json"]
-    assert cli.main(argv) == 0
-    shown = json.loads(capsys.readouterr().out)
-    assert [column["name"] for column in shown] == ["yours", "dualball"]
-    assert shown[0]["results"][1]["creep"] is None  # a block that slides has none, and JSON has no nan
-    assert "with cone pyramidal, solimp 0.5 0.6." in page.read_text()
-    ours = ContactSettings()
-    assert asked[0].timestep == ours.timestep
-    assert asked[0].cone == "pyramidal"
-    assert asked[0].A.solimp == (0.5, 0.6, 1e-4, 0.5, 2.0)
-    assert asked[0].B.solref == ours.spring
+def test_the_league_takes_the_settings_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A block on a slope creeps with a pyramid and holds with a cone; the step is that of the file."""
+    text = '<option timestep="0.001" cone="{}" impratio="100"/>'
+    for cone in ("elliptic", "pyramidal"):
+        (tmp_path / f"{cone}.xml").write_text(mjcf(FLOOR + BALL, text.format(cone)))
+    errors = {}
+    for cone in ("elliptic", "pyramidal"):
+        words = [
+            "--settings",
+            str(tmp_path / f"{cone}.xml"),
+            "--engine",
+            "mujoco-defaults",
+            "-o",
+            str(tmp_path),
+            "--json",
+        ]
+        assert cli.main(["league", *words]) == 0
+        found = json.loads(capsys.readouterr().out)["engines"]
+        assert list(found) == [cone, "mujoco-defaults"]
+        by_case = {result["case"]: result for result in found[cone]}
+        assert by_case["block-rests"]["steps"] == [0.001]
+        errors[cone] = by_case["block-rests"]["errors"][-1]
+    assert "no wall" in by_case["block-rests"]["engine"]["note"]
+    assert errors["elliptic"] < errors["pyramidal"] / 30
 
 
 def test_settings_come_through_to_the_engine() -> None:
     options = {"integrator": "implicitfast", "cone": "elliptic", "solver": "CG", "impratio": 7.0, "iterations": 33}
-    options |= {"timestep": 0.0015, "tolerance": 1e-5, "noslip_iterations": 2}
+    options |= {"tolerance": 1e-5, "noslip_iterations": 2}
     given = Native(**options, A=Pair(solref=(0.005, 0.8), margin=1e-4), B=Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3)))
-    model, _ = given.build(Parameters.named("reference"), given.loop())
-    assert model.opt.timestep == given.timestep
-    assert model.pair("A").solref.tolist() == [0.005, 0.8]
-    assert model.pair("A").margin[0] == 1e-4
-    assert model.pair("B").solimp.tolist() == [0.2, 0.3, 0.01, 0.4, 3]
-    assert (model.opt.impratio, model.opt.iterations, model.opt.noslip_iterations) == (7.0, 33, 2)
+    (case,) = (case for case in cases() if case.name == "rolls-on-both")
+    body = Bodies("mine", "", tune=given.tune)
+    body.build(case, 0.0015)
+    option = body.model.opt
+    assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
+    assert (option.impratio, option.iterations, option.cone) == (7.0, 33, mujoco.mjtCone.mjCONE_ELLIPTIC)
+    names = [body.model.geom(body.model.pair_geom1[k]).name for k in range(body.model.npair)]
+    floor, wall = names.index("floor"), next(k for k, name in enumerate(names) if name.startswith("wall"))
+    assert body.model.pair_solref[floor].tolist() == [0.005, 0.8]
+    assert body.model.pair_margin[floor] == 1e-4
+    assert body.model.pair_solimp[wall].tolist() == [0.2, 0.3, 0.01, 0.4, 3]
 
 
 def test_a_scene_of_our_own_is_read_back(read: Callable[[str], Native]) -> None:
@@ -115,9 +87,6 @@ def test_a_scene_of_our_own_is_read_back(read: Callable[[str], Native]) -> None:
     for pair in (of_scene.A, of_scene.B):
         assert pair.solref == settings.spring
         assert pair.solreffriction[0] == settings.solreffriction
-        theory = of_scene.theory(pair, 9.81)
-        for name in ("b_f", "k", "softness"):
-            assert getattr(theory, name) == pytest.approx(getattr(settings, name), rel=1e-12)
 
 
 def test_geoms_are_mixed_as_the_engine_does(read: Callable[[str], Native]) -> None:
@@ -167,7 +136,7 @@ def test_impedance_is_the_engines(depth: float) -> None:
         (mjcf(FLOOR + BALL, '<option cone="round"/>'), "MuJoCo refuses it"),
     ],
 )
-def test_files_that_cannot_be_graded(read: Callable[[str], Native], text: str, message: str) -> None:
+def test_files_without_such_contacts(read: Callable[[str], Native], text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as refused:
         read(text)
     assert "\n" not in str(refused.value)

@@ -15,18 +15,10 @@ from compare.commands import cli
 from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
 from compare.kit.workers import processes
-from compare.subjects.attractors import search
-from compare.subjects.attractors.search import (
-    BOX,
-    FATES,
-    AttractorSearch,
-    Basins,
-    Searched,
-    basins,
-    parameters,
-    random_starts,
-)
+from compare.subjects.attractors.basins import FATES, Basins, basins
+from docs.studies import search
 from docs.studies.figures import SEARCHES
+from docs.studies.search import BOX, AttractorSearch, Searched, parameters, random_starts
 from model import InputError, Parameters, StorageError, storage
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
