@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,10 +13,12 @@ from matplotlib.textpath import text_to_path
 
 from compare import subjects
 from compare.kit import drawing, style
-from compare.kit.drawing import Drawing, Figures, GapError, Material
+from compare.kit.drawing import Diagram, Drawing, Figures, GapError, Material
 from compare.kit.record import Check
 from compare.kit.statistics import COVERAGE
-from model import InputError, StorageError
+from compare.subjects.flowmeter import figures as flowmeter
+from compare.subjects.thresholds.figures import Plane
+from model import InputError, Parameters, StorageError
 from model.files import make_directory, write_text
 
 _WIDEST = 1.5
@@ -25,6 +28,8 @@ _MANY = 100
 _WIDTH, _BELOW = 7.0, 0.48
 """Of a figure of deviations, and of what is below its frame, inches."""
 Checks = tuple[Check, ...]
+Selected = dict[str, Callable[[], Any]]
+"""By name, what gives a figure its data, or raises `GapError`."""
 
 FORMATS = ("svg", "pdf", "png")
 CAPTIONS = "captions.txt"
@@ -99,8 +104,26 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     )
 
 
-def write(output: Path, material: Material, formats: Sequence[str] = ("svg",)) -> Iterator[tuple[str, str]]:
-    """Write all figures to a directory, and their captions; yield the name of each, and why it wasn't drawn if so.
+def of_set(p: Parameters) -> Selected:
+    """What the figures show of one set that theory alone can draw."""
+    folds = p.eta < p.j
+    planes = {name: Plane(p, equal, ()) for name, equal in (("fig-7", False), ("fig-8", True))}
+    names = ("fig-9", "fig-10", "fig-13-left") if folds else ("fig-9", "fig-11", "fig-13-right")
+
+    def of(name: str) -> Any:
+        flowmeter.top_flow(p)  # raises an error where there are no thresholds
+        return Diagram(name, p)
+
+    return {name: partial(planes.__getitem__, name) for name in planes} | {name: partial(of, name) for name in names}
+
+
+def of_results(material: Material) -> Selected:
+    """What every figure selects from results."""
+    return {name: partial(each.select, material) for name, each in FIGURES.items()}
+
+
+def write(output: Path, selected: Selected, formats: Sequence[str] = ("svg",)) -> Iterator[tuple[str, str]]:
+    """Write figures to a directory, and their captions; yield the name of each, and why it wasn't drawn if so.
 
     Raises `InputError` for an unknown format, `StorageError` if a file can't be written.
     """
@@ -109,11 +132,11 @@ def write(output: Path, material: Material, formats: Sequence[str] = ("svg",)) -
             raise InputError(f"no figure can be written as {suffix!r}; there are {', '.join(FORMATS)}")
     make_directory(output)
     captions = []
-    for name, each in FIGURES.items():
+    for name, data in selected.items():
+        each = FIGURES[name]
         try:
-            data = each.select(material)
-            figure, caption = each.draw(data)
-        except (GapError, StorageError) as gap:
+            figure, caption = each.draw(data())
+        except (GapError, StorageError, InputError) as gap:
             yield name, f"not drawn: {gap}"
             continue
         for suffix in formats:

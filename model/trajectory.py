@@ -21,6 +21,7 @@ from model.parameters import Parameters
 from model.versions import current_commit, current_versions
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 AXES = ("x", "y", "z")
@@ -160,6 +161,28 @@ class Trajectory:
         variables["omega_0"] = ("time", self.omega_0, attributes(FLUID))
         schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
         return xarray.Dataset(variables, attrs=schema | self.header.attributes())
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The samples as a pandas table, one row each, with the time in s as its index.
+
+        Columns have the names and units of a file's; forces are split along `AXES` (force_Ax …), cases are categories
+        by name, and `attrs` says where the motion comes from. Raises `InputError` if pandas, an optional dependency,
+        isn't installed.
+        """
+        try:
+            import pandas  # here, because it is optional and takes a second to load
+        except ImportError as error:
+            raise InputError("to_pandas() needs pandas: pip install pandas") from error
+        table: dict[str, Any] = {}
+        for name, meta in columns(type(self)).items():
+            values = getattr(self, name)
+            split = zip(AXES, values.T, strict=True) if meta["shape"] else [("", values)]
+            table |= {name + axis: column for axis, column in split}
+        table["omega_0"] = self.omega_0
+        table["case"] = pandas.Categorical.from_codes(self.case, [case.name for case in Case])
+        found = pandas.DataFrame(table).set_index("time")
+        found.attrs = self.header.attributes()
+        return found
 
     @classmethod
     def from_blocks(cls, header: Header, blocks: list[npt.NDArray[np.void]], events: Events) -> Self:

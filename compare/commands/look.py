@@ -21,6 +21,7 @@ def add(commands: options.Commands) -> None:
         "-o", "--output", type=options.results, default=Path("figures"), metavar="DIR", help="directory to write to"
     )
     command.add_argument("--results", type=Path, metavar="DIR", help=f"{stored} (default results, if it is there)")
+    options.add_own_set(command)
     command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
 
     command = options.command(commands, "inspect", inspect, "run.h5 --plot run.png")
@@ -67,8 +68,15 @@ def figures(args: argparse.Namespace) -> int:
 
     if args.results and not args.results.is_dir():
         raise InputError(f"cannot read {args.results}: there is no such directory")
-    stored = validation.stored_material(args.results or Path("results"))
-    for name, gap in registry.write(args.output, stored, args.format or ["svg"]):
+    if own := list(options.own_set(args).values()):
+        if args.results:
+            raise InputError(
+                "--results shows what was measured, --set and --parameters what theory alone says of a set"
+            )
+        chosen = registry.of_set(*own)
+    else:
+        chosen = registry.of_results(validation.stored_material(args.results or Path("results")))
+    for name, gap in registry.write(args.output, chosen, args.format or ["svg"]):
         print(f"{args.output / name}: {gap or 'written'}")
     return 0
 

@@ -160,6 +160,20 @@ def command(commands: Commands, name: str, run: Callable[[argparse.Namespace], i
     return declared
 
 
+def add_own_set(parser: Parser) -> None:
+    """A set of the study by its name, or one's own."""
+    own = parser.add_mutually_exclusive_group()
+    own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
+    own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
+
+
+def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
+    """The set that was asked for, by its name; nothing if none was."""
+    if args.parameters:
+        return {args.parameters.stem: Parameters.load(args.parameters)}
+    return {args.set: Parameters.named(args.set)} if args.set else {}
+
+
 def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
     """An option, to be given once or more often, for `compare.kit.sweep.Axis`."""
     parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})

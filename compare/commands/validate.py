@@ -17,7 +17,6 @@ from compare.commands import options, running
 from compare.kit import pages, progress
 from compare.kit.levels import Level
 from compare.report import results, wording
-from model import Parameters
 
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
 
@@ -29,9 +28,7 @@ def add(commands: options.Commands) -> None:
     for each, takes in ((Level.QUICK, "a minute or two"), (Level.FULL, "an hour or more")):
         option, usual, takes = f"--{each.name.lower()}", Level.DEFAULT, f"{takes} (default: in between)"
         level.add_argument(option, dest="level", action="store_const", const=each, default=usual, help=takes)
-    own = command.add_mutually_exclusive_group()
-    own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
-    own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
+    options.add_own_set(command)
     running.add_engine_name(command, None, "only this one is heard; default: the first three")
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
@@ -53,11 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure and judge."""
     from compare import validation  # here, because it loads everything there is
 
-    console, chosen = options.terminal(quiet=args.json), None
-    if args.parameters:
-        chosen = {args.parameters.stem: Parameters.load(args.parameters)}
-    elif args.set:
-        chosen = {args.set: Parameters.named(args.set)}
+    console, chosen = options.terminal(quiet=args.json), options.own_set(args) or None
     if args.list:
         rows = [[claim.id, claim.source, claim.statement, str(claim.text)] for claim in CLAIMS]
         options.terminal().print(pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -22,9 +23,14 @@ _VARIABLES = {
 
 
 def draw(basins: Basins) -> Figure:
-    """The map by time stepping, and a point for each run of MuJoCo."""
+    """The map as a figure."""
     figure = style.figure(6.2, 4.4)
-    axes = figure.subplots()
+    fill(figure.add_subplot(), basins)
+    return figure
+
+
+def fill(axes: Axes, basins: Basins) -> None:
+    """The map by time stepping, and a point for each run of MuJoCo."""
     look: dict[str, Any] = {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(FATES) - 0.5, "alpha": 0.55}
     axes.pcolormesh(basins.x, basins.y, basins.fates, shading="nearest", rasterized=True, **look)
     present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
@@ -42,4 +48,3 @@ def draw(basins: Basins) -> Figure:
     axes.legend(
         handles=handles, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(handles), frameon=False
     )
-    return figure

@@ -16,7 +16,9 @@ import mjsim
 from analytic import thresholds
 from analytic.orbits import orbit_branch
 from compare import gallery as registry
+from compare import plot
 from compare.catalogue import CLAIMS
+from compare.commands import cli
 from compare.gallery import FIGURES, figures_of
 from compare.kit import drawing, style
 from compare.kit.drawing import GapError, Material, Motion
@@ -25,7 +27,7 @@ from compare.kit.record import Check, Measurement, Records
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.slipping import figures as slipping
 from compare.subjects.unsteady import figures as unsteady
-from model import Case, InputError, Parameters, StorageError
+from model import Case, InputError, Parameters, State, StorageError
 from tests.measured import measured
 
 DEPENDS = dict.fromkeys(FIGURES, "μηjκ") | {"fig-7": "μjκ", "fig-8": "jκ"}
@@ -224,17 +226,17 @@ def test_claims_have_their_own_figures_or_deviations() -> None:
 def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     chosen = {name: FIGURES[name] for name in ("fig-9", "characteristic")}
     monkeypatch.setattr(registry, "FIGURES", chosen)
-    assert dict(registry.write(tmp_path, Material(), ("svg", "png"))) == {
+    assert dict(registry.write(tmp_path, registry.of_results(Material()), ("svg", "png"))) == {
         "fig-9": "",
         "characteristic": "not drawn: no settled states were measured with its parameter sets",
     }
     assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-9.png", "fig-9.svg"]
     assert "Stationary solutions off the floor" in (tmp_path / "captions.txt").read_text("utf-8")
     with pytest.raises(InputError, match="bmp"):
-        list(registry.write(tmp_path, Material(), ("bmp",)))
+        list(registry.write(tmp_path, registry.of_results(Material()), ("bmp",)))
     (tmp_path / "file").touch()
     with pytest.raises(StorageError):
-        list(registry.write(tmp_path / "file", Material()))
+        list(registry.write(tmp_path / "file", registry.of_results(Material())))
 
 
 def test_how_figures_look(material: Material) -> None:
@@ -256,3 +258,40 @@ def test_what_a_figure_file_is_called_decides_its_format(tmp_path: Path) -> None
     for name in ("a.svg", "b.svg"):
         drawing.save(figure, tmp_path / name)
     assert (tmp_path / "a.svg").stat().st_size == (tmp_path / "b.svg").stat().st_size
+
+
+def test_figures_of_a_set_of_ones_own(tmp_path, capsys):
+    """All that theory alone can draw, by the friction of its wall."""
+    for name, chosen in (("glass-in-water", "fig-10"), ("high-wall-friction", "fig-11")):
+        assert cli.main(["figures", "--set", name, "-o", str(tmp_path / name)]) == 0
+        written = {path.stem for path in (tmp_path / name).glob("*.svg")}
+        assert {"fig-7", "fig-8", "fig-9", chosen} < written
+        assert len(written) == 5
+    numbers = "m = 0.03, r = 0.01, R = 0.05, j = 0.4, g = 9.81, mu = 0.0, eta = 0.0, c = 0.5, omega_0 = 9"
+    (tmp_path / "slick.toml").write_text(numbers.replace(", ", "\n"))
+    capsys.readouterr()
+    assert cli.main(["figures", "--parameters", str(tmp_path / "slick.toml"), "-o", str(tmp_path / "slick")]) == 0
+    assert capsys.readouterr().out.count("\n") == 5
+    assert cli.main(["figures", "--set", "reference", "--results", str(tmp_path)]) == 2
+    assert "theory alone" in capsys.readouterr().err
+
+
+def test_functions_that_draw_into_axes():
+    p = Parameters.named("reference")
+    axes = plot.characteristic(p)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (style.OMEGA_0, style.OMEGA_C)
+    assert plot.regions(p, equal=True).get_xlabel().startswith("friction")
+    run = analytic.simulate(p.replace(omega_0=25.0), State(y=0.003, omega_c=5.0), 2.0)
+    mine = style.figure(3, 3).add_subplot()
+    assert plot.motion(run, "slip_x", "slip_z", axes=mine) is mine
+    np.testing.assert_array_equal(mine.get_lines()[1].get_ydata(), run.slip_z)
+    of_file = plot.motion(run.to_xarray(), "force_Ay")
+    np.testing.assert_array_equal(of_file.get_lines()[0].get_ydata(), run.force_A[:, 1])
+    assert "N" in of_file.get_ylabel()
+    for names, said in (
+        (("y", "omega_c"), "different units"),
+        (("force_A",), "no quantity"),
+        (("speed",), "no quantity"),
+    ):
+        with pytest.raises(InputError, match=said):
+            plot.motion(run, *names)

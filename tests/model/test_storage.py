@@ -106,6 +106,20 @@ def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> N
         make().to_xarray()
 
 
+def test_a_table_for_pandas_has_a_row_for_each_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    trajectory = make(50, 2)
+    table = trajectory.to_pandas()
+    assert len(table) == 50
+    assert table.index.name == "time"
+    np.testing.assert_array_equal(table.force_By, trajectory.force_B[:, 1])
+    np.testing.assert_array_equal(table.omega_0, trajectory.omega_0)
+    assert list(table.case) == [case.name for case in trajectory.cases]
+    assert table.attrs["mu"] == trajectory.header.parameters.mu
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match="pip install pandas"):
+        trajectory.to_pandas()
+
+
 def test_chunks_arrive_while_the_run_goes_on(tmp_path: Path) -> None:
     trajectory = make(300)
     samples = np.empty(300, SAMPLE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
@@ -17,7 +18,7 @@ from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion
 from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
-from model import Case, Contact, Parameters
+from model import Case, Contact, InputError, Parameters
 
 SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}
 """The parameter set of each panel, eta < j and eta > j."""
@@ -51,8 +52,8 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
     figure, panels = style.panels(10, 6, 2, len(curves), sharex="col", height_ratios=[3, 1.2])
     for (above, below), curve in zip(panels.T, curves, strict=True):
         p = curve.p
-        fastest = max(map(style.omega_0, curve.states), default=_top(p)) * 1.04
-        _theory(above, p, fastest)
+        fastest = max(map(style.omega_0, curve.states), default=top_flow(p)) * 1.04
+        theory(above, p, fastest)
         above.set_title(f"η = {p.eta:g} {'<' if p.eta < p.j else '>'} j = {p.j:g}", fontsize=11)
         style.points(above, curve.states)
         above.set(ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C)
@@ -84,14 +85,14 @@ def select_figure_13(material: Material, figure: str) -> Diagram:
 
 def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     """One panel, with both scales."""
-    p, top = of.p, _top(of.p)
+    p, top = of.p, top_flow(of.p)
     figure, axes = style.panels(6.0, 4.3)
     if p.eta < p.j:
         said = (
             "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
             "(arrows)."
         )
-        t = _theory(axes, p, top)
+        t = theory(axes, p, top)
         slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
         look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
         jumps = (t.omega_04, fold_state(p).omega_c, t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)
@@ -125,13 +126,16 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     )
 
 
-def _top(p: Parameters) -> float:
-    """The fastest flow shown, rad s-1."""
+def top_flow(p: Parameters) -> float:
+    """The fastest flow shown, rad s-1; raises `InputError` where the set has no thresholds."""
     t = bifurcation.thresholds(p)
-    return 1.25 * t.omega_04 if p.eta < p.j else 1.6 * t.omega_03
+    top = 1.25 * t.omega_04 if p.eta < p.j else 1.6 * t.omega_03
+    if not math.isfinite(top + t.omega_02):
+        raise InputError(f"a set with mu = {p.mu:g}, eta = {p.eta:g} and c = {p.c:g} 1/s has not all thresholds")
+    return top
 
 
-def _theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
+def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     """All solutions up to the fastest flow, and the thresholds; for eta > j RR, SR and NR are one line."""
     t = bifurcation.thresholds(p)
     folds = p.eta < p.j

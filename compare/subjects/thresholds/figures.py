@@ -30,7 +30,8 @@ from model.arrays import Array
 
 _THEORY = Parameters.named("reference")
 """Shown where nothing was measured."""
-_WIDEST = 0.8
+_LEAST, _WIDEST = 0.01, 0.8
+"""Frictions of the wall shown, and the least at which thresholds that meet set the scale."""
 _SECTIONS = {0.2: "Figs. 9, 10", 0.6: "Figs. 9, 11"}
 """The two typical sections of Fig. 7, by wall friction."""
 _LINES = {
@@ -72,26 +73,15 @@ def draw_plane(plane: Plane) -> tuple[Figure, str]:
     p = plane.p
     figure = style.figure(6.4, 4.9)
     axes = figure.add_subplot()
-    eta = np.linspace(0.0, _WIDEST, 801)
-    mu = eta if plane.equal else np.full(eta.shape, p.mu)
-    doubles = bifurcation.double_points(p, plane.equal)
-    highest = [point.omega_0 for point in doubles] + [c.measurement.parameters.omega_0 for c in plane.checks]
-    fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), *highest])
-    _regions(axes, p, mu, eta, np.linspace(0.0, fastest, 901))
-    for point in doubles:
-        axes.plot([point.eta], [point.omega_0], **style.POINT)
-        axes.axvline(point.eta, ymax=point.omega_0 / fastest, **style.GUIDE)
-        name = "$j$" if point.eta == p.j else "$\\eta_{cr}$"
-        axes.annotate(name, (point.eta, 0), xytext=(3, 5), textcoords="offset points", fontsize=9)
-    for section, text in () if plane.equal else _SECTIONS.items():
+    regions(axes, p, plane.equal, max((c.measurement.parameters.omega_0 for c in plane.checks), default=0.0))
+    for section, text in _SECTIONS.items() if not plane.equal and p.replace(eta=_THEORY.eta) == _THEORY else ():
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
-        axes.text(section, 0.985 * fastest, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3")
+        axes.text(section, 0.985, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3",
+                  transform=axes.get_xaxis_transform())  # fmt: skip
     for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
         axes.plot(*_places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
     if failed := [check for check in plane.checks if not check.agrees]:
         axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
-    friction = "friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$"
-    axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
     style.legend(figure, loc="outside lower center", ncols=6, handlelength=3.2)
     style.dimensionless(axes, p, y=style.FREE_0)
     fixed = style.named(p, "j", "kappa") if plane.equal else style.named(p, "mu", "j", "kappa")
@@ -106,7 +96,13 @@ def draw_plane(plane: Plane) -> tuple[Figure, str]:
     return figure, caption
 
 
-def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -> None:
+def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> None:
+    """Which cases exist over friction and flow, up to a flow at least, rad s-1; the thresholds and where they meet."""
+    eta = np.linspace(0.0, _WIDEST, 801)
+    mu = eta if equal else np.full(eta.shape, p.mu)
+    doubles = [point for point in bifurcation.double_points(p, equal) if point.eta > _LEAST]
+    fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), highest, *(point.omega_0 for point in doubles)])
+    omega_0 = np.linspace(0.0, fastest, 901)
     plane = bifurcation.case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
     shades = ListedColormap([_TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
@@ -126,6 +122,13 @@ def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -
             axes.plot(eta, shown, color=colour, ls=line, lw=1.8, label=style.THRESHOLD_LABELS[name])
     for kind in kinds:
         _name(axes, plane == kind, eta, omega_0, int(kind))
+    for point in doubles:
+        axes.plot([point.eta], [point.omega_0], **style.POINT)
+        axes.axvline(point.eta, ymax=point.omega_0 / fastest, **style.GUIDE)
+        name = "$j$" if point.eta == p.j else "$\\eta_{cr}$"
+        axes.annotate(name, (point.eta, 0), xytext=(3, 5), textcoords="offset points", fontsize=9)
+    friction = "friction $\\eta = \\mu$" if equal else "wall friction $\\eta$"
+    axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
 
 
 def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, kind: int) -> None:

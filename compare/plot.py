@@ -1,0 +1,91 @@
+"""Figures of one's own: each function draws into axes of matplotlib, new ones if none are given, and returns them.
+
+from compare import plot
+from model import Parameters
+
+axes = plot.characteristic(Parameters.load("mine.toml"))
+axes.figure.savefig("mine.svg")
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from compare.kit import pages, style
+from compare.kit.quantities import QUANTITIES
+from compare.subjects.attractors.basins import Basins
+from compare.subjects.flowmeter import figures as flowmeter
+from compare.subjects.thresholds import figures as thresholds
+from compare.view import planes
+from model import Case, InputError, Parameters, Trajectory
+from model.trajectory import columns
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def characteristic(p: Parameters, axes: Axes | None = None, *, fastest: float | None = None) -> Axes:
+    """The stationary solutions of a set, omega_c over omega_0 up to the fastest, rad/s: dashed where unstable.
+
+    Dotted: the thresholds (84) to (88). Raises `InputError` where a set has none, as without drag.
+    """
+    axes = _or_new(axes)
+    flowmeter.theory(axes, p, fastest or flowmeter.top_flow(p))
+    axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    return axes
+
+
+def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> Axes:
+    """Which cases have a stationary solution over the friction of the wall, or of both if `equal`, and the flow.
+
+    As Figs. 7 and 8 of the paper, with the other parameters of the set.
+    """
+    axes = _or_new(axes)
+    thresholds.regions(axes, p, equal)
+    style.legend(axes, loc="upper right")
+    return axes
+
+
+def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = None) -> Axes:
+    """Quantities of a motion over time, omega_c if none is named, on the colours of its cases.
+
+    `run`: what `simulate` returns, or a file that xarray has opened. A component of a force is named as in a file of
+    pandas, ``force_Ay``. Raises `InputError` for an unknown name, or for quantities of different units.
+    """
+    known = {name: meta for name, meta in columns(Trajectory).items() if name not in ("time", "case")}
+    units, axes = {}, _or_new(axes)
+    time, case = np.asarray(run.time), np.asarray(run.case)
+    for name in names or ("omega_c",):
+        column = name[:-1] if name[:-1] in known and known[name[:-1]]["shape"] else name
+        if column not in known or (known[column]["shape"] and column == name):
+            raise InputError(
+                f"no quantity of a motion is called {name!r}; there are {', '.join(known)}, forces with x, y, z"
+            )
+        values = np.asarray(getattr(run, column))
+        values = values[:, "xyz".index(name[-1])] if column != name else values
+        units[known[column]["units"]] = name
+        axes.plot(time, values, label=style.symbol(name) if name in QUANTITIES else name)
+    if len(units) > 1:
+        raise InputError(f"{' and '.join(units.values())} have different units: {', '.join(units)}")
+    begins = np.flatnonzero(np.diff(case, prepend=-1))
+    for first, last in zip(begins, [*begins[1:], len(case) - 1], strict=True):
+        axes.axvspan(time[first], time[last], color=style.COLOURS[Case(case[first])], alpha=0.15, lw=0)
+    (unit,) = units
+    said = ", ".join(dict.fromkeys(str(line.get_label()) for line in axes.get_lines()))
+    axes.set(xlabel="time (s)", ylabel=f"{said} ({pages.readable(unit)})", xlim=time[[0, -1]])
+    style.legend(axes)
+    return axes
+
+
+def basins(of: Basins, axes: Axes | None = None) -> Axes:
+    """Where balls end that start on a plane of states, as `dualball basins --save` keeps it for `Basins.load`."""
+    axes = _or_new(axes)
+    planes.fill(axes, of)
+    return axes
+
+
+def _or_new(axes: Axes | None) -> Axes:
+    return axes if axes is not None else style.figure(6.2, 4.4).add_subplot()
