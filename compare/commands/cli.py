@@ -120,6 +120,7 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     """Carry out a command, whose arguments are added to `args`."""
     # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
     words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in argv]
+    words = [re.sub(r"^--[\w-]+", lambda option: option[0].replace("_", "-"), word) for word in words]
     _parser(words).parse_args(words or ["--help"], args)
     args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
     with options.no_empty_directories(args), signals.raised():

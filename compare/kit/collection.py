@@ -48,7 +48,7 @@ _HELD = "steady", "identity", "numbers"
 
 
 def collect(directory: Path, output: Path, workers: int = 0) -> int:
-    """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
+    """Gather all runs of a directory, whole ones and failed ones, ordered by what varies; return their number.
 
     One that is stored twice is taken once. So many processes read the files; 0 is this one.
 
@@ -86,6 +86,8 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
         raise StorageError(f"there are no runs in {directory}")
     collected = {name: values[rows] for name, values in table.items() if name not in _HELD}
     coordinates, about = varied(collected), _attributes()
+    order = np.lexsort([collected[name] for name in ("run", *reversed(coordinates))])
+    collected = {name: values[order] for name, values in collected.items()}
     with WholeFile(output) as whole:
         title = f"What {len(rows)} balls settled to, measured over the last part of each run"
         whole.file.attrs.update(Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION)

@@ -28,6 +28,7 @@ ROOT = Path(cli.__file__).parents[2]
 def test_predict_says_what_the_ball_does_and_what_ends_the_operating_range(capsys: pytest.CaptureFixture[str]) -> None:
     for given, words in (
         ("--omega-0 25", "the ball slips (SS)"),
+        ("--omega_0 25", "the ball slips (SS)"),
         ("--set reference", "slip at both points"),
         ("--set high-wall-friction", "the wall can carry it"),
     ):

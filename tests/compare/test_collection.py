@@ -44,6 +44,8 @@ def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
         assert data.omega_0.dims == ("run",)
         assert data.omega_0.units == "rad s-1"
         table = data.omega_c.set_index(run=["omega_0", "eta"]).unstack("run")
+        pairs = list(zip(data.eta.values.tolist(), data.omega_0.values.tolist(), strict=True))
+        assert pairs == [(eta, omega) for eta in ETAS for omega in OMEGAS]  # whatever the files are called
         np.testing.assert_array_equal(table.omega_0, OMEGAS)
         np.testing.assert_array_equal(table.eta, ETAS)
         assert np.isfinite(table).all()
