@@ -42,6 +42,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "basins": ("attractors", "what becomes of the ball from each start of a plane of states, resumable"),
         "design": ("design", "the best meter for a fluid and a range of flows, within bounds"),
         "render": ("look", "a picture or film of a run: the scene, contact forces, slip, case"),
+        "explore": ("look", "a page on this machine to play with: theory as sliders move, the motion in 3-D"),
         "view": ("look", "the ball in MuJoCo's viewer, driven by the study's own loop"),
     },
     "contacts and engines": {

@@ -1,4 +1,4 @@
-"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``view``, a live ball."""
+"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; ``view``, a live ball, and ``explore``."""
 
 from __future__ import annotations
 
@@ -59,6 +59,12 @@ def add(commands: options.Commands) -> None:
     running.add_start(command)
     command.add_argument("--timestep", type=options.seconds, help="time step (default: that of the study)")
     command.add_argument("--speed", type=options.Number(allowed=Range(1e-3, 1e3)), default=1.0, help="1 is real time")
+
+    command = options.command(commands, "explore", explore, "--set hopping --port 8081")
+    options.add_parameters(command)
+    port = options.Number(allowed=Range(1024, 65535, whole=True))
+    command.add_argument("--port", type=port, default=8080, help="port of 127.0.0.1")
+    command.add_argument("--no-browser", action="store_true", help="open none")
 
 
 def figures(args: argparse.Namespace) -> int:
@@ -126,4 +132,12 @@ def view(args: argparse.Namespace) -> int:
     p = options.parameters(args)
     settings = ContactSettings.for_problem(p, **options.given(args, ["timestep"]))
     viewer.view(p, running.start(args), running.flow(args) or Flow.steady(p.omega_0), settings, args.speed)
+    return 0
+
+
+def explore(args: argparse.Namespace) -> int:
+    """Serve the page to play with."""
+    from compare.view import explore as served  # here, because nothing else needs it
+
+    served.serve(options.parameters(args), args.port, not args.no_browser)
     return 0

@@ -41,7 +41,7 @@ _LINES = {
     "omega_04": ("#D55E00", (0, (1, 1))),
 }
 _BISTABLE = Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR
-_TINTS = {
+TINTS = {
     Exists.RR | Exists.NS: "#e8f1f8",
     Exists.SS | Exists.NS: "#fbe6dc",
     _BISTABLE: "#f4e6ef",
@@ -105,7 +105,7 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
     omega_0 = np.linspace(0.0, fastest, 901)
     plane = bifurcation.case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
-    shades = ListedColormap([_TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
+    shades = ListedColormap([TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
     grid: dict[str, Any] = {"origin": "lower", "aspect": "auto", "extent": (*eta[[0, -1]], *omega_0[[0, -1]])}
     shown = np.searchsorted(kinds, plane)
     axes.imshow(shown, cmap=shades, vmin=0, vmax=len(kinds) - 1, interpolation="nearest", zorder=0, **grid)

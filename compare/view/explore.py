@@ -1,0 +1,351 @@
+"""A page on this machine to play with: what theory says of a set as its sliders move, and the motion in 3-D.
+
+NiceGUI serves it: one process and no page to build, with three.js and plotly.js in the package, so that it works
+without a network. Each tab has a set and a motion of its own, by the event-driven simulation.
+"""
+
+from __future__ import annotations
+
+import errno
+import socket
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import analytic
+from analytic.bifurcation import diagram as bifurcation
+from analytic.bifurcation.diagram import Exists
+from analytic.stationary import slipping_branch
+from compare.kit.style import COLOURS, FORCE
+from compare.subjects.thresholds.figures import TINTS
+from compare.view.render import orientations
+from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
+from model.kinematics import frame, to_world
+
+HOST = "127.0.0.1"
+LASTS, RATE = 10.0, 60
+"""Duration of a motion, s, and its samples a second."""
+REACH = 0.6
+"""Length of the arrow of the largest force, in units of R."""
+TICK = 0.05
+"""Time between two pictures, s."""
+OIL = 1e-5
+"""Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
+SLIDERS: dict[str, tuple[str, float, float, float]] = {
+    "mu": ("friction of the floor μ", 0.0, 1.2, 0.01),
+    "eta": ("friction of the wall η", 0.0, 1.2, 0.01),
+    "j": ("inertia j", 0.05, 0.66, 0.01),
+    "kappa": ("drag κ = c√(R/g)", 0.005, 2.0, 0.005),
+    "omega_0": ("fluid ω₀, rad/s", 0.0, 80.0, 0.1),
+}
+"""Text, range and step of each."""
+SYMBOLS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄"}
+Figure = dict[str, Any]
+"""Data and layout of a figure of plotly."""
+
+
+@dataclass
+class Tab:
+    """What a tab of the browser shows."""
+
+    p: Parameters
+    start: State = field(default_factory=lambda: State(omega_c=0.0))
+    run: Trajectory | None = None
+    turns: Any = None
+    """How the ball is turned at each sample."""
+    clock: float = 0.0
+    asked: int = 0
+    """Number of the simulation that was asked for last."""
+
+
+def changed(p: Parameters, name: str, value: float | str) -> Parameters:
+    """The set with another value of a slider or another law of drag; raises `InputError` for one out of its range."""
+    if name == "kappa":
+        return p.replace(c=float(value) * np.sqrt(p.g / p.R))
+    more = {"nu_f": OIL} if name == "drag" and value != drag.STOKES and p.nu_f == 0 else {}
+    return p.replace(**{name: value}, **more)
+
+
+def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
+    """omega_c of stationary solutions over omega_0, the thresholds, where the ball starts; a click anywhere counts."""
+    t, s = bifurcation.thresholds(p), np.linspace(-16.0, 16.0, 401)
+    folds = p.eta < p.j
+    rolls, rides = (t.omega_01, t.omega_02) if folds else (t.omega_03, t.omega_03)
+    lines: list[tuple[str, Case, Any, Any, str]] = []
+    if np.isfinite(rolls):
+        lines.append(("RR", Case.RR, [0, min(rolls, fastest)], [0, min(rolls, fastest)], "solid"))
+    if folds and p.c > 0 and np.isfinite(t.omega_02):
+        x, flows = slipping_branch.states(s, p)
+        grows = slipping_branch.eigenvalues_at(s, p).real.max(axis=-1) > 0
+        for text, part, dash in (("SS", ~grows, "solid"), ("SS, unstable", grows, "dash")):
+            lines.append((text, Case.SS, flows, np.where(part, State.of(x).omega_c, np.nan), dash))
+    if np.isfinite(rides) and rides < fastest:
+        lines.append(("SR, NR", Case.SR, [rides, fastest], [rides, fastest], "solid"))
+    data = [
+        {"type": "scatter", "mode": "lines", "name": text, "x": np.asarray(x).tolist(),
+         "y": [None if np.isnan(v) else v for v in np.asarray(y, float).tolist()],
+         "line": {"color": COLOURS[case], "dash": dash, "width": 3}}
+        for text, case, x, y, dash in lines
+    ]  # fmt: skip
+    data.append(_here(p.omega_0, start))
+    guides = [(name, getattr(t, name)) for name in ("omega_01", "omega_02", "omega_03", "omega_04")]
+    shown = [(name, at) for name, at in guides if at < fastest and not (name == "omega_03" and folds)]
+    guide = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "line": {"color": "#999", "dash": "dot"}}
+    shapes = [guide | {"x0": at, "x1": at} for _, at in shown]
+    label = {"yref": "paper", "y": 0.98, "xanchor": "left", "showarrow": False, "font": {"size": 11}}
+    annotations = [label | {"x": at, "text": SYMBOLS[name]} for name, at in shown]
+    cells = np.linspace(0.0, fastest, 81).tolist()
+    data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": np.zeros((81, 81)).tolist(), "opacity": 0.0,
+                    "showscale": False, "hoverinfo": "none"})  # fmt: skip
+    return _figure(data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, shapes=shapes, annotations=annotations)
+
+
+def regions(p: Parameters, fastest: float) -> Figure:
+    """Which stationary solutions exist over the wall's friction and the flow, and where the set is."""
+    eta, flows = np.linspace(0.0, SLIDERS["eta"][2], 121), np.linspace(0.0, fastest, 161)
+    found = bifurcation.case_map(p, p.mu, eta, flows).T
+    kinds, index = np.unique(found, return_inverse=True)
+    names = [
+        " ".join(dict.fromkeys(f.name.split("_")[0] for f in Exists if f & int(kind) and f.name)) for kind in kinds
+    ]
+    texts = np.array(names)[index.reshape(found.shape)].tolist()
+    shades = [TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds]
+    colours = [[(k + end) / len(kinds), shade] for k, shade in enumerate(shades) for end in (0, 1)]
+    names_at = []
+    for k, name in enumerate(names):
+        y, x = np.argwhere(index.reshape(found.shape) == k).mean(axis=0).round().astype(int)
+        if index.reshape(found.shape)[y, x] == k:
+            names_at.append({"x": eta[x], "y": flows[y], "text": name, "showarrow": False})
+    heat = {
+        "type": "heatmap", "x": eta.tolist(), "y": flows.tolist(), "z": index.reshape(found.shape).tolist(),
+        "text": texts, "colorscale": colours, "zmin": -0.5, "zmax": len(kinds) - 0.5, "showscale": False,
+        "hovertemplate": "η %{x:.2f}, ω₀ %{y:.1f} rad/s: %{text}<extra></extra>",
+    }  # fmt: skip
+    return _figure([heat, _here(p.eta, p.omega_0)], "friction of the wall η", "ω₀ (rad/s)", eta[-1], fastest,
+                   annotations=names_at)  # fmt: skip
+
+
+def _here(x: float, y: float) -> Figure:
+    look = {"symbol": "cross", "size": 12, "color": "black"}
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "here",
+        "x": [x],
+        "y": [y],
+        "marker": look,
+        "showlegend": False,
+    }
+
+
+def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more: Any) -> Figure:
+    layout = {
+        "xaxis": {"title": {"text": x}, "range": [0, right]}, "yaxis": {"title": {"text": y}, "range": [0, top]},
+        "margin": {"l": 50, "r": 10, "t": 30, "b": 40}, "hovermode": "closest",
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"}, "uirevision": "kept",
+    }  # fmt: skip
+    return {"data": data, "layout": layout | more}
+
+
+def simulated(p: Parameters, start: State) -> tuple[Trajectory, Any]:
+    """A motion and how the ball is turned; what there is of one that breaks down."""
+    try:
+        run = analytic.simulate(p, start.stacked(), LASTS, sample_interval=1 / RATE)
+    except SimulationError as error:
+        run = error.trajectory
+    return run, orientations(run)
+
+
+def said(p: Parameters) -> str:
+    """Thresholds and what the set comes to, in a line."""
+    t = bifurcation.thresholds(p)
+    parts = [f"{symbol} = {at:.4g}" for name, symbol in SYMBOLS.items() if np.isfinite(at := getattr(t, name))]
+    stable = " or ".join(
+        f"{each.case.name} at ω_c = {float(each.state.omega_c):.4g}" for each in analytic.stable_solutions(p)
+    )
+    return f"{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
+
+
+def serve(p: Parameters, port: int, show: bool) -> None:
+    """Serve the page on the loopback address alone until the process is interrupted; a tab has the set `p` at first.
+
+    Raises `InputError` if NiceGUI, an extra, isn't installed, or the port is in use.
+    """
+    try:
+        from nicegui import app, ui
+        from starlette.middleware.trustedhost import TrustedHostMiddleware
+    except ImportError as error:
+        raise InputError("explore needs NiceGUI: pip install 'dualball[explore]'") from error
+    with socket.socket() as tried:
+        try:
+            tried.bind((HOST, port))
+        except OSError as error:
+            why = "is in use" if error.errno == errno.EADDRINUSE else f"can't be had: {error.strerror}"
+            raise InputError(f"port {port} {why}; choose another one by --port") from error
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
+    print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
+    ui.run(
+        partial(page, p), host=HOST, port=port, title="dualball", show=show, reload=False, show_welcome_message=False
+    )
+
+
+def page(p: Parameters) -> None:
+    """Build a tab."""
+    from nicegui import ui
+
+    tab, draw = Tab(p), list[Callable[[], None]]()
+    with ui.row().classes("w-full no-wrap"):
+        with ui.column().classes("w-80"):
+            again = _controls(ui, tab, draw)
+        with ui.column().classes("grow"):
+            _theory(ui, tab, draw, again)
+        with ui.column().classes("grow"):
+            _motion(ui, tab)
+    for each in draw:
+        each()
+    again()
+
+
+def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[], None]:
+    """Sliders, the law of drag and files; what is returned simulates anew."""
+    from nicegui import run
+
+    async def again() -> None:
+        tab.asked += 1
+        mine = tab.asked
+        try:
+            found = await run.io_bound(simulated, tab.p, tab.start)
+        except InputError as error:
+            ui.notify(str(error), type="negative")
+            return
+        if found and mine == tab.asked:  # nothing else was asked for meanwhile
+            (tab.run, tab.turns), tab.clock = found, 0.0
+
+    def change(name: str, event: Any) -> None:
+        if event.value is None or (name in SLIDERS and float(event.value) == value(name)):
+            return
+        try:
+            tab.p = changed(tab.p, name, event.value)
+        except InputError as error:
+            ui.notify(str(error), type="negative")
+            return
+        for each in draw:
+            each()
+        ui.timer(0.0, again, once=True)
+
+    def value(name: str) -> float:
+        return float(getattr(tab.p, name))
+
+    sliders = {}
+    for name, (text, low, high, step) in SLIDERS.items():
+        ui.label(text)
+        with ui.row().classes("w-full no-wrap items-center"):
+            sliders[name] = slider = ui.slider(min=low, max=high, step=step, value=value(name))
+            slider.props(f'aria-label="{name}"').on_value_change(partial(change, name))
+            number = ui.number(value=round(value(name), 4), step=step, format="%.4g").classes("w-24")
+            number.bind_value(slider)
+    ui.select(list(drag.LAWS), value=tab.p.drag, label="law of drag").on_value_change(partial(change, "drag"))
+    line = ui.label().classes("text-sm said")
+
+    def show() -> None:
+        line.set_text(said(tab.p))
+        for name, slider in sliders.items():
+            slider.set_value(value(name))
+
+    draw.append(show)
+    with ui.row():
+        ui.button("Set as TOML", on_click=lambda: ui.download.content(_bytes(tab.p.save, "set.toml"), "set.toml"))
+        ui.button("Run as HDF5", on_click=lambda: _download(ui, tab))
+    return lambda: ui.timer(0.0, again, once=True)
+
+
+def _download(ui: Any, tab: Tab) -> None:
+    if tab.run:
+        ui.download.content(_bytes(partial(storage.save, tab.run), "run.h5"), "run.h5")
+
+
+def _bytes(save: Callable[[Path], object], name: str) -> bytes:
+    """What a function writes into a file."""
+    with tempfile.TemporaryDirectory() as directory:
+        save(Path(directory) / name)
+        return (Path(directory) / name).read_bytes()
+
+
+def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], again: Callable[[], None]) -> None:
+    """The characteristic curve and the map of cases; a click chooses where the ball starts, or the set."""
+    fastest = SLIDERS["omega_0"][2]
+    figures = {
+        "curve": lambda: characteristic(tab.p, float(tab.start.omega_c), fastest),
+        "map": lambda: regions(tab.p, fastest),
+    }
+    for name, figure in figures.items():
+        plot = ui.plotly(_figure([], "", "", 1, 1)).classes(f"w-full h-80 {name}")
+
+        def refresh(plot: Any = plot, figure: Callable[[], Figure] = figure) -> None:
+            plot.update_figure(figure())
+
+        def clicked(event: Any, name: str = name) -> None:
+            x, y = (float(event.args["points"][0][axis]) for axis in "xy")
+            if name == "curve":
+                tab.start, tab.p = State(omega_c=y), tab.p.replace(omega_0=x)
+            else:
+                tab.p = tab.p.replace(eta=x, omega_0=y)
+            for each in draw:
+                each()
+            again()
+
+        plot.on("plotly_click", clicked)
+        draw.append(refresh)
+    ui.label("A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η and ω₀.")
+
+
+def _motion(ui: Any, tab: Tab) -> None:
+    """The vessel, the ball that rolls in it, and the forces of floor and wall; lengths in units of R."""
+    p, upright = tab.p, [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    size = p.r / p.R
+    label = ui.label().classes("text-lg case")
+    scene = ui.scene(width=560, height=480, grid=False, background_color="#ffffff").classes("w-full")
+    scene.move_camera(0, -2.3, 1.7, 0, 0, 0.1)
+    with scene:
+        wall = scene.cylinder(1 + size, 1 + size, 4 * size, 64, wireframe=True).rotate_R(upright).move(0, 0, 2 * size)
+        wall.material("#7794ad", 0.35)
+        scene.cylinder(1 + size, 1 + size, 0.01, 64).rotate_R(upright).move(0, 0, -0.005).material("#dfe5ea")
+        with scene.group() as ball:
+            scene.sphere(size).material("#f5cc6b")
+            for spot in np.vstack([np.eye(3), -np.eye(3)]).tolist():
+                scene.sphere(0.2 * size, 12, 8).move(*(0.9 * size * v for v in spot)).material("#8a6d1f")
+        arrows = [scene.line([0, 0, 0], [0, 0, 1]).material(FORCE) for _ in "AB"]
+
+    def tick() -> None:
+        run = tab.run
+        if run is None or not len(run.time):
+            return
+        k = int(tab.clock * RATE) % len(run.time)
+        tab.clock += TICK
+        p, axes = run.header.parameters, frame(run.theta[k])
+        largest = max(p.m * p.g, float(np.abs(run.force_A).max()), float(np.abs(run.force_B).max()))
+        centre = to_world(run.x[k], run.theta[k], p).position / p.R
+        ball.move(*centre.tolist()).rotate_R(tab.turns[k].as_matrix().tolist())
+        for arrow, normal, force in zip(arrows, (axes[1], axes[0]), (run.force_A[k], run.force_B[k]), strict=True):
+            along = axes.T @ force * (REACH / largest)
+            arrow.move(*(centre - size * normal).tolist()).rotate_R(_towards(along)).scale(
+                float(np.linalg.norm(along)) + 1e-6
+            )
+        case = run.cases[k].name
+        label.set_text(f"{case}   t = {run.time[k]:.2f} s   ω_c = {run.omega_c[k]:.3g} rad/s")
+
+    ui.timer(TICK, tick)
+
+
+def _towards(direction: Any) -> list[list[float]]:
+    """A rotation that turns the z axis into a direction."""
+    z = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
+    x /= max(float(np.linalg.norm(x)), 1e-12)
+    rotation: list[list[float]] = np.column_stack([x, np.cross(z, x), z]).tolist()
+    return rotation

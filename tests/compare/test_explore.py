@@ -1,0 +1,132 @@
+"""The page to play with follows sliders and clicks in a real browser, saves what it shows, and serves nobody else."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.commands import cli
+from compare.view import explore
+from model import InputError, Parameters, State, storage
+from tests.compare.test_report import BROWSER
+
+P = Parameters.named("reference")
+
+
+def free_port() -> int:
+    with socket.socket() as tried:
+        tried.bind((explore.HOST, 0))
+        return int(tried.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """Of a server of its own, which Ctrl-C must end."""
+    pytest.importorskip("nicegui")
+    port = free_port()
+    command = [sys.executable, "-m", "compare", "explore", "--no-browser", "--port", str(port)]
+    env = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}  # NiceGUI looks for it
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, **pipes, text=True, env=env) as server:
+        assert server.stdout
+        assert f"http://{explore.HOST}:{port}" in server.stdout.readline()
+        for _ in range(100):
+            with socket.socket() as tried:
+                if tried.connect_ex((explore.HOST, port)) == 0:
+                    break
+            signal.sigtimedwait([], 0.1)
+        yield f"http://{explore.HOST}:{port}/"
+        server.send_signal(signal.SIGINT)
+        _, error = server.communicate(timeout=20)
+        assert server.returncode == 130
+        assert "Traceback" not in error
+
+
+def test_what_is_moved_clicked_and_typed_shows_and_is_saved(address: str, tmp_path: Path) -> None:
+    sync = pytest.importorskip("playwright.sync_api")
+    if BROWSER is None:
+        pytest.skip("there is no browser")
+    with sync.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
+        page, other = (browser.new_page(viewport={"width": 1500, "height": 900}) for _ in range(2))
+        for tab in (page, other):
+            tab.goto(address)
+            tab.wait_for_selector(".map .nsewdrag", timeout=60_000)
+
+        def shows(text: str) -> None:
+            page.wait_for_function("t => document.querySelector('.said').innerText.includes(t)", arg=text)
+
+        def click(where: str, x: float, y: float) -> None:
+            box = page.locator(where).bounding_box()
+            place = box["x"] + box["width"] * x, box["y"] + box["height"] * y
+            page.mouse.move(*place)
+            page.wait_for_timeout(300)  # plotly looks for the point below when the pointer rests
+            page.mouse.click(*place)
+
+        shows("RR at ω_c = 12")
+        click("[aria-label=omega_0]", 25 / 80, 0.5)
+        shows("SS at ω_c = ")
+        click(".map .nsewdrag", 0.5, 0.5)  # eta = 0.6, omega_0 = 40
+        shows("NR at ω_c = 40")
+        click(".curve .nsewdrag", 0.75, 0.25)  # omega_0 = 60, from omega_c = 60
+        shows("NR at ω_c = 60")
+        page.wait_for_function("document.querySelector('.case').innerText.startsWith('NR')")
+        for button, name in (("Set as TOML", "set.toml"), ("Run as HDF5", "run.h5")):
+            with page.expect_download() as saved:
+                page.get_by_text(button).click()
+            saved.value.save_as(tmp_path / name)
+        number = page.locator("input[type=number]").first
+        number.fill("-3")
+        number.press("Tab")
+        page.wait_for_selector("text=mu = -3 is out of range")
+        assert "RR at ω_c = 12" in other.inner_text(".said")
+        browser.close()
+    p, run = Parameters.load(tmp_path / "set.toml"), storage.load(tmp_path / "run.h5")
+    assert (p.eta, p.omega_0) == (pytest.approx(0.6, abs=0.02), pytest.approx(60, abs=1.5))
+    assert run.header.parameters == p
+    assert run.omega_c[0] == pytest.approx(60, abs=1.5)
+
+
+def test_nobody_else_is_served(address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = urllib.request.Request(address, headers={"Host": "example.org"})
+    with pytest.raises(urllib.error.HTTPError, match="400"):
+        urllib.request.urlopen(asked, timeout=10)
+    port = address.strip("/").rsplit(":", 1)[1]
+    assert cli.main(["explore", "--no-browser", "--port", port]) == 2
+    assert f"port {port} is in use; choose another one by --port" in capsys.readouterr().err
+
+
+def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "nicegui", None)
+    with pytest.raises(InputError, match=r"pip install 'dualball\[explore\]'"):
+        explore.serve(P, free_port(), show=False)
+
+
+@pytest.mark.parametrize("changes", [{}, {"eta": 0.6}, {"mu": 0.0, "eta": 0.0}, {"c": 0.0}, {"drag": "quadratic"}])
+def test_every_set_has_its_figures(changes: dict[str, float]) -> None:
+    p = P.replace(**changes, **({"nu_f": 1e-5} if "drag" in changes else {}))
+    curve, plane = explore.characteristic(p, 0.0, 80.0), explore.regions(p, 80.0)
+    assert "Settles to: " in explore.said(p)
+    assert curve["data"][0]["type"] == plane["data"][0]["type"] == "heatmap"
+    assert np.shape(plane["data"][0]["z"]) == np.shape(plane["data"][0]["text"])
+
+
+def test_a_slider_changes_the_set_and_a_motion_turns_the_ball() -> None:
+    p = explore.changed(explore.changed(P, "kappa", 0.5), "drag", "schiller-naumann")
+    assert p.kappa == pytest.approx(0.5)
+    assert p.nu_f == explore.OIL
+    with pytest.raises(InputError, match="j = 2"):
+        explore.changed(P, "j", 2.0)
+    run, turns = explore.simulated(p, State(omega_c=5.0))
+    assert len(turns) == len(run.time)
+    along = np.array(explore._towards(np.array([0.3, -0.4, 0.2])))
+    assert along[:, 2] * np.sqrt(0.29) == pytest.approx([0.3, -0.4, 0.2])
+    assert np.linalg.det(along) == pytest.approx(1.0)
