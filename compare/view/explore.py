@@ -312,30 +312,34 @@ def _motion(ui: Any, tab: Tab) -> None:
     scene = ui.scene(width=560, height=480, grid=False, background_color="#ffffff").classes("w-full")
     scene.move_camera(0, -2.3, 1.7, 0, 0, 0.1)
     with scene:
-        wall = scene.cylinder(1 + size, 1 + size, 4 * size, 64, wireframe=True).rotate_R(upright).move(0, 0, 2 * size)
-        wall.material("#7794ad", 0.35)
+        wall = scene.cylinder(1 + size, 1 + size, 1, 64, wireframe=True).rotate_R(upright).material("#7794ad", 0.35)
         scene.cylinder(1 + size, 1 + size, 0.01, 64).rotate_R(upright).move(0, 0, -0.005).material("#dfe5ea")
         with scene.group() as ball:
             scene.sphere(size).material("#f5cc6b")
             for spot in np.vstack([np.eye(3), -np.eye(3)]).tolist():
                 scene.sphere(0.2 * size, 12, 8).move(*(0.9 * size * v for v in spot)).material("#8a6d1f")
-        arrows = [scene.line([0, 0, 0], [0, 0, 1]).material(FORCE) for _ in "AB"]
+        arrows = [scene.group() for _ in "AB"]
+        for arrow in arrows:
+            with arrow:
+                scene.cylinder(0.02, 0.02, 1, 12).rotate_R(upright).move(0, 0, 0.5).material(FORCE)
 
     def tick() -> None:
         run = tab.run
         if run is None or not len(run.time):
             return
+        if tab.clock == 0:  # a new run: as tall a vessel as it needs
+            tall = float(run.y.max()) / p.R + 3 * size
+            wall.scale(1, tall, 1).move(0, 0, tall / 2)
         k = int(tab.clock * RATE) % len(run.time)
         tab.clock += TICK
-        p, axes = run.header.parameters, frame(run.theta[k])
+        axes = frame(run.theta[k])
         largest = max(p.m * p.g, float(np.abs(run.force_A).max()), float(np.abs(run.force_B).max()))
         centre = to_world(run.x[k], run.theta[k], p).position / p.R
         ball.move(*centre.tolist()).rotate_R(tab.turns[k].as_matrix().tolist())
         for arrow, normal, force in zip(arrows, (axes[1], axes[0]), (run.force_A[k], run.force_B[k]), strict=True):
             along = axes.T @ force * (REACH / largest)
-            arrow.move(*(centre - size * normal).tolist()).rotate_R(_towards(along)).scale(
-                float(np.linalg.norm(along)) + 1e-6
-            )
+            length = max(float(np.linalg.norm(along)), 1e-6)
+            arrow.move(*(centre - size * normal).tolist()).rotate_R(_towards(along)).scale(1, 1, length)
         case = run.cases[k].name
         label.set_text(f"{case}   t = {run.time[k]:.2f} s   ω_c = {run.omega_c[k]:.3g} rad/s")
 
