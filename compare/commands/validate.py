@@ -60,8 +60,9 @@ def run(args: argparse.Namespace) -> int:
         wanted |= {"workers": running.workers(args), "progress": show}
         wanted |= {"announce": lambda verdict: console.print(line(verdict), soft_wrap=True)}
         verdicts = validation.validate(args.output, **wanted)
-    admitted = [v for v in verdicts if v.outcome is not Outcome.NOT_RUN] if chosen else verdicts
-    return _finish(verdicts, admitted, args, console)
+    # A set of one's own may be too rough for a claim, or hold no example of it; the study's must not be.
+    spared = {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if chosen else set()
+    return _finish(verdicts, [v for v in verdicts if v.outcome not in spared], args, console)
 
 
 def judge(args: argparse.Namespace) -> int:
@@ -91,7 +92,8 @@ def _finish(
 def line(verdict: Verdict) -> Text:
     """A claim in one line: verdict, largest deviation, what error of theory would be noticed, or what went wrong."""
     kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
-    shown = Text.assemble((f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<18}")
+    expected = ", as expected" if verdict.passed and verdict.outcome is Outcome.REFUTED else ""
+    shown = Text.assemble((f"{mark} {verdict.outcome + expected:<13}", _STYLES[kind]), f" {verdict.claim.id:<18}")
     parts = []
     if verdict.checks:
         found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]

@@ -96,9 +96,11 @@ def noticed(powers: Mapping[str, float]) -> str:
     alike: dict[str, list[str]] = {}
     for name, power in powers.items():
         if quantity(name).resolves:
-            alike.setdefault(f"{power:.1g}", []).append(SYMBOLS[name])
+            alike.setdefault(f"{power:.1g}" if power < 1 else "", []).append(SYMBOLS[name])
+    blind = ", ".join(alike.pop("", []))
     errors = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
-    return f"a relative error of {errors}" if errors else ""
+    parts = [f"a relative error of {errors}"] * bool(errors) + [f"none in {blind}, which are too coarse"] * bool(blind)
+    return "; ".join(parts)
 
 
 def coarsest(witness: Witness) -> float:
@@ -161,10 +163,16 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
 
 def headline(ran: Sequence[Verdict]) -> str:
     """The verdicts in a sentence."""
-    failed = [verdict.claim.id for verdict in ran if not verdict.passed]
-    if failed:
-        more = f" and {len(failed) - 4} more" if len(failed) > 4 else ""
-        return f"{len(failed)} of {len(ran)} claims did not come out as expected: {', '.join(failed[:4])}{more}"
+    unsure = [verdict.claim.id for verdict in ran if verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed]
+    failed = [verdict.claim.id for verdict in ran if not verdict.passed and verdict.claim.id not in unsure]
+    if failed or unsure:
+        kinds = {"did not come out as expected": failed, "can't be told from what was measured": unsure}
+        return "; ".join(
+            f"{len(those)} of {len(ran)} claims {what}: {', '.join(those[:4])}"
+            + (f" and {len(those) - 4} more" if len(those) > 4 else "")
+            for what, those in kinds.items()
+            if those
+        )
     if not ran:
         return "Nothing has been checked yet"
     name = next((each.engine for verdict in ran for each in verdict.witnesses), "")
@@ -174,11 +182,13 @@ def headline(ran: Sequence[Verdict]) -> str:
 def kinds(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims came out as expected, by kind, and how many didn't: counts with what they count."""
     passed = [verdict for verdict in ran if verdict.passed]
+    unsure = sum(verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed for verdict in ran)
     counts = {
         "confirmed by measurement": sum(v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed),
         "refuted as expected": sum(v.outcome is Outcome.REFUTED for v in passed),
         "formal, theory against theory": sum(bool(v.claim.algebra) for v in passed),
-        "not as expected": len(ran) - len(passed),
+        "not as expected": len(ran) - len(passed) - unsure,
+        "inconclusive": unsure,
     }
     return [(str(n), what) for what, n in counts.items() if n]
 
