@@ -139,6 +139,8 @@ def _parser(words: Sequence[str]) -> options.Parser:
     parser.add_argument("--version", action="version", version=f"dualball {version('dualball')}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS)
     known = {name: about for group in GROUPS.values() for name, about in group.items()}
+    if words and words[0] == "--print-completion":
+        _complete(parser, commands, words[1:])
     if words and words[0] in known:
         module, what = known[words[0]]
         importlib.import_module(f"compare.commands.{module}").add(commands)
@@ -154,5 +156,23 @@ def _parser(words: Sequence[str]) -> options.Parser:
         for name, (_, what) in group.items():
             commands.add_parser(name)
             listed.append(textwrap.fill(what, 100, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14))
+    parser.add_argument(
+        "--print-completion", metavar="SHELL", help="print what bash, zsh, fish or tcsh complete words by"
+    )
     parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
     return parser
+
+
+def _complete(parser: options.Parser, commands: options.Commands, shell: Sequence[str]) -> NoReturn:
+    """Print what a shell completes commands, options and files by, and end."""
+    try:
+        import shtab  # here, because it is optional
+    except ImportError as error:
+        raise InputError("--print-completion needs shtab: pip install 'dualball[completion]'") from error
+    if tuple(shell) not in {(each,) for each in shtab.SUPPORTED_SHELLS}:
+        raise InputError(f"--print-completion takes one of {', '.join(shtab.SUPPORTED_SHELLS)}")
+    for module in dict.fromkeys(module for group in GROUPS.values() for module, _ in group.values()):
+        importlib.import_module(f"compare.commands.{module}").add(commands)
+    commands.help = "a command"  # what has no help isn't completed
+    print(shtab.complete(parser, shell[0]))
+    raise SystemExit(0)

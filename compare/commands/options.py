@@ -155,7 +155,8 @@ class _Help(argparse.HelpFormatter):
 
 def command(commands: Commands, name: str, run: Callable[[argparse.Namespace], int], example: str) -> Parser:
     """Declare a command; the example is what follows its name."""
-    declared: Parser = commands.add_parser(name, epilog=f"Example: dualball {name} {example}", formatter_class=_Help)
+    texts = {"help": f"as in: dualball {name} {example}", "epilog": f"Example: dualball {name} {example}"}
+    declared: Parser = commands.add_parser(name, **texts, formatter_class=_Help)
     declared.set_defaults(run=run)
     return declared
 

@@ -416,3 +416,21 @@ def test_mistakes(
     before = sorted(Path().iterdir())
     assert says in refused(capsys, *argv.split())
     assert sorted(Path().iterdir()) == before  # and nothing is left half written
+
+
+def test_shells_complete_commands_options_and_files(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("shtab")
+    for shell in ("bash", "zsh", "fish"):
+        with pytest.raises(SystemExit, match="0"):
+            cli.main(["--print-completion", shell])
+        text = capsys.readouterr().out
+        assert "explore" in text
+        assert "sample-interval" in text
+        (tmp_path / shell).write_text(text)
+    words = "source ./bash; COMP_WORDS=(dualball sim); COMP_CWORD=1; _shtab_dualball; echo ${COMPREPLY[@]}"
+    assert subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True).stdout == "simulate\n"
+    assert cli.main(["--print-completion", "dos"]) == 2
+    assert "takes one of bash" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "shtab", None)
+    assert cli.main(["--print-completion", "bash"]) == 2
+    assert "dualball[completion]" in capsys.readouterr().err
