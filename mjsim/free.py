@@ -2,8 +2,11 @@
 
 A free ball takes the curve of the wall from the engine: the more independent witness and the less accurate one, since
 MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis. Of the
-corrections between the steps only drag, the turning of the wall and the servo of the margins apply to it. With
-``law="rigid"`` its contacts obey `mjsim.Coulomb`, which serves any model and knows nothing of this one.
+corrections between the steps only drag, the turning of the wall and the servo of the margins apply to it.
+
+With ``law="rigid"`` its contacts obey `mjsim.Coulomb`, which serves any model and knows nothing of this one.
+Semi-implicit steps are leapfrog: places are half a step ahead of velocities. The wall is a block that is turned to the
+ball before each step and moves during it as a cylinder does past the ball (`against`).
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ def newcomer(step: float) -> ContactSettings:
 
 
 def rigid(step: float) -> ContactSettings:
-    """A free ball in the vessel, its wall a plane that is turned, and Coulomb's law for any model; no more of ours."""
+    """A free ball in the vessel, its wall a plane that goes with it, and Coulomb's law for any model; no more of ours."""
     return replace(newcomer(ContactSettings.timestep), coordinates="free", law="rigid", timestep=step)
 
 
@@ -213,7 +213,7 @@ COULOMB = replace(
     study=None,
     stream=mjsim.Run,
     title="MuJoCo under a law of friction for any model, in the limit of no time step",
-    about="a free ball in the vessel, the wall a plane turned to it; contacts by mjsim.Coulomb, which serves any model",
+    about="a free ball in the vessel, its wall a plane that goes with it; contacts by mjsim.Coulomb, for any model",
     refine=(2, 4, 8, 16),
     mark="X",
 )
