@@ -120,7 +120,7 @@ def newcomer(step: float) -> ContactSettings:
 
 
 def rigid(step: float) -> ContactSettings:
-    """A free ball in the vessel, its wall a plane that goes with it, and Coulomb's law for any model; no more of ours."""
+    """A free ball in the vessel, its wall a plane that goes with it, and Coulomb's law for any model."""
     return replace(newcomer(ContactSettings.timestep), coordinates="free", law="rigid", timestep=step)
 
 
