@@ -227,7 +227,8 @@ class Campaign:
                 batches = [(again.popleft(),)]
             for batch in batches:
                 pending[self._workers.submit(run_batch, batch, self.directory, self.label, self.limit, *how)] = batch
-            wait(pending, return_when=FIRST_COMPLETED)
+            if not any(future.done() for future in pending):  # `wait` waits for cancelled ones that nobody told of it
+                wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)
                 if future.cancelled():

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 
 import numpy as np
@@ -295,7 +295,13 @@ class Orphaned(ThreadPoolExecutor):
         return gone
 
 
-def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(tmp_path: Path, undisturbed) -> None:
+@pytest.mark.parametrize("slow", [False, True])
+def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
+    slow: bool, tmp_path: Path, undisturbed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where all that it did is there before it is missed."""
+    if slow:
+        monkeypatch.setattr("compare.kit.campaign.wait", lambda futures, **how: wait(futures))
     fleet = Workers(1, lambda: Orphaned(2), lambda executor, at_once: executor.shutdown(), ())
     gone = "the workers' scheduler is gone; finished runs are kept"
     with pytest.raises(StorageError, match=gone), Campaign(tmp_path, fleet, batch=1) as campaign:
