@@ -49,14 +49,25 @@ def going_round(
     style.curve(axes, case, flows, quantity(slip_x, flows), text, place, line)
 
 
+def ends(p: Parameters) -> tuple[float, float]:
+    """The flows up to which RR and from which SR is stable, rad s-1: for eta > j they are one."""
+    t = bifurcation.thresholds(p)
+    return (t.omega_01, t.omega_02) if p.eta < p.j else (t.omega_03, t.omega_03)
+
+
+def slipping_curve(p: Parameters, count: int) -> tuple[State, Array, npt.NDArray[np.bool_]]:
+    """So many states of the branch of SS, as columns, their flows, rad s-1, and whether they are unstable."""
+    s = np.linspace(-16.0, 16.0, count)
+    x, omega_0 = slipping_branch.states(s, p)
+    return State.of(x), omega_0, slipping_branch.eigenvalues_at(s, p).real.max(axis=-1) > 0
+
+
 def slipping(
     axes: Axes, p: Parameters, quantity: Drawn, stable: Place | None = None, unstable: Place | None = None
 ) -> None:
     """The branch of SS, its line by its eigenvalues; a name at each part that has a place for it."""
-    s = np.linspace(-16.0, 16.0, 1601)
-    x, omega_0 = slipping_branch.states(s, p)
-    grows = slipping_branch.eigenvalues_at(s, p).real.max(axis=-1) > 0
-    values = quantity(State.of(x).slip_x, State.of(x).omega_c)
+    x, omega_0, grows = slipping_curve(p, 1601)
+    values = quantity(x.slip_x, x.omega_c)
     for part, line, text, place in ((~grows, "-", "SS", stable), (grows, UNSTABLE, "SS, unstable", unstable)):
         if part.any():
             style.curve(axes, Case.SS, omega_0, np.where(part, values, np.nan), text, place, line)

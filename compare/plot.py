@@ -1,10 +1,12 @@
 """Figures of one's own: each function draws into axes of matplotlib, new ones if none are given, and returns them.
 
-from compare import plot
-from model import Parameters
+For example::
 
-axes = plot.characteristic(Parameters.load("mine.toml"))
-axes.figure.savefig("mine.svg")
+    from compare import plot
+    from model import Parameters
+
+    axes = plot.characteristic(Parameters.load("mine.toml"))
+    axes.figure.savefig("mine.svg")
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.thresholds import figures as thresholds
 from compare.view import planes
 from model import Case, InputError, Parameters, Trajectory
-from model.trajectory import columns
+from model.parameters import check_names
+from model.trajectory import COMPONENTS, columns, component
 
 if TYPE_CHECKING:
     import xarray
@@ -52,24 +55,18 @@ def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> 
 def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = None) -> Axes:
     """Quantities of a motion over time, omega_c if none is named, on the colours of its cases.
 
-    `run`: what `simulate` returns, or a file that xarray has opened. A component of a force is named as in a file of
-    pandas, ``force_Ay``. Raises `InputError` for an unknown name, or for quantities of different units.
+    `run`: what `simulate` returns, or a file that xarray has opened. A component of a force is named as in
+    `Trajectory.to_pandas`, ``force_Ay``. Raises `InputError` for an unknown name, or for quantities of different units.
     """
-    known = {name: meta for name, meta in columns(Trajectory).items() if name not in ("time", "case")}
-    units, axes = {}, _or_new(axes)
-    time, case = np.asarray(run.time), np.asarray(run.case)
-    for name in names or ("omega_c",):
-        column = name[:-1] if name[:-1] in known and known[name[:-1]]["shape"] else name
-        if column not in known or (known[column]["shape"] and column == name):
-            raise InputError(
-                f"no quantity of a motion is called {name!r}; there are {', '.join(known)}, forces with x, y, z"
-            )
-        values = np.asarray(getattr(run, column))
-        values = values[:, "xyz".index(name[-1])] if column != name else values
-        units[known[column]["units"]] = name
-        axes.plot(time, values, label=style.symbol(name) if name in QUANTITIES else name)
+    names, about = names or ("omega_c",), columns(Trajectory)
+    known = [name for name in COMPONENTS if name not in ("time", "case")]
+    check_names(names, known, "quantity of a motion")
+    units = {about[COMPONENTS[name][0]]["units"]: name for name in names}
     if len(units) > 1:
         raise InputError(f"{' and '.join(units.values())} have different units: {', '.join(units)}")
+    axes, time, case = _or_new(axes), np.asarray(run.time), np.asarray(run.case)
+    for name in names:
+        axes.plot(time, component(run, name), label=style.symbol(name) if name in QUANTITIES else name)
     begins = np.flatnonzero(np.diff(case, prepend=-1))
     for first, last in zip(begins, [*begins[1:], len(case) - 1], strict=True):
         axes.axvspan(time[first], time[last], color=style.COLOURS[Case(case[first])], alpha=0.15, lw=0)

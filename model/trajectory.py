@@ -173,12 +173,7 @@ class Trajectory:
             import pandas  # here, because it is optional and takes a second to load
         except ImportError as error:
             raise InputError("to_pandas() needs pandas: pip install pandas") from error
-        table: dict[str, Any] = {}
-        for name, meta in columns(type(self)).items():
-            values = getattr(self, name)
-            split = zip(AXES, values.T, strict=True) if meta["shape"] else [("", values)]
-            table |= {name + axis: column for axis, column in split}
-        table["omega_0"] = self.omega_0
+        table: dict[str, Any] = {name: component(self, name) for name in COMPONENTS} | {"omega_0": self.omega_0}
         table["case"] = pandas.Categorical.from_codes(self.case, [case.name for case in Case])
         found = pandas.DataFrame(table).set_index("time")
         found.attrs = self.header.attributes()
@@ -226,6 +221,19 @@ def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]
 
 
 _SAMPLED = columns(Trajectory).items()
+COMPONENTS: dict[str, tuple[str, str]] = {
+    name + axis: (name, axis) for name, meta in _SAMPLED for axis in (AXES if meta["shape"] else ("",))
+}
+"""What a sample holds, number by number: the columns, forces once along each of the `AXES` (force_Ax ...)."""
+
+
+def component(of: Any, name: str) -> Array:
+    """One of `COMPONENTS` at each sample of a trajectory, or of its data set in xarray, shape (n,)."""
+    column, axis = COMPONENTS[name]
+    values = np.asarray(getattr(of, column))
+    return values[:, AXES.index(axis)] if axis else values
+
+
 _meanings = (f"* {name}: {meta['long_name']}, in {meta['units']}" for name, meta in _SAMPLED)
 Trajectory.__doc__ = (Trajectory.__doc__ or "").replace("COLUMNS", "\n    ".join(_meanings).replace(", in 1", ""))
 

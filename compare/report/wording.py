@@ -161,18 +161,21 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
     return rows
 
 
+def unsure(ran: Sequence[Verdict]) -> list[str]:
+    """The claims that were to come out one way or the other, and can't be told from what was measured."""
+    return [verdict.claim.id for verdict in ran if verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed]
+
+
 def headline(ran: Sequence[Verdict]) -> str:
     """The verdicts in a sentence."""
-    unsure = [verdict.claim.id for verdict in ran if verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed]
-    failed = [verdict.claim.id for verdict in ran if not verdict.passed and verdict.claim.id not in unsure]
-    if failed or unsure:
-        kinds = {"did not come out as expected": failed, "can't be told from what was measured": unsure}
-        return "; ".join(
-            f"{len(those)} of {len(ran)} claims {what}: {', '.join(those[:4])}"
-            + (f" and {len(those) - 4} more" if len(those) > 4 else "")
-            for what, those in kinds.items()
-            if those
-        )
+    undecided = unsure(ran)
+    failed = [verdict.claim.id for verdict in ran if not verdict.passed and verdict.claim.id not in undecided]
+    parts = []
+    for what, ids in (("did not come out as expected", failed), ("can't be told from what was measured", undecided)):
+        more = f" and {len(ids) - 4} more" if len(ids) > 4 else ""
+        parts += [f"{len(ids)} of {len(ran)} claims {what}: {', '.join(ids[:4])}{more}"] * bool(ids)
+    if parts:
+        return "; ".join(parts)
     if not ran:
         return "Nothing has been checked yet"
     name = next((each.engine for verdict in ran for each in verdict.witnesses), "")
@@ -182,13 +185,13 @@ def headline(ran: Sequence[Verdict]) -> str:
 def kinds(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims came out as expected, by kind, and how many didn't: counts with what they count."""
     passed = [verdict for verdict in ran if verdict.passed]
-    unsure = sum(verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed for verdict in ran)
+    left = len(unsure(ran))
     counts = {
         "confirmed by measurement": sum(v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed),
         "refuted as expected": sum(v.outcome is Outcome.REFUTED for v in passed),
         "formal, theory against theory": sum(bool(v.claim.algebra) for v in passed),
-        "not as expected": len(ran) - len(passed) - unsure,
-        "inconclusive": unsure,
+        "not as expected": len(ran) - len(passed) - left,
+        "inconclusive": left,
     }
     return [(str(n), what) for what, n in counts.items() if n]
 

@@ -20,7 +20,7 @@ import numpy as np
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
-from analytic.stationary import slipping_branch
+from compare.branches import ends, slipping_curve
 from compare.kit.style import COLOURS, FORCE
 from compare.subjects.thresholds.figures import TINTS
 from compare.view.render import orientations
@@ -73,17 +73,14 @@ def changed(p: Parameters, name: str, value: float | str) -> Parameters:
 
 def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     """omega_c of stationary solutions over omega_0, the thresholds, where the ball starts; a click anywhere counts."""
-    t, s = bifurcation.thresholds(p), np.linspace(-16.0, 16.0, 401)
-    folds = p.eta < p.j
-    rolls, rides = (t.omega_01, t.omega_02) if folds else (t.omega_03, t.omega_03)
+    t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, ends(p)
     lines: list[tuple[str, Case, Any, Any, str]] = []
     if np.isfinite(rolls):
         lines.append(("RR", Case.RR, [0, min(rolls, fastest)], [0, min(rolls, fastest)], "solid"))
     if folds and p.c > 0 and np.isfinite(t.omega_02):
-        x, flows = slipping_branch.states(s, p)
-        grows = slipping_branch.eigenvalues_at(s, p).real.max(axis=-1) > 0
+        x, flows, grows = slipping_curve(p, 401)
         for text, part, dash in (("SS", ~grows, "solid"), ("SS, unstable", grows, "dash")):
-            lines.append((text, Case.SS, flows, np.where(part, State.of(x).omega_c, np.nan), dash))
+            lines.append((text, Case.SS, flows, np.where(part, x.omega_c, np.nan), dash))
     if np.isfinite(rides) and rides < fastest:
         lines.append(("SR, NR", Case.SR, [rides, fastest], [rides, fastest], "solid"))
     data = [
@@ -182,6 +179,9 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     except ImportError as error:
         raise InputError("explore needs NiceGUI: pip install 'dualball[explore]'") from error
     with socket.socket() as tried:
+        tried.setsockopt(
+            socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
+        )  # as the server does: of one that ended nothing is left
         try:
             tried.bind((HOST, port))
         except OSError as error:
@@ -201,18 +201,16 @@ def page(p: Parameters) -> None:
     tab, draw = Tab(p), list[Callable[[], None]]()
     with ui.row().classes("w-full no-wrap"):
         with ui.column().classes("w-80"):
-            again = _controls(ui, tab, draw)
+            follow = _controls(ui, tab, draw)
         with ui.column().classes("grow"):
-            _theory(ui, tab, draw, again)
+            _theory(ui, tab, draw, follow)
         with ui.column().classes("grow"):
             _motion(ui, tab)
-    for each in draw:
-        each()
-    again()
+    follow()
 
 
 def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[], None]:
-    """Sliders, the law of drag and files; what is returned simulates anew."""
+    """Sliders, the law of drag and files; what is returned draws all and simulates anew."""
     from nicegui import run
 
     async def again() -> None:
@@ -234,6 +232,9 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
         except InputError as error:
             ui.notify(str(error), type="negative")
             return
+        follow()
+
+    def follow() -> None:
         for each in draw:
             each()
         ui.timer(0.0, again, once=True)
@@ -261,7 +262,7 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
     with ui.row():
         ui.button("Set as TOML", on_click=lambda: ui.download.content(_bytes(tab.p.save, "set.toml"), "set.toml"))
         ui.button("Run as HDF5", on_click=lambda: _download(ui, tab))
-    return lambda: ui.timer(0.0, again, once=True)
+    return follow
 
 
 def _download(ui: Any, tab: Tab) -> None:
@@ -276,7 +277,7 @@ def _bytes(save: Callable[[Path], object], name: str) -> bytes:
         return (Path(directory) / name).read_bytes()
 
 
-def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], again: Callable[[], None]) -> None:
+def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[[], None]) -> None:
     """The characteristic curve and the map of cases; a click chooses where the ball starts, or the set."""
     fastest = SLIDERS["omega_0"][2]
     figures = {
@@ -295,9 +296,7 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], again: Callable[[
                 tab.start, tab.p = State(omega_c=y), tab.p.replace(omega_0=x)
             else:
                 tab.p = tab.p.replace(eta=x, omega_0=y)
-            for each in draw:
-                each()
-            again()
+            follow()
 
         plot.on("plotly_click", clicked)
         draw.append(refresh)
@@ -323,17 +322,20 @@ def _motion(ui: Any, tab: Tab) -> None:
             with arrow:
                 scene.cylinder(0.02, 0.02, 1, 12).rotate_R(upright).move(0, 0, 0.5).material(FORCE)
 
+    largest = 1.0
+
     def tick() -> None:
+        nonlocal largest
         run = tab.run
         if run is None or not len(run.time):
             return
-        if tab.clock == 0:  # a new run: as tall a vessel as it needs
+        if tab.clock == 0:  # a new run: as tall a vessel as it needs, arrows by its largest force
             tall = float(run.y.max()) / p.R + 3 * size
             wall.scale(1, tall, 1).move(0, 0, tall / 2)
+            largest = max(p.m * p.g, float(np.abs([run.force_A, run.force_B]).max()))
         k = int(tab.clock * RATE) % len(run.time)
         tab.clock += TICK
         axes = frame(run.theta[k])
-        largest = max(p.m * p.g, float(np.abs(run.force_A).max()), float(np.abs(run.force_B).max()))
         centre = to_world(run.x[k], run.theta[k], p).position / p.R
         ball.move(*centre.tolist()).rotate_R(tab.turns[k].as_matrix().tolist())
         for arrow, normal, force in zip(arrows, (axes[1], axes[0]), (run.force_A[k], run.force_B[k]), strict=True):

@@ -5,17 +5,15 @@ All take some half an hour, most of them the piles (``--only piles``).
 
 from __future__ import annotations
 
-import argparse
 import copy
 import functools
 import itertools
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Protocol
 from unittest import mock
 
@@ -23,7 +21,7 @@ import mujoco
 import numpy as np
 
 from compare.kit.pages import Rows
-from docs.studies.tables import write
+from docs.studies.tables import write_all
 from mjsim import Coulomb
 from mjsim.coulomb import doors, formulas
 
@@ -481,16 +479,5 @@ TABLES: dict[str, Callable[[], Rows]] = {
 }  # fmt: skip
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Measure and write all tables, or those named."""
-    parser = argparse.ArgumentParser(description="Write the tables on Coulomb's law.")
-    parser.add_argument("page", type=Path, metavar="FILE", help="docs/friction.md")
-    parser.add_argument("--only", action="append", choices=list(TABLES), metavar="NAME", help="only this table")
-    args = parser.parse_args(argv)
-    for name in args.only or TABLES:
-        write(args.page, name, TABLES[name]())
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_all(TABLES, "Write the tables on Coulomb's law.", "docs/friction.md"))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -19,7 +17,7 @@ from analytic.simulation import charts, integrator
 from analytic.simulation.motion import Fluid, Moment
 from analytic.stationary.solutions import solution
 from compare.kit.pages import Rows
-from docs.studies.tables import write
+from docs.studies.tables import write_all
 from model import Case, Flow, Parameters, State
 from model.kinematics import SLIP_XYZ
 
@@ -134,16 +132,5 @@ def event_driven() -> Rows:
 TABLES: dict[str, Callable[[], Rows]] = {"event-driven": event_driven}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Measure and write all tables, or those named."""
-    parser = argparse.ArgumentParser(description="Write the tables on speed.")
-    parser.add_argument("page", type=Path, metavar="FILE", help="docs/speed.md")
-    parser.add_argument("--only", action="append", choices=list(TABLES), metavar="NAME", help="only this table")
-    args = parser.parse_args(argv)
-    for name in args.only or TABLES:
-        write(args.page, name, TABLES[name]())
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_all(TABLES, "Write the tables on speed.", "docs/speed.md"))

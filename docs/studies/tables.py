@@ -12,7 +12,7 @@ import json
 import os
 import pickle
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -40,6 +40,17 @@ def write(page: Path, name: str, rows: Rows) -> None:
         raise InputError(f"{page} must have the lines {begin!r} and {end!r} once each")
     before, rest = text.split(begin)
     write_text(page, f"{before}{begin}\n{pages.markdown(rows)}\n{end}{rest.split(end)[1]}")
+
+
+def write_all(tables: Mapping[str, Callable[[], Rows]], what: str, page: str) -> int:
+    """As a program: measure and write all tables of a page, or those named."""
+    parser = argparse.ArgumentParser(description=what)
+    parser.add_argument("page", type=Path, metavar="FILE", help=page)
+    parser.add_argument("--only", action="append", choices=list(tables), metavar="NAME", help="only this table")
+    args = parser.parse_args()
+    for name in args.only or tables:
+        write(args.page, name, tables[name]())
+    return 0
 
 
 def _of_settings(entries: Sequence[Entry]) -> Rows:

@@ -290,8 +290,10 @@ def test_functions_that_draw_into_axes():
     assert "N" in of_file.get_ylabel()
     for names, said in (
         (("y", "omega_c"), "different units"),
-        (("force_A",), "no quantity"),
-        (("speed",), "no quantity"),
+        (("force_A",), "unknown quantity of a motion"),
+        (("speed",), "unknown quantity of a motion"),
+        (("force_Aq",), "unknown quantity of a motion"),
     ):
         with pytest.raises(InputError, match=said):
-            plot.motion(run, *names)
+            plot.motion(run, *names, axes=mine)
+    assert len(mine.get_lines()) == 2

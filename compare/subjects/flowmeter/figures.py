@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation import simulator
-from compare.branches import fold_state, slipping
+from compare.branches import ends, fold_state, slipping
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion
 from compare.kit.engines import EVENT
@@ -107,14 +107,14 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
             "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
         )
         t = bifurcation.thresholds(p)
-        for case, ends, width, line, at in (
+        for case, span, width, line, at in (
             (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (9, -9))),
             (Case.SR, (t.omega_03, top), 5, style.STABLE, (0.4, (-12, 12))),
             (Case.SR, (t.omega_02, t.omega_03), 5, (0, (1.5, 0.8)), (0.1, (-30, 20))),
             (Case.RR, (0.0, t.omega_03), 2, style.STABLE, (0.45, (-5, 5))),
         ):
             text = case.name if line == style.STABLE else f"{case.name}, unstable"
-            style.curve(axes, case, ends, ends, text, at, line, width)
+            style.curve(axes, case, span, span, text, at, line, width)
         axes.plot([t.omega_02], [t.omega_02], **style.POINT)
         style.points(axes, [m for m in of.states if m.conditions["case"] in ("RR", "SR", "NR")], ms=4)
         style.guides(axes, {"omega_02": t.omega_02, "omega_03": t.omega_03})
@@ -137,12 +137,9 @@ def top_flow(p: Parameters) -> float:
 
 def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     """All solutions up to the fastest flow, and the thresholds; for eta > j RR, SR and NR are one line."""
-    t = bifurcation.thresholds(p)
-    folds = p.eta < p.j
-    rolls, rides = (t.omega_01, t.omega_02) if folds else (t.omega_03, t.omega_03)
-
-    for case, ends, text, at in ((Case.RR, (0.0, rolls), "RR", 0.45), (Case.SR, (rides, fastest), "SR, NR", 0.7)):
-        style.curve(axes, case, ends, ends, text, (at, (-5, 5)))
+    t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, ends(p)
+    for case, span, text, at in ((Case.RR, (0.0, rolls), "RR", 0.45), (Case.SR, (rides, fastest), "SR, NR", 0.7)):
+        style.curve(axes, case, span, span, text, (at, (-5, 5)))
     if folds:
         slipping(axes, p, lambda _, omega_c: omega_c, (0.5, (0, -7)), (0.5, (38, -14)))
     axes.set_xlim(0, fastest)
