@@ -25,8 +25,9 @@ help:
 
 mutants: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet
+	$(BIN)/dualball validate --quick --quiet --engine mujoco-coulomb -o results/coulomb
 	$(BIN)/dualball validate --quiet -o results/default
-	$(BIN)/python -m tests.mutants results results/default --whole --engines --witness mujoco-plain --least 0.95 --page docs/mutants.md
+	$(BIN)/python -m tests.mutants results results/default --whole --engines --witness mujoco-plain --witness mujoco-coulomb=results/coulomb --least 0.95 --page docs/mutants.md
 
 test: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist loadfile

@@ -18,8 +18,8 @@ def main() -> int:
     results = "results of 'dualball validate'; a theory is judged on them until a claim notices it, the quickest first"
     parser.add_argument("directories", type=Path, nargs="+", metavar="DIR", help=results)
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
-    one = "also judge by what this witness alone says, as mujoco-plain; may be repeated"
-    parser.add_argument("--witness", action="append", default=[], metavar="NAME", help=one)
+    one = "also judge by what this witness alone says, as mujoco-plain, stored in DIR or the first of all; repeatable"
+    parser.add_argument("--witness", action="append", default=[], metavar="NAME[=DIR]", help=one)
     parser.add_argument("--whole", action="store_true", help="judge by all claims on the first of them: takes an hour")
     parser.add_argument("--page", type=Path, metavar="FILE", help="page to write")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
@@ -30,7 +30,8 @@ def main() -> int:
         levels = [trial.judged(first, args.workers, whole=args.whole)]
         levels += [trial.judged(each, args.workers, whole=False) for each in others]
         measured = trial.wrong_engines(first, args.workers) if args.engines else []
-        alone = [trial.heard(first, name, args.workers) for name in args.witness]
+        named = [name.partition("=") for name in args.witness]
+        alone = [trial.heard(Path(where or first), name, args.workers) for name, _, where in named]
         if args.page:
             write_text(args.page, trial.page(levels, measured, alone))
     except InputError as error:
