@@ -36,7 +36,7 @@ def _advance(
         wall[0], wall[3] = math.cos(theta / 2), math.sin(theta / 2)
         spin = _spun(qpos[3:], qvel)
         slip = _slip(qpos, qvel, spin, ahead, ball)
-        qvel[6], qvel[7] = _against(theta, qvel, spin, ahead, ball)
+        qvel[6], qvel[7] = _against(theta, qvel, spin, ahead, ball.R, ball.r)
         at[2], qpos[7], qpos[8] = qpos[2], 0.0, 0.0
         seen[number, -2], seen[number, -1] = qpos[2] - ball.r, ball.R - math.hypot(x, y)
         kernels.mj_step1(m, d)

@@ -70,16 +70,17 @@ def spun(turned: Any, velocity: Any) -> tuple[float, float, float]:
     )
 
 
-def against(azimuth: float, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tuple[float, float]:
-    """Velocity of the wall inwards and upwards, m/s, at which what is at rest against it is so against the cylinder
-    once velocities are where the place is at the end of the step.
+def against(azimuth: float, velocity: Any, spin: Any, ahead: float, R: float, r: float) -> tuple[float, float]:
+    """Velocity of a plane inwards and upwards, m/s, at which what is at rest against it is so against the cylinder
+    `ahead` s later, when velocities are where the place is now.
 
-    By then the azimuth has grown by h/2 Omega: of the velocity along the wall h/2 Omega^2 R will point into it, and
-    where ball and wall touch the turning about the normal will show as h/2 Omega r o_n of slip.
+    By then the azimuth has grown by ahead Omega: of the velocity along the wall ahead Omega^2 R will point into it, and
+    where ball and wall touch the turning about the normal will show as ahead Omega r o_n of slip. A plane without that
+    velocity takes h Omega^2/2 of the ball's speed a second.
     """
     out_x, out_y = math.cos(azimuth), math.sin(azimuth)
-    rate = (out_x * velocity[1] - out_y * velocity[0]) / ball.R
-    return ahead * rate * rate * ball.R, -ahead * rate * ball.r * (out_x * spin[0] + out_y * spin[1])
+    rate = (out_x * velocity[1] - out_y * velocity[0]) / R
+    return ahead * rate * rate * R, -ahead * rate * r * (out_x * spin[0] + out_y * spin[1])
 
 
 def slip(place: Any, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tuple[float, float, float, float]:
@@ -210,7 +211,7 @@ class _Ball:
         if self.law:
             spin = spun(turned, velocity)
             self._at[2], data.qpos[7:] = place[2], 0.0
-            data.qvel[6:] = against(self.theta, velocity, spin, self.ahead, self._ball)
+            data.qvel[6:] = against(self.theta, velocity, spin, self.ahead, p.R, p.r)
             self.law.step(data)
         else:
             mujoco.mj_step(self.model, data)

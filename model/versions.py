@@ -8,6 +8,9 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
+ABSENT = "not installed"
+"""The version of a package that isn't there."""
+
 
 @functools.cache
 def current_versions() -> Mapping[str, str]:
@@ -24,7 +27,7 @@ def version(package: str) -> str:
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
-        return "not installed"
+        return ABSENT
 
 
 @functools.cache

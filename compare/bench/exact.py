@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 import analytic
+from compare.adapters.scene import Body, Surface
 from compare.bench import mechanisms, one_contact
-from compare.bench.case import TOLERANCE, VERSION, Body, Case, Surface
+from compare.bench.case import TOLERANCE, VERSION, Case
 from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
 from model import Parameters, State, Trajectory
 from model.arrays import Array

@@ -22,18 +22,16 @@ from compare.kit.workers import threads
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_OWN = "compare.bench.adapters"
+_OWN = "compare.adapters"
 ENTRIES: dict[str, str] = {
-    "event": f"{_OWN}.simulators:event",
-    "time-stepping": f"{_OWN}.simulators:time_stepping",
+    "event": "compare.bench.simulators:event",
+    "time-stepping": "compare.bench.simulators:time_stepping",
     "mujoco": f"{_OWN}.mujoco_free:best",
-    "mujoco-plain": f"{_OWN}.simulators:mujoco_plain",
+    "mujoco-plain": "compare.bench.simulators:mujoco_plain",
     "mujoco-defaults": f"{_OWN}.mujoco_free",
-    "siconos": f"{_OWN}.simulators:siconos",
-    "siconos-defaults": f"{_OWN}.simulators:siconos_defaults",
     **{
         f"{name}{suffix}": f"{_OWN}.{name}:{which}"
-        for name in ("pybullet", "drake", "dart", "rapier", "sapien")
+        for name in ("siconos", "pybullet", "drake", "dart", "rapier", "sapien")
         for suffix, which in (("", "best"), ("-defaults", "defaults"))
     },
     "mujoco-warp": f"{_OWN}.mujoco_warp:best",

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk, ellipkinc
 
-from compare.bench.case import Case, Surface
+from compare.adapters.scene import Surface
+from compare.bench.case import Case
 from compare.bench.one_contact import SPEED_ALONE, G, along, block, closed, slope, sphere
 from model.arrays import Array
 

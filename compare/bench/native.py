@@ -15,8 +15,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.adapters.mujoco_free import Bodies, pairs
-from compare.bench.case import Case
+from compare.adapters.mujoco_free import Bodies, pairs
+from compare.adapters.scene import Scene
 from compare.bench.settled import load
 from model import InputError
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
@@ -82,9 +82,9 @@ class Native:
         for name, known in CHOICES.items():
             check_choice(name, getattr(self, name), list(known))
 
-    def tune(self, spec: Any, case: Case, timestep: float) -> None:
-        """Set an exact case's scene: a wall as the wall, all else as the floor."""
-        own = ((self.B if name == "wall" else self.A, pair) for name, pair in pairs(spec, case))
+    def tune(self, spec: Any, scene: Scene, timestep: float) -> None:
+        """Set a scene of free bodies: a wall as the wall, all else as the floor."""
+        own = ((self.B if name == "wall" else self.A, pair) for name, pair in pairs(spec, scene))
         dataclasses.replace(self, timestep=timestep).set(spec, own)
 
     def set(self, spec: Any, contacts: Iterable[tuple[Pair, Any]]) -> None:

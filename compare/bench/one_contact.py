@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.bench.case import Body, Case, Surface, Vector
+from compare.adapters.scene import Body, Surface, Vector
+from compare.bench.case import Case
 from model import Parameters, State
 from model.arrays import Array
 

@@ -34,8 +34,9 @@ from typing import Any
 
 import numpy as np
 
-from compare.bench import adapters
-from compare.bench.case import TIME_STEPS, TOLERANCE, Case
+from compare import adapters
+from compare.adapters.scene import TIME_STEPS
+from compare.bench.case import TOLERANCE, Case
 from model import InputError
 from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number

@@ -15,15 +15,15 @@ import numpy as np
 
 import analytic
 import mjsim
-from compare.kit.adapters import adapter, drake, pybullet, siconos
-from compare.kit.adapters.adapter import Library, simulate
+from compare.adapters import KNOWN, siconos, vessel
+from compare.adapters.free import Library
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.errors import suggestion
 from model.versions import version
 
-AnySettings = ContactSettings | analytic.Settings | adapter.Settings
+AnySettings = ContactSettings | analytic.Settings | vessel.Settings
 """Numerical settings of any engine."""
 Simulate = Callable[[Parameters, State, float, Flow, Any, float | None, Callable[[float], None]], Trajectory]
 """One whole run from parameters, start, duration, flow, settings and sample interval; the function is called with the
@@ -145,28 +145,24 @@ def _theory(method: str, *task: Any) -> Trajectory:
         return error.trajectory
 
 
-def _adapted(adapter: Any, library: Library, marks: str) -> tuple[Engine, Engine]:
-    """Records of an engine with the best settings of its adapter and with a newcomer's, each with a mark."""
-    name, other = library.name, f"{library.name}-defaults"
+def _adapted(library: Library, marks: str) -> tuple[Engine, Engine]:
+    """Records of an engine with the best settings of its adapter and with its own, each with a mark."""
+    name = library.module.rpartition(".")[2]
     best = Engine(
         name=name,
-        settings=adapter.Settings,
+        settings=vessel.Settings,
         options=("timestep",),
-        configure=lambda given, p: adapter.Settings(**given),
-        simulate=partial(simulate, name, library, adapter.Scene),
-        sources=("model", "mjsim", "compare.kit.adapters"),
+        configure=lambda given, p: vessel.Settings(**given),
+        simulate=partial(vessel.simulate, name, library, "best"),
+        sources=("model", "mjsim", "compare.adapters"),
         stands_on=("numpy",),
         needs=library,
-        as_it_comes=other,
+        as_it_comes=f"{name}-defaults",
+        refine=(1, 2, 4),  # a free body's errors are of first or second order in the step
         mark=marks[0],
     )
-    return best, replace(
-        best,
-        name=other,
-        configure=lambda given, p: replace(adapter.DEFAULTS, **given),
-        simulate=partial(simulate, other, library, adapter.Scene),
-        mark=marks[1],
-    )
+    as_it_comes = partial(vessel.simulate, best.as_it_comes, library, "defaults")
+    return best, replace(best, name=best.as_it_comes, simulate=as_it_comes, mark=marks[1])
 
 
 MUJOCO = Engine(
@@ -235,10 +231,14 @@ MOREAU = replace(
     simulate=partial(_theory, "time-stepping"),
     mark="^",
 )
+_PACKAGES = {name: Library(KNOWN[name].partition(" ")[0], f"compare.adapters.{name}") for name in KNOWN}
 _OTHERS = (
-    *_adapted(pybullet, Library("pybullet", "pybullet"), "v1"),
-    *_adapted(drake, Library("drake", "pydrake.all"), "D+"),
-    *_adapted(siconos, siconos.LIBRARY, "p2"),
+    *_adapted(siconos.LIBRARY, "p2"),
+    *_adapted(_PACKAGES["pybullet"], "v1"),
+    *_adapted(_PACKAGES["drake"], "D+"),
+    *_adapted(_PACKAGES["dart"], "<3"),
+    *_adapted(_PACKAGES["rapier"], ">4"),
+    *_adapted(_PACKAGES["sapien"], "hH"),
 )
 WITNESSES = (MUJOCO, PLAIN, NEWCOMER)
 """Who is heard of a claim where no engine is named: the one on trial, and two beside it."""

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from compare.adapters.mujoco_free import Bodies
 from compare.bench import cases, native
-from compare.bench.adapters.mujoco_free import Bodies
 from compare.bench.contact_law import impedance
 from compare.bench.native import Native, Pair
 from compare.commands import cli

@@ -83,7 +83,7 @@ def test_errors_order_creep_and_cost():
     assert found.cost >= 0
     assert run(BY_NAME["growing-pull"], Exact()).skipped == "no forces"
     # Steps between which samples lie.
-    assert run(BY_NAME["sphere-rolls-down"], "compare.bench.adapters.mujoco_free", [3e-3]).passed
+    assert run(BY_NAME["sphere-rolls-down"], "compare.adapters.mujoco_free", [3e-3]).passed
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_errors_order_creep_and_cost():
         ("no.such.module", "no.such.module can't be used: ModuleNotFoundError: No module named 'no'"),
         ("compare.bench.runner", "compare.bench.runner has no function build nor step nor state"),
         (SimpleNamespace(build=print, step=print), "SimpleNamespace has no function state; an engine has build, step"),
-        ("compare.bench.adapters.dart:gone", " (dartpy "),
+        ("compare.adapters.dart:gone", " (dartpy "),
         (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
     ],
 )

@@ -4,12 +4,12 @@ import sys
 
 import pytest
 
+from compare.adapters import siconos
+from compare.adapters.vessel import Settings, Vessel
 from compare.commands import cli
-from compare.kit.adapters import siconos
-from compare.kit.adapters.siconos import Settings
 from compare.kit.engines import ENGINES
 from compare.kit.tasks import Task, carry_out
-from model import InputError, Parameters
+from model import Flow, InputError, Parameters, State
 
 REFERENCE = Parameters.named("reference")
 ENGINE = ENGINES["siconos"]
@@ -41,9 +41,10 @@ def test_where_it_is_missing_the_program_says_what_to_do(named, says, elsewhere,
     assert capsys.readouterr().err == f"dualball: error: {says}\n"
 
 
-def test_a_python_without_its_libraries_is_the_person_s_error():
+def test_a_python_without_its_libraries_is_the_person_s_error(monkeypatch):
+    monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
     with pytest.raises(InputError, match=r"siconos ended \(ModuleNotFoundError: No module named 'siconos"):
-        siconos.Scene(sys.executable, REFERENCE, Settings())
+        siconos.best.build(Vessel.of(REFERENCE, State(), Flow.steady(1.0)), 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +60,7 @@ def test_a_python_without_its_libraries_is_the_person_s_error():
 def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monkeypatch):
     """Whatever it does in the first step; it is gone after that."""
     script = tmp_path / "program.py"
-    state = "STATE = '[[0, NaN, 0], [0, 0, 0, 0, 0, 0]]'"
+    state = "STATE = '[[0, NaN, 0], [0, 0, 0], [0, 0, 0]]'"
     script.write_text(f"{state}\nfor _ in range(2):\n    input()\n    print('null', flush=True)\ninput()\n{program}\n")
     started = []
 

@@ -1,4 +1,4 @@
-"""Engines that take exact cases; each module is one, see `compare.bench.runner`."""
+"""Physics engines with free bodies, a module each: they build and step the exact cases and the ball in its vessel."""
 
 KNOWN = {
     "dart": "dartpy 6.20.0",
@@ -9,6 +9,5 @@ KNOWN = {
     "pybullet": "pybullet 3.2.7",
     "rapier": "rapier3d 0.36.1",
     "sapien": "sapien 3.0.3",
-    "simulators:mujoco_plain": "mujoco 4.0.0",
 }
 """Packages and versions with which they are known to work: here, so that it can be said where one can't be imported."""

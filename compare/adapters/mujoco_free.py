@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 
 import mjsim
-from compare.bench.adapters.free import CORNERS, Free, State
-from compare.bench.case import FACETS, TIME_STEPS, Case, Vector
+from compare.adapters.free import CORNERS, Free, State
+from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector
 from model.arrays import Array
 
 FEATURES = ("two bodies", "moving surface", "dry joint", "tripod")
@@ -32,15 +32,15 @@ class Bodies(Free):
     TIMESTEPS: tuple[float, ...] = TIME_STEPS
 
     def __init__(
-        self, name: str, note: str, best: str = "", tune: Callable[[Any, Case, float], None] | None = None
+        self, name: str, note: str, best: str = "", tune: Callable[[Any, Scene, float], None] | None = None
     ) -> None:
         super().__init__(name, note, best)
         self.tune = tune
 
     def make(self) -> None:
-        spec = mujoco.MjSpec.from_string(self.case.mjcf(self.timestep))
+        spec = mujoco.MjSpec.from_string(self.scene.mjcf(self.timestep))
         if self.tune:
-            self.tune(spec, self.case, self.timestep)
+            self.tune(spec, self.scene, self.timestep)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
@@ -52,7 +52,7 @@ class Bodies(Free):
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
             update(self.model, self.data)
         found, rate = [], np.empty(6)
-        for name in ("body", "under")[: len(self.case.bodies)]:
+        for name in ("body", "under")[: len(self.scene.bodies)]:
             body = self.data.body(name)
             mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body.id, rate, 0)
             found += [body.xpos, rate[3:].copy(), rate[:3].copy()]
@@ -63,39 +63,28 @@ class Bodies(Free):
 
 
 class Lawful(Bodies):
-    """Rigid contacts under Coulomb's law; of a cylinder a piece of wall that goes with the body.
-
-    It is set to the body's azimuth at mid step, and given such a velocity that what is at rest against it will be so
-    against the cylinder at the end of the step: towards the axis (h/2) v^2/rho, v along the wall, and upwards that of
-    -(h/2) w x (Omega x a), with the rate Omega of the azimuth and the way a from the centre to the contact. Without it
-    what goes round loses a share h Omega^2/2 of its speed a second.
-    """
+    """Rigid contacts under Coulomb's law; of a cylinder a piece of wall that goes with the body."""
 
     FEATURES = (*FEATURES, "restitution")
 
     def make(self) -> None:
         super().make()
-        bounce = max((surface.restitution for surface in self.case.surfaces), default=0.0)
+        bounce = max((surface.restitution for surface in self.scene.surfaces), default=0.0)
         self.law = mjsim.Coulomb(self.model, rigid=True, restitution=bounce)
 
     def advance(self) -> None:
         self.law.step(self.data)
 
-    def turn(self, point: Array, normal: Array) -> None:
-        (x, y, z), velocity, spin = self.read()
-        rho, half, wall = math.hypot(x, y), self.timestep / 2, self.model.body("wall")
-        out, azimuth = np.array([x / rho, y / rho, 0.0]), math.atan2(y, x)
-        rate = (out[0] * velocity[1] - out[1] * velocity[0]) / rho
-        wall.pos = np.hypot(*point[:2]) * out + [0.0, 0.0, z]
-        wall.quat = math.cos(azimuth / 2), 0.0, 0.0, math.sin(azimuth / 2)
-        self.data.qpos[-2:] = 0.0
-        self.data.qvel[-2:] = half * rate**2 * rho, -half * rate * self.case.body.size[0] * (spin @ out)
+    def turn(self, point: Array, normal: Array, velocity: Array) -> None:
+        half, wall = math.atan2(-normal[1], -normal[0]) / 2, self.model.body("wall")
+        wall.pos, wall.quat = point, (math.cos(half), 0.0, 0.0, math.sin(half))
+        self.data.qpos[-2:], self.data.qvel[-2:] = 0.0, (velocity @ normal, velocity[2])
 
 
-def pairs(spec: Any, case: Case) -> Iterator[tuple[str, Any]]:
+def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
     """A pair of each surface with what touches it, made with the friction of the surface, and that surface's name."""
-    lowest = "under" if case.under else "body"
-    for surface in case.surfaces:
+    lowest = "under" if scene.under else "body"
+    for surface in scene.surfaces:
         of = [[g.name for g in spec.geoms if g.name.rstrip("0123456789") == name] for name in (surface.name, lowest)]
         for geom, part in itertools.product(*of):
             pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
@@ -103,32 +92,32 @@ def pairs(spec: Any, case: Case) -> Iterator[tuple[str, Any]]:
             yield surface.name, pair
 
 
-def studied(spec: Any, case: Case, timestep: float) -> None:
+def studied(spec: Any, scene: Scene, timestep: float) -> None:
     """An elliptic cone, stiff friction rows; normal rows soft and slow enough for blocks on four points to be stable.
 
     b_f h is a tenth, so that contacts don't hover at 2 m/s; impratio 1e4 leaves a creep of some micrometres a second.
     """
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio, spec.option.tolerance = 1e4, 1e-12
-    for _, pair in pairs(spec, case):
+    for _, pair in pairs(spec, scene):
         pair.solref, pair.solreffriction = (6 * timestep, 1.0), (100 * timestep, 1.0)
         pair.solimp = (0.2, 0.2, 1e-4, 0.5, 2.0)
 
 
-def rigid(spec: Any, case: Case, timestep: float) -> None:
+def rigid(spec: Any, scene: Scene, timestep: float) -> None:
     """An elliptic cone, solved to round-off; dry joints that stop within a step; for facets a wall that moves."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
     for joint in spec.joints:
         joint.solref_friction, joint.solimp_friction = (-1.0, -_SOLIMP / timestep), (_SOLIMP, _SOLIMP, 1.0, 0.5, 2.0)
-    for surface in case.surfaces:
+    for surface in scene.surfaces:
         if not surface.radius:
             continue
         for k in range(FACETS):
             spec.delete(spec.geom(f"{surface.name}{k}"))
         spec.option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
-        own, half = spec.worldbody.add_body(name=surface.name), _WALL * case.body.size[0]
+        own, half = spec.worldbody.add_body(name=surface.name), _WALL * scene.body.size[0]
         for axis in ([-1, 0, 0], [0, 0, 1]):
-            own.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=_HEAVY * case.body.mass)
+            own.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=_HEAVY * scene.body.mass)
         box, friction = mujoco.mjtGeom.mjGEOM_BOX, [surface.friction, 0.0, 0.0]
         own.add_geom(name=surface.name, type=box, size=[half] * 3, pos=[half, 0, 0], friction=friction, mass=1e-9)
         spec.add_exclude(bodyname1="world", bodyname2=surface.name)

@@ -1,5 +1,7 @@
 """PhysX as SAPIEN has it, on a processor, in single precision.
 
+What friction carries it doesn't tell.
+
 Traps: spin is limited to 100 rad/s, and damped; friction is the mean of both bodies' coefficients; the normal of a
 plane is the x axis of its pose; planes don't turn.
 """
@@ -10,8 +12,8 @@ import math
 import warnings
 from typing import Any
 
-from compare.bench.adapters.free import CHORD, CORNERS, Free, State
-from compare.bench.case import Vector, upright
+from compare.adapters.free import CORNERS, Free, State
+from compare.adapters.scene import Vector, upright
 from model.arrays import Array
 
 with warnings.catch_warnings():
@@ -19,26 +21,35 @@ with warnings.catch_warnings():
     import sapien as engine
 physx = engine.physx
 
+WALL = 3.0
+"""Half edge of the box whose face is the wall that goes with the body, in radii."""
+
 
 class Sapien(Free):
     """As in `Free`."""
 
     PRECISION = "f32"
+    RESOLUTION = 1e-4
 
     def make(self) -> None:
-        case, body = self.case, self.case.body
+        scene, body = self.scene, self.scene.body
         config, bodies = physx.PhysxSceneConfig(), physx.PhysxBodyConfig()
-        config.gravity = [0.0, 0.0, -case.g]
+        config.gravity = [0.0, 0.0, -scene.g]
         if self.best:
             config.enable_tgs, bodies.solver_position_iterations, bodies.solver_velocity_iterations = False, 50, 20
         physx.set_scene_config(config)
         physx.set_body_config(bodies)
-        self.scene = engine.Scene([physx.PhysxCpuSystem()])
-        self.scene.timestep = self.timestep
+        self.world = engine.Scene([physx.PhysxCpuSystem()])
+        self.world.timestep = self.timestep
         for surface, _, point, normal in self.planes():
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
-            self.wall = self.add(physx.PhysxRigidStaticComponent(), pose(point, normal), 2 * surface.friction)
+            size: tuple[float, ...] = ()
+            own = physx.PhysxRigidStaticComponent()
+            if self.moves(surface):  # planes have no velocity
+                own, size = physx.PhysxRigidDynamicComponent(), (WALL * body.size[0],) * 3
+                own.kinematic, self.half = True, size[0]
+            self.wall, self.face = self.add(own, pose(point, normal), 2 * surface.friction, size), own
         self.body = physx.PhysxRigidDynamicComponent()
         self.entity = self.add(self.body, engine.Pose(body.position, body.orientation), 0.0, body.size)
         self.body.mass, self.body.inertia, self.body.cmass_local_pose = body.mass, body.inertia, engine.Pose()
@@ -56,11 +67,11 @@ class Sapien(Free):
         entity = engine.Entity()
         entity.add_component(component)
         entity.set_pose(pose)
-        self.scene.add_entity(entity)
+        self.world.add_entity(entity)
         return entity
 
     def advance(self) -> None:
-        self.scene.step()
+        self.world.step()
 
     def read(self) -> State:
         return self.entity.pose.p, self.body.linear_velocity, self.body.angular_velocity
@@ -68,8 +79,10 @@ class Sapien(Free):
     def push(self, force: Vector) -> None:
         self.body.add_force_at_point(force, self.entity.pose.p)
 
-    def turn(self, point: Array, normal: Array) -> None:
-        self.wall.set_pose(pose(point, normal))
+    def turn(self, point: Array, normal: Array, velocity: Array) -> None:
+        begin = pose(point - self.half * normal, normal)
+        self.wall.set_pose(begin)
+        self.face.set_kinematic_target(engine.Pose(begin.p + self.timestep * velocity, begin.q))
 
 
 def pose(point: Array, normal: Array) -> Any:
@@ -81,7 +94,6 @@ def pose(point: Array, normal: Array) -> Any:
 defaults = Sapien("sapien-defaults", f"spin is limited to 100 rad/s, and {CORNERS}")
 best = Sapien(
     "sapien",
-    f"worst round the cylinder: {CHORD}; and PGS has friction in two directions of their own, by which what slips "
-    "obliquely is wrong by 4 % at every step",
+    "PGS has friction in two directions of their own, by which what slips obliquely is wrong by 4 % at every step",
     "PGS with 50 and 20 iterations, no limit to spin",
 )

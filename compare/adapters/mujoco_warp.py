@@ -1,4 +1,4 @@
-"""MuJoCo on Warp, on a processor in single precision, in scenes of `compare.bench.adapters.mujoco_free`."""
+"""MuJoCo on Warp, on a processor in single precision, in scenes of `compare.adapters.mujoco_free`."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import mujoco_warp as engine
 import numpy as np
 import warp
 
-from compare.bench.adapters import mujoco_free
-from compare.bench.adapters.free import State
-from compare.bench.case import Vector
+from compare.adapters import mujoco_free
+from compare.adapters.free import State
+from compare.adapters.scene import Vector
 from model.kinematics import rotated
 
 warp.config.quiet = True

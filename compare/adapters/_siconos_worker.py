@@ -1,8 +1,9 @@
 """The ball in Siconos: a program for the Python that has it, which takes steps on demand.
 
-It reads and writes lines of JSON. First comes the problem; then nine numbers (place and velocity) to start from, three
-(a force) for a step, answered by place and velocity, or none, answered by [contact, force, gap] of each contact point
-that carries something. What fails is answered by {"error": ...}. `compare.kit.adapters.siconos` is at the other end.
+It reads and writes lines of JSON. First comes the problem; then nine numbers (position, velocity and spin) to start
+from, three (a force) for a step, answered by those three vectors, or none, answered by [contact, force, gap] of each
+contact point that carries something. All is in world axes. What fails is answered by {"error": ...}.
+`compare.adapters.siconos` is at the other end.
 
 The Python that runs it isn't that of the project: nothing but Siconos, numpy and the standard library is imported.
 """
@@ -30,9 +31,9 @@ def main() -> None:
         given, answer = json.loads(line), None
         try:
             if isinstance(given, dict):
-                scene = (Turning if given["coordinates"] == "joints" else FreeBall)(given)
+                scene = (Turning if given["turning"] else FreeBall)(given)
             elif len(given) == 9:
-                scene.start(given[:3], given[3:])
+                scene.start(given[:3], given[3:6], given[6:])
             else:
                 answer = scene.advance(given) if given else scene.touches()
         except Exception as error:  # the other side has to say it, whatever it is
@@ -45,25 +46,29 @@ class Scene:
 
     directions = "C"
     """What a relation calls its matrix: normal and tangents (rows) by velocities, first those of the centre."""
+    axes = np.eye(3)
+    """Of those velocities, as rows."""
 
     def __init__(self, given: dict[str, Any]) -> None:
         self.given, self.R, self.r, self.mass = given, given["R"], given["r"], given["m"]
-        self.inertia = given["j"] * self.mass * self.r**2
+        self.inertia = given["inertia"]
         self.weight = self.mass * given["g"]
 
-    def simulate(self, ball: Any, relations: list[Any]) -> None:
-        """Begin with a ball and its contacts, first that with the floor."""
+    def simulate(self, ball: Any, floor: Any, wall: Any) -> None:
+        """Begin with a ball and its contacts; there is no floor where none has a friction."""
         given = self.given
         self.ball, system = ball, kernel.NonSmoothDynamicalSystem(0.0, float("inf"))
         system.insertDynamicalSystem(ball)
         self.contacts = []
-        for number, relation in enumerate(relations):
-            law = kernel.NewtonImpactFrictionNSL(0.0, 0.0, given["eta" if number else "mu"], 3)
+        for friction, relation in ((given["mu"], floor), (given["eta"], wall)):
+            if friction is None:
+                continue
+            law = kernel.NewtonImpactFrictionNSL(0.0, 0.0, friction, 3)
             self.contacts.append(kernel.Interaction(law, relation))
             system.link(self.contacts[-1], ball)
         solver = kernel.FrictionContact(3)
         options = solver.numericsSolverOptions()
-        options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = given["iterations"]
+        options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 1000
         options.dparam[numerics.SICONOS_DPARAM_TOL] = given["tolerance"]
         clock, projection = kernel.TimeDiscretisation(0.0, given["timestep"]), given["projection"]
         if projection is None:
@@ -87,13 +92,13 @@ class Scene:
         self.simulation.nextStep()
 
     def touches(self) -> list[Any]:
-        """Number, force on the ball's centre and gap of each contact that carried something in the last step."""
+        """Number, force on the ball and gap of each contact that carried something in the last step."""
         shown = []
         for number, contact in enumerate(self.contacts):
             impulse = contact.lambda_(1)
             if impulse[0] > 0:
                 force = getattr(contact.relation(), self.directions)()[:, :3].T @ impulse / self.given["timestep"]
-                shown.append((number, force.tolist(), contact.y(0)[0]))
+                shown.append((number, (force @ self.axes).tolist(), contact.y(0)[0]))
         return shown
 
 
@@ -131,26 +136,38 @@ class TurningBall(kernel.LagrangianDS):  # type: ignore[misc]
 
 
 class Turning(Scene):
-    """A ball in axes that turn with it, so that floor and wall are planes; in the coordinates of massless joints."""
+    """A ball in axes that turn with it, outward, along and up, so that floor and wall are planes."""
 
-    def start(self, place: list[float], velocity: list[float]) -> None:
-        """Place (ignored, h, y); velocity (omega_c, v_h, v_y, spin about the axes less omega_c)."""
-        (_, h, y), (omega_c, v_h, v_y, *spin, s_z), r = place, velocity, self.r
-        v = [-v_h, (self.R - h) * omega_c, v_y, *spin, s_z + omega_c]
-        ball = TurningBall([-h, 0, y, 0, 0, 0], v, self.mass, self.inertia, self.R)
+    def start(self, position: list[float], velocity: list[float], spin: list[float]) -> None:
+        """Position, velocity and spin in world axes."""
+        x, y, z = position
+        self.azimuth, h, r = math.atan2(y, x), self.R - math.hypot(x, y), self.r
+        self.axes = turned(self.azimuth)
+        ball = TurningBall(
+            [-h, 0, z - r, 0, 0, 0], [*self.axes @ velocity, *self.axes @ spin], self.mass, self.inertia, self.R
+        )
         floor = [[0, 0, 1, 0, 0, 0], [1, 0, 0, 0, -r, 0], [0, 1, 0, r, 0, 0]]
         wall = [[-1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, r], [0, 0, 1, 0, -r, 0]]
-        self.simulate(ball, [kernel.LagrangianLinearTIR(np.array(rows, float)) for rows in (floor, wall)])
+        self.simulate(ball, *(kernel.LagrangianLinearTIR(np.array(rows, float)) for rows in (floor, wall)))
 
     def advance(self, force: list[float]) -> Any:
-        """Under (torque, inward, upward); the azimuth is that of this step."""
-        (torque, inward, upward), q = force, self.ball.q()
+        """Under a force in world axes."""
+        self.axes, q = turned(self.azimuth), self.ball.q()
         before, way = self.R + q[0], q[1]
-        self.take_step([-inward, torque / before, upward - self.weight, 0.0, 0.0, 0.0])
-        q, (outward, along, v_y, *spin, s_z) = self.ball.q(), self.ball.velocity()
+        outward, along, upward = self.axes @ force
+        self.take_step([outward, along, upward - self.weight, 0.0, 0.0, 0.0])
+        q, rates = self.ball.q(), self.ball.velocity()
         rho = self.R + q[0]
-        place = 2 * (q[1] - way) / (before + rho), -q[0], q[2]
-        return place, (along / rho, -outward, v_y, *spin, s_z - along / rho)
+        self.azimuth += 2 * (q[1] - way) / (before + rho)
+        axes = turned(self.azimuth)
+        position = rho * math.cos(self.azimuth), rho * math.sin(self.azimuth), self.r + q[2]
+        return position, (rates[:3] @ axes).tolist(), (rates[3:] @ axes).tolist()
+
+
+def turned(azimuth: float) -> Any:
+    """Outward, along and up, as rows, in world axes."""
+    cos, sin = math.cos(azimuth), math.sin(azimuth)
+    return np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
 class Contact(kernel.NewtonEuler3DR):  # type: ignore[misc]
@@ -173,16 +190,16 @@ class FreeBall(Scene):
 
     directions = "jachqT"
 
-    def start(self, place: list[float], velocity: list[float]) -> None:
-        """Place, velocity and spin in world axes."""
+    def start(self, position: list[float], velocity: list[float], spin: list[float]) -> None:
+        """Position, velocity and spin in world axes."""
 
         def wall(q: Any) -> Any:
             rho = math.hypot(q[0], q[1])
             return self.R + self.r - rho, np.array([-q[0] / rho, -q[1] / rho, 0.0])
 
         up, orientation = np.array([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0, 0.0]
-        ball = kernel.NewtonEulerDS([*place, *orientation], velocity, self.mass, self.inertia * np.eye(3))
-        self.simulate(ball, [Contact(self.r, surface) for surface in (lambda q: (q[2], up), wall)])
+        ball = kernel.NewtonEulerDS([*position, *orientation], [*velocity, *spin], self.mass, self.inertia * np.eye(3))
+        self.simulate(ball, *(Contact(self.r, surface) for surface in (lambda q: (q[2], up), wall)))
 
     def advance(self, force: list[float]) -> Any:
         """Under a force in world axes."""
@@ -190,7 +207,7 @@ class FreeBall(Scene):
         (x, y, z, w, *axis), velocity = self.ball.q(), self.ball.velocity()
         spin = velocity[3:]  # in the axes of the ball
         turn = 2 * np.cross(axis, spin)
-        return (x, y, z), (*velocity[:3], *(spin + w * turn + np.cross(axis, turn)))
+        return (x, y, z), velocity[:3].tolist(), (spin + w * turn + np.cross(axis, turn)).tolist()
 
 
 if __name__ == "__main__":

@@ -12,8 +12,8 @@ from typing import Any
 import dartpy as engine
 import numpy as np
 
-from compare.bench.adapters.free import CHORD, Free, State
-from compare.bench.case import Vector
+from compare.adapters.free import Free, State, Touch
+from compare.adapters.scene import Vector
 from model.arrays import Array
 from model.kinematics import rotated
 
@@ -21,22 +21,29 @@ from model.kinematics import rotated
 class Dart(Free):
     """As in `Free`."""
 
+    TELLS = True
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod")
 
     def make(self) -> None:
-        case, bodies = self.case, engine.dynamics
+        scene, bodies = self.scene, engine.dynamics
         self.world = engine.simulation.World()
         self.world.setTimeStep(self.timestep)
-        self.world.setGravity([0.0, 0.0, -case.g])
+        self.world.setGravity([0.0, 0.0, -scene.g])
         if self.best:
             solver, self.cone = self.world.getConstraintSolver(), engine.constraint.NsgsFrictionSolver()
             self.world.setCollisionDetector(engine.collision.OdeCollisionDetector())
             solver.setBoxedLcpSolver(self.cone)
             solver.setSplitImpulseEnabled(True)
         self.tables: list[tuple[Any, float]] = []
+        self.surfaces: dict[str, int] = {}
         for surface, name, point, normal in self.planes():
             skeleton = bodies.Skeleton(name)
-            if rate := surface.turning or math.hypot(*surface.velocity):
+            self.surfaces[name] = scene.surfaces.index(surface)
+            if self.moves(surface):
+                self.wall, node = skeleton.createTranslationalJointAndBodyNodePair()
+                self.wall.setActuatorType(bodies.ActuatorType.VELOCITY)
+                node.setGravityMode(False)
+            elif rate := surface.turning or math.hypot(*surface.velocity):
                 turns, slides = (
                     skeleton.createRevoluteJointAndBodyNodePair,
                     skeleton.createPrismaticJointAndBodyNodePair,
@@ -47,10 +54,10 @@ class Dart(Free):
                 self.tables.append((joint, rate))
             else:
                 _, node = skeleton.createWeldJointAndBodyNodePair()
-            self.wall = bodies.PlaneShape(normal, point)  # the last one is the one that moves
-            self.add(skeleton, node, self.wall, surface.friction, restitution=surface.restitution)
+            self.plane = bodies.PlaneShape(normal, point)  # the last one is the one that moves
+            self.add(skeleton, node, self.plane, surface.friction, restitution=surface.restitution)
         self.nodes: list[Any] = []
-        for body, friction in zip(case.bodies, (1e3, case.between), strict=False):
+        for body, friction in zip(scene.bodies, (1e3, scene.between), strict=False):
             skeleton = bodies.Skeleton(f"body{len(self.nodes)}")
             joint, node = skeleton.createFreeJointAndBodyNodePair()
             pose = placed(body.position)
@@ -89,8 +96,23 @@ class Dart(Free):
     def push(self, force: Vector) -> None:
         self.nodes[0].setExtForce(force, np.zeros(3), False, True)
 
-    def turn(self, point: Array, normal: Array) -> None:
-        self.wall.setNormalAndPoint(normal, point)
+    def turn(self, point: Array, normal: Array, velocity: Array) -> None:
+        self.plane.setNormalAndPoint(normal, point)
+        self.wall.setPositions(np.zeros(3))
+        self.wall.setVelocities(velocity)
+        self.wall.setCommands(velocity)
+
+    def touches(self) -> list[Touch]:
+        shown = []
+        for contact in self.world.getLastCollisionResult().getContacts():
+            names = [
+                each.getShapeFrame().asShapeNode().getSkeleton().getName()
+                for each in (contact.collisionObject1, contact.collisionObject2)
+            ]
+            sign = 1 if names[1] in self.surfaces else -1  # it acts on the first object
+            surface = self.surfaces[names[1 if sign > 0 else 0]]
+            shown.append(Touch(surface, sign * np.array(contact.force), -contact.penetrationDepth))
+        return shown
 
 
 def placed(position: Any) -> Array:
@@ -103,6 +125,6 @@ def placed(position: Any) -> Array:
 defaults = Dart("dart-defaults", "boxes rock and creep, since FCL places their contacts anew in every step")
 best = Dart(
     "dart",
-    f"worst round the cylinder: {CHORD}",
+    "a landing is late by up to a step, and its overlap is taken out slowly",
     "contacts by ODE's collision detector, Coulomb's cone by NSGS, overlaps taken out by split impulses",
 )

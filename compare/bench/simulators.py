@@ -1,7 +1,6 @@
-"""Simulators that know the study's ball alone: in its vessel on joints, other cases left to an engine for free bodies.
+"""Simulators of the study's ball as `compare.kit.engines` runs them: the theory's two, and MuJoCo's ball on joints.
 
-What runs is what `compare.kit.engines` runs: the theory's two simulators, MuJoCo with its settings, and the engines of
-`compare.kit.adapters` in theirs.
+Cases without a vessel are left to an adapter for free bodies, if there is one.
 """
 
 from __future__ import annotations
@@ -11,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from compare.bench.adapters import mujoco_free
-from compare.bench.case import TIME_STEPS, Case
+from compare.adapters import mujoco_free
+from compare.adapters.scene import TIME_STEPS
+from compare.bench.case import Case
 from compare.kit.engines import ENGINES, Engine, engine
 from compare.kit.tasks import Task, carry_out
 from model import InputError
@@ -92,15 +92,4 @@ time_stepping = Simulated(
     "time-stepping",
     declared="the equations of the paper, no scene",
     note="a contact closes at the end of a step: after a landing it is of first order, elsewhere of second",
-)
-siconos = Simulated(
-    "siconos",
-    declared="equations of motion in turning axes, no scene",
-    note="a contact closes up to half a step early or late",
-)
-siconos_defaults = Simulated(
-    "siconos-defaults",
-    declared="equations of motion, no scene",
-    note="each step ends along a chord of the cylinder, and the wall takes away what then points into it: a ball that "
-    "it should carry loses its speed and falls",
 )

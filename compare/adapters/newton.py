@@ -3,7 +3,7 @@
 Traps: quaternions end with the scalar; shapes have torsional and rolling friction unless that is set to zero; friction
 is the mean of both coefficients, in VBD the root of their product; room for a thousand contacts, which is what there is
 unless a model says otherwise, makes a step of Kamino twelve times as long. The solver MuJoCo wants a MuJoCo older than
-4: it is in `compare.bench.adapters.mujoco_warp` by itself. Kernels are compiled when they are first needed, which takes
+4: it is in `compare.adapters.mujoco_warp` by itself. Kernels are compiled when they are first needed, which takes
 minutes.
 """
 
@@ -16,8 +16,8 @@ import newton as engine
 import numpy as np
 import warp
 
-from compare.bench.adapters.free import CHORD, Free, State
-from compare.bench.case import Vector, upright
+from compare.adapters.free import Free, State
+from compare.adapters.scene import Vector, upright
 from model.arrays import Array
 
 warp.config.quiet = True
@@ -36,7 +36,7 @@ class Newton(Free):
         self.TIMESTEPS = (4e-3, shortest)
 
     def make(self) -> None:
-        body, builder = self.case.body, engine.ModelBuilder(gravity=(0.0, 0.0, -self.case.g))
+        body, builder = self.scene.body, engine.ModelBuilder(gravity=(0.0, 0.0, -self.scene.g))
         rooted = self.solver is engine.solvers.SolverVBD
 
         def rough(mu: float) -> Any:
@@ -47,8 +47,11 @@ class Newton(Free):
         for surface, _, point, normal in self.planes():
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
-            material = rough(surface.friction**2 if rooted else 2 * surface.friction)
-            self.wall = builder.add_shape_plane(None, xform=pose(point, normal), width=0.0, length=0.0, cfg=material)
+            material, own, at = rough(surface.friction**2 if rooted else 2 * surface.friction), -1, pose(point, normal)
+            if self.moves(surface):
+                self.wall = own = builder.add_body(xform=at, mass=1.0, is_kinematic=True)
+                at = warp.transform()
+            builder.add_shape_plane(None, body=own, xform=at, width=0.0, length=0.0, cfg=material)
         w, *axis = body.orientation
         start = warp.transform(body.position, (*axis, w))
         number = builder.add_body(xform=start, mass=body.mass, inertia=np.diag(body.inertia), lock_inertia=True)
@@ -56,7 +59,8 @@ class Newton(Free):
             builder.add_shape_sphere(number, radius=body.size[0], cfg=rough(float(rooted)))
         else:
             builder.add_shape_box(number, hx=body.size[0], hy=body.size[1], hz=body.size[2], cfg=rough(float(rooted)))
-        builder.joint_qd[:6] = builder.body_qd[0] = [*body.velocity, *body.spin]
+        builder.joint_qd[-6:] = builder.body_qd[number] = [*body.velocity, *body.spin]
+        self.number = number
         if rooted:
             builder.color()
         self.model = builder.finalize(device="cpu")
@@ -71,14 +75,15 @@ class Newton(Free):
         self.old.clear_forces()
 
     def read(self) -> State:
-        place, rate = self.old.body_q.numpy()[0].astype(float), self.old.body_qd.numpy()[0].astype(float)
+        place, rate = (each.numpy()[self.number].astype(float) for each in (self.old.body_q, self.old.body_qd))
         return place[:3], rate[:3], rate[3:]
 
     def push(self, force: Vector) -> None:
-        self.old.body_f.numpy()[0, :3] = force  # on a processor this is the engine's own memory
+        self.old.body_f.numpy()[self.number, :3] = force  # on a processor this is the engine's own memory
 
-    def turn(self, point: Array, normal: Array) -> None:
-        self.model.shape_transform.numpy()[self.wall] = pose(point, normal)
+    def turn(self, point: Array, normal: Array, velocity: Array) -> None:
+        self.old.body_q.numpy()[self.wall] = pose(point, normal)
+        self.old.body_qd.numpy()[self.wall] = [*velocity, 0.0, 0.0, 0.0]
 
 
 def pose(point: Array, normal: Array) -> Any:
@@ -92,7 +97,7 @@ _CREEPS = (
     "bodies creep at a rate that more iterations lessen"
 )
 xpbd_defaults = Newton("XPBD", _CREEPS)
-xpbd = Newton("XPBD", f"{_CREEPS}; then round the cylinder: {CHORD}", "10 iterations", iterations=10)
+xpbd = Newton("XPBD", _CREEPS, "10 iterations", iterations=10)
 semiimplicit_defaults = Newton(
     "SemiImplicit",
     "worst at long steps and with light bodies: its springs and friction of 1000 N s/m are explicit, and explode at "
@@ -106,8 +111,7 @@ vbd_defaults = Newton(
 )
 kamino = Newton(
     "Kamino",
-    "resting, sliding and rolling on planes to first order, by ADMM with Coulomb's cone; worst round the "
-    f"cylinder: {CHORD}",
+    "resting, sliding and rolling to first order, by ADMM with Coulomb's cone; worst where it lands",
     "the engine's own settings",
     shortest=2e-3,
 )

@@ -1,0 +1,162 @@
+"""Drake: a discrete `MultibodyPlant` with point contact, normal forces implicit, friction regularised below a speed.
+
+TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a contact that should
+roll creeps at a part of v_s, and a ball sinks in by its load divided by the stiffness. Both can be made small, as far
+as Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of
+their own, and creep.
+
+Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1 + k2); without
+`SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane has to be a half space, since
+boxes are less exact, but one among a dozen of other shapes crashes the engine; two half spaces that may meet are
+refused.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+from typing import Any
+
+import numpy as np
+import pydrake.all as engine
+
+from compare.adapters.free import Free, State, Touch
+from compare.adapters.scene import Surface, Vector
+from model.arrays import Array
+
+STIFFNESS, DISSIPATION, STICTION = 1e7, 100.0, 1e-8
+"""N/m and s/m of body and surfaces, and v_s in m/s. A body that has landed comes out of its overlap at up to the
+reciprocal of the dissipation: with less it is thrown back, with more it stays sunk in for long. Where the wall is
+placed anew before each step a hundred times the stiffness makes the contact chatter, and TAMSI fail."""
+HEAVY = 1e6
+"""Mass of a surface that moves, divided by the body's; moment of inertia divided by mass, m2: nothing slows it."""
+SIZE = 100.0
+"""Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
+
+logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
+
+
+class Drake(Free):
+    """As in `Free`."""
+
+    TELLS = True
+    RESOLUTION = STICTION
+
+    def make(self) -> None:
+        scene, body = self.scene, self.scene.body
+        self.most = max(surface.friction for surface in scene.surfaces)
+        builder = engine.DiagramBuilder()
+        self.plant, graph = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(self.timestep))
+        plant = self.plant
+        plant.set_contact_model(engine.ContactModel.kPoint)
+        solver = engine.DiscreteContactApproximation
+        plant.set_discrete_contact_approximation(solver.kTamsi if self.best else solver.kLagged)
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scene.g])
+        plant.SetUseSampledOutputPorts(False)
+        moments = engine.UnitInertia(*(np.array(body.inertia) / body.mass))
+        ball = plant.AddRigidBody("body", engine.SpatialInertia(body.mass, np.zeros(3), moments))
+        self.own = ball.index()
+        for k, (place, shape) in enumerate(self.shapes()):
+            self.add(ball, place, shape, f"body{k}")
+        moving = [surface for surface in scene.surfaces if self.moves(surface) or surface.turning]
+        walls = {surface.name: self.heavy(surface) for surface in moving}
+        self.surfaces = {}
+        for surface, name, point, normal in self.planes():
+            of = walls.get(surface.name, plant.world_body())
+            if self.moves(surface):
+                point, normal = np.zeros(3), np.array([-1.0, 0.0, 0.0])
+            self.surfaces[self.plane(of, point, normal, name, surface)] = scene.surfaces.index(surface)
+        apart = engine.CollisionFilterDeclaration().ExcludeWithin(engine.GeometrySet([*self.surfaces]))
+        graph.collision_filter_manager().Apply(apart)
+        plant.Finalize()
+        if self.best:
+            plant.set_stiction_tolerance(STICTION)
+        self.diagram = builder.Build()
+        self.root = self.diagram.CreateDefaultContext()
+        self.context = plant.GetMyMutableContextFromRoot(self.root)
+        self.force, self.x = np.zeros(plant.num_velocities()), plant.GetPositionsAndVelocities(self.context)
+        self.ball = self.wall = self.numbers(ball)
+        self.put(self.ball, [*body.orientation, *body.position], [*body.spin, *body.velocity])
+        for surface in moving:
+            turns = self.numbers(walls[surface.name])
+            self.put(turns, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, surface.turning, 0.0, 0.0, 0.0])
+            self.wall = turns if surface.radius else self.wall
+
+    def heavy(self, surface: Surface) -> Any:
+        """A body that floats without gravity, for a surface that moves."""
+        own, turning = self.plant.AddModelInstance(surface.name), engine.UnitInertia(HEAVY, HEAVY, HEAVY)
+        inertia = engine.SpatialInertia(HEAVY * self.scene.body.mass, np.zeros(3), turning)
+        self.plant.set_gravity_enabled(own, False)
+        return self.plant.AddRigidBody(surface.name, own, inertia)
+
+    def shapes(self) -> list[tuple[Any, Any]]:
+        """The shape of the body; a box in the best settings is its corners."""
+        body = self.scene.body
+        if body.shape == "sphere" or not self.best:
+            whole = engine.Sphere(*body.size) if body.shape == "sphere" else engine.Box(*(2 * np.array(body.size)))
+            return [(engine.RigidTransform(), whole)]
+        corners = itertools.product(*((-half, half) for half in body.size))
+        return [(engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners]
+
+    def add(self, of: Any, pose: Any, shape: Any, name: str, friction: float | None = None) -> Any:
+        """A shape of what moves, or of what it touches, with the friction of the pair."""
+        material, mu = engine.ProximityProperties(), self.most
+        if friction is not None:  # the harmonic mean of both is the pair's
+            mu = mu * friction / (2 * mu - friction) if friction else 0.0
+        springs = {"dissipation": DISSIPATION, "point_stiffness": STIFFNESS} if self.best else {}
+        engine.AddContactMaterial(**springs, friction=engine.CoulombFriction(mu, mu), properties=material)
+        return self.plant.RegisterCollisionGeometry(of, pose, shape, name, material)
+
+    def plane(self, of: Any, point: Array, normal: Array, name: str, surface: Surface) -> Any:
+        """A half space, or one side of a cube: a half space among a dozen of shapes crashes the engine."""
+        size = 0.0 if self.best else SIZE * max((each.radius or 0.0) for each in self.scene.surfaces)
+        if not size:
+            pose, shape = engine.HalfSpace.MakePose(normal, point), engine.HalfSpace()
+        else:
+            turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
+            pose, shape = engine.RigidTransform(turn, point - size / 2 * normal), engine.Box(size, size, size)
+        return self.add(of, pose, shape, name, surface.friction)
+
+    def numbers(self, body: Any) -> tuple[slice, slice]:
+        """Where orientation and place, and spin and velocity of a free body are in the state."""
+        at, rate = body.floating_positions_start(), self.plant.num_positions() + body.floating_velocities_start_in_v()
+        return slice(at, at + 7), slice(rate, rate + 6)
+
+    def put(self, numbers: tuple[slice, slice], pose: Any, rate: Any) -> None:
+        """A free body somewhere."""
+        self.x[numbers[0]], self.x[numbers[1]] = pose, rate
+
+    def advance(self) -> None:
+        self.plant.get_applied_generalized_force_input_port().FixValue(self.context, self.force)
+        self.plant.SetPositionsAndVelocities(self.context, self.x)
+        self.x = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
+
+    def read(self) -> State:
+        pose, rate = (self.x[part] for part in self.ball)
+        return pose[4:], rate[3:], rate[:3]
+
+    def push(self, force: Vector) -> None:
+        first = self.ball[1].start - self.plant.num_positions()
+        self.force[first + 3 : first + 6] = force
+
+    def turn(self, point: Array, normal: Array, velocity: Array) -> None:
+        half = math.atan2(-normal[1], -normal[0]) / 2
+        self.put(self.wall, [math.cos(half), 0.0, 0.0, math.sin(half), *point], [0.0, 0.0, 0.0, *velocity])
+
+    def touches(self) -> list[Touch]:
+        results = self.plant.get_contact_results_output_port().Eval(self.context)
+        shown = []
+        for info in (results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())):
+            pair, sign = info.point_pair(), 1 if info.bodyB_index() == self.own else -1  # it acts on the second body
+            surface = self.surfaces[pair.id_A if sign > 0 else pair.id_B]
+            shown.append(Touch(surface, sign * info.contact_force(), -pair.depth))
+        return shown
+
+
+defaults = Drake("drake-defaults", "boxes touch a plane at one point at a time, and tumble from corner to corner")
+best = Drake(
+    "drake",
+    "a body that lands overlaps by up to a step's way, and comes out slowly",
+    f"TAMSI, {STIFFNESS:.0e} N/m, stiction tolerance {STICTION:g} m/s; a box touches by its corners",
+)

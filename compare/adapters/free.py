@@ -1,0 +1,161 @@
+"""What adapters of engines share: free bodies, the force of each step, a plane that goes along for a cylinder."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import importlib
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from compare.adapters.scene import FACETS, Scene, Surface, Vector
+from mjsim.free import against
+from model import InputError
+from model.arrays import Array
+from model.kinematics import tangent
+from model.versions import ABSENT, version
+
+CORNERS = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
+"""Why a ball in facets is slow."""
+State = tuple[Any, ...]
+"""Position, velocity and spin in world axes; of two bodies those of both."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """What an engine comes in, a package that may be missing, and the module of its adapters."""
+
+    name: str
+    """Of the package."""
+    module: str
+
+    @property
+    def missing(self) -> str:
+        """Why it can't be used here, and what to do about it; empty if it can."""
+        return "" if self.version != ABSENT else f"{self.name} is not installed: pip install {self.name}"
+
+    @property
+    def version(self) -> str:
+        """Or that it isn't installed."""
+        return version(self.name)
+
+    def load(self, member: str) -> Free:
+        """A copy of one of its adapters by name; `InputError` if the package is missing or can't be imported."""
+        try:
+            engine: Free = getattr(importlib.import_module(self.module), member)
+        except ImportError as error:
+            raise InputError(self.missing or f"{self.name} can't be imported: {error}") from error
+        return copy.copy(engine)
+
+
+class Touch(NamedTuple):
+    """What a contact point of the engine carried in the last step."""
+
+    surface: int
+    """Which of the scene's surfaces."""
+    force: Array
+    """On the body, in world axes, shape (3,), N."""
+    gap: float
+    """m"""
+
+
+class BreakdownError(RuntimeError):
+    """The engine can't take the next step."""
+
+
+class Free(ABC):
+    """A free body in an engine: in the best settings, with a wall that moves along, or as it comes, with facets."""
+
+    PRECISION = "f64"
+    FEATURES: tuple[str, ...] = ()
+    """Of `Scene.needs`, what it can do."""
+    AHEAD = 0.5
+    """Share of a step by which positions, where contacts and forces are found, are ahead of velocities. Semi-implicit
+    steps are leapfrog, of second order, once one says so: in the best settings bodies start so far on, and what is read
+    of them is taken back."""
+    RESOLUTION = 1e-9
+    """The least slip speed that the engine tells from rolling, m/s: to what its solver goes, or round-off."""
+
+    TELLS = False
+    """Whether the engine tells what contacts carry, friction included."""
+
+    def __init__(self, name: str, note: str, best: str = "") -> None:
+        """`note`: what is worst, and why; `best` declares settings other than the engine's own; empty for those."""
+        self.NAME, self.NOTE, self.best = name, note, bool(best)
+        moved = "one plane that goes with the body for a cylinder; positions half a step ahead of velocities"
+        self.DECLARED = "; ".join(filter(None, (moved if best else f"{FACETS} planes for a cylinder", best)))
+        self.scene: Scene
+        self.timestep = self.now = self.ahead = 0.0
+
+    def build(self, scene: Scene, timestep: float) -> None:
+        """The scene at its start; raises `NotImplementedError` for one that the engine can't have."""
+        self.ahead = self.now = self.AHEAD * timestep * self.best
+        body, under = scene.body.after(self.ahead), scene.under and scene.under.after(self.ahead)
+        self.scene, self.timestep = dataclasses.replace(scene, body=body, under=under), timestep
+        self.make()
+
+    def step(self, n: int) -> None:
+        """Take n steps."""
+        scene = self.scene
+        radii = [surface.radius for surface in scene.surfaces if self.best and surface.radius]
+        half, reach = self.timestep / 2, scene.body.size[0]
+        for _ in range(n):
+            if scene.forced or radii:
+                position, velocity, spin, *_ = self.read()
+                if scene.forced:
+                    self.push(scene.force(self.now, position, velocity))
+                for radius in radii:
+                    azimuth = math.atan2(position[1], position[0])
+                    inwards, up = against(azimuth, velocity, spin, half, radius - reach, reach)
+                    point, normal = tangent(radius, azimuth)
+                    point[2] = position[2]
+                    self.turn(point, normal, np.append(inwards * normal[:2], up))
+            self.advance()
+            self.now += self.timestep
+
+    def state(self) -> State:
+        """As it is now: positions are taken back to where velocities are."""
+        parts = [np.array(part, float) for part in self.read()]
+        for k in range(0, len(parts), 3):
+            parts[k] -= self.ahead * parts[k + 1]
+        return tuple(parts)
+
+    def moves(self, surface: Surface) -> bool:
+        """Whether it is a cylinder for which one plane stands that goes with the body."""
+        return self.best and surface.radius is not None
+
+    def planes(self) -> Iterator[tuple[Surface, str, Array, Array]]:
+        """As `Scene.planes`: a cylinder's are many, or the one that moves along."""
+        return self.scene.planes(1 if self.best else FACETS)
+
+    @abstractmethod
+    def make(self) -> None:
+        """`scene`, with steps of `timestep`."""
+
+    @abstractmethod
+    def advance(self) -> None:
+        """Take a step."""
+
+    @abstractmethod
+    def read(self) -> State:
+        """As the engine has it."""
+
+    def push(self, force: Vector) -> None:
+        """Set the force on the centre for the next step, N."""
+        raise NotImplementedError("it takes no forces")
+
+    def turn(self, point: Array, normal: Array, velocity: Array) -> None:
+        """Place the plane that stands for the cylinder, and give it a velocity for the next step, m/s."""
+        raise NotImplementedError("its planes can't be moved")
+
+    def touches(self) -> list[Touch]:
+        """The contact points of the last step, of an engine that `TELLS`."""
+        raise NotImplementedError
+
+    def close(self) -> None:  # noqa: B027
+        """Release what the engine holds: most hold nothing."""

@@ -1,0 +1,220 @@
+"""A rigid body, or one on another, in plain geometry, and what acts on it, as data: what an engine is asked to build.
+
+SI units, world axes with z up. Contacts are rigid, friction is Coulomb's with one coefficient for stick and slip, and
+impacts are plastic unless a surface has a restitution. The body's friction is nothing of its own: the coefficient of a
+pair is that of the surface.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from model.arrays import Array
+from model.kinematics import rotated, tangent
+
+Vector = tuple[float, float, float]
+TIME_STEPS = (4e-3, 2e-3, 1e-3)
+"""Time steps at which an engine is asked, s; every sample of a case falls on a step of each."""
+FACETS = 64
+"""Planes that stand for a cylinder in MJCF, which has no hollow one."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A fixed surface: a plane, or the inner side of a vertical cylinder."""
+
+    name: str
+    friction: float
+    """Coulomb's coefficient of the pair of it and the body."""
+    point: Vector = (0.0, 0.0, 0.0)
+    """A point of the plane, or of the cylinder's axis, m."""
+    normal: Vector = (0.0, 0.0, 1.0)
+    """Of the plane, towards the body."""
+    radius: float | None = None
+    """Of the cylinder, m; None for a plane."""
+    turning: float = 0.0
+    """Angular velocity of its material about the vertical through `point`, rad/s; a turntable has one."""
+    velocity: Vector = (0.0, 0.0, 0.0)
+    """Of its material along itself, m/s; a belt has one."""
+    restitution: float = 0.0
+    """Share of its normal speed with which the body leaves it after a blow."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body and its start; its centre of mass is the middle of its shape."""
+
+    position: Vector
+    """Of the centre at the start, m."""
+    velocity: Vector
+    """m/s"""
+    spin: Vector
+    """Angular velocity, rad/s."""
+    shape: str
+    """``sphere``, ``box`` or ``tripod``: three spheres that are joined, and stand."""
+    size: tuple[float, ...]
+    """Radius; or the three half edges; or of a tripod's feet the radius, how far from the axis, and how far below the
+    centre they are, the first along x; m."""
+    mass: float
+    """kg"""
+    inertia: Vector
+    """Principal moments about the centre, kg m2."""
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    """Unit quaternion, the scalar first."""
+
+    @property
+    def parts(self) -> Array:
+        """Where the centres of its shapes are, (n, 3), in its own axes, m."""
+        if self.shape != "tripod":
+            return np.zeros((1, 3))
+        _, out, down = self.size
+        turns = math.tau / 3 * np.arange(3)
+        return np.stack([out * np.cos(turns), out * np.sin(turns), np.full(3, -down)], axis=1)
+
+    def after(self, time: float) -> Body:
+        """The body that has moved on freely by a short time, s."""
+        spin, rate = np.array(self.spin), math.hypot(*self.spin)
+        turn = np.append(math.cos(rate * time / 2), spin / max(rate, 1e-300) * math.sin(rate * time / 2))
+        w, *axis = self.orientation
+        ours = turn[0] * np.array(axis) + w * turn[1:] + np.cross(turn[1:], axis)
+        place = np.array(self.position) + time * np.array(self.velocity)
+        orientation = (float(turn[0] * w - turn[1:] @ axis), *ours.tolist())
+        return replace(self, position=(*place.tolist(),), orientation=orientation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A body, what it touches and what acts on it."""
+
+    name: str
+    body: Body
+    surfaces: tuple[Surface, ...]
+    g: float = 9.81
+    """Gravity, along -z, m/s2."""
+    pull: Vector = (0.0, 0.0, 0.0)
+    """A constant force at the centre, N."""
+    growth: Vector = (0.0, 0.0, 0.0)
+    """A force at the centre that grows with time, N/s."""
+    drag: float = 0.0
+    """c of a fluid's drag -m c (v - u), 1/s."""
+    flow: float = 0.0
+    """Angular velocity of that fluid about the z axis: u = flow (-y, x, 0), rad/s."""
+    spring: float = 0.0
+    """Stiffness of a spring that draws the centre to the origin, N/m."""
+    joint: Vector | None = None
+    """The way that a joint leaves to the body, which doesn't turn then; None: it is free."""
+    dry: float = 0.0
+    """Dry friction in that joint, N."""
+    under: Body | None = None
+    """A second body, on which the first one stands. It alone touches the surfaces."""
+    between: float = 0.0
+    """Coulomb's coefficient of the two bodies."""
+
+    def force(self, t: float, position: Any, velocity: Any) -> Vector:
+        """All that acts at the body's centre at a time in s but gravity and contacts, N; engines set it every step."""
+        (x, y, *_), (v_x, v_y, v_z), mc = position, velocity, self.body.mass * self.drag
+        relative = (v_x + self.flow * y, v_y - self.flow * x, v_z)
+        pulls = zip(self.pull, self.growth, relative, position, strict=True)
+        a, b, c = (p + t * q - mc * w - self.spring * s for p, q, w, s in pulls)
+        return float(a), float(b), float(c)
+
+    @property
+    def forced(self) -> bool:
+        """Whether `force` is ever other than zero."""
+        return any((*self.pull, *self.growth, self.drag, self.spring))
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The body, and the one under it if there is one."""
+        return (self.body, self.under) if self.under else (self.body,)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """What version 1 of the cases had not: an engine that takes it says so in `FEATURES`."""
+        asked = {
+            "two bodies": self.under,
+            "moving surface": any(any(surface.velocity) for surface in self.surfaces),
+            "restitution": any(surface.restitution for surface in self.surfaces),
+            "dry joint": self.joint,
+            "tripod": self.body.shape == "tripod",
+        }
+        return tuple(name for name, needed in asked.items() if needed)
+
+    @property
+    def round(self) -> bool:
+        """Whether the body is in a cylinder about the z axis."""
+        return any(surface.radius is not None for surface in self.surfaces)
+
+    def planes(self, facets: int) -> Iterator[tuple[Surface, str, Array, Array]]:
+        """Each surface with a name, a point and the normal of a plane; a cylinder's are so many."""
+        for surface in self.surfaces:
+            if surface.radius is None:
+                yield surface, surface.name, np.array(surface.point), np.array(surface.normal)
+            else:
+                for k in range(facets):
+                    yield surface, f"{surface.name}{k}", *tangent(surface.radius, math.tau * k / facets)
+
+    def mjcf(self, timestep: float = 1e-3) -> str:
+        """The scene for MuJoCo with all of its contact parameters as they come; it lacks `force` and restitution."""
+        parts: list[str] = []
+        qpos: list[float] = []
+        qvel: list[float] = []
+        for surface, name, point, normal in self.planes(FACETS):
+            moves = (*into(upright(normal), np.array(surface.velocity)), 0.0, 0.0, surface.turning)
+            pose = f'pos="{_text(point)}" quat="{_text(upright(normal))}"'
+            belt = f'surfacevel="{_text(moves)}" ' if any(moves) else ""
+            parts.append(
+                f'<geom name="{name}" type="plane" size="0 0 1" {pose} {belt}friction="{surface.friction} 0 0"/>'
+            )
+        for name, body in reversed([*zip(("body", "under"), self.bodies, strict=False)]):
+            joint = f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>' if self.joint else ""
+            shape, size = ("sphere", body.size[:1]) if body.shape == "tripod" else (body.shape, body.size)
+            geoms = [
+                f'<geom name="{name}{k or ""}" type="{shape}" size="{_text(size)}" pos="{_text(at)}" friction="0 0 0"/>'
+                for k, at in enumerate(body.parts)
+            ]
+            parts.append(f"""<body name="{name}" pos="{_text(body.position)}" quat="{_text(body.orientation)}">
+      {joint or "<freejoint/>"}
+      <inertial pos="0 0 0" mass="{body.mass}" diaginertia="{_text(body.inertia)}"/>
+      {(chr(10) + "      ").join(geoms)}
+    </body>""")
+            # MuJoCo counts the spin of a free body in its own axes.
+            free = [*body.position, *body.orientation], [*body.velocity, *into(body.orientation, body.spin)]
+            start = ([0.0], [float(np.dot(self.joint, body.velocity))]) if self.joint else free
+            qpos, qvel = qpos + start[0], qvel + start[1]
+        pair = (
+            f'<pair geom1="under" geom2="body" friction="{self.between} {self.between} 0 0 0"/>' if self.under else ""
+        )
+        return f"""<mujoco model="{self.name}">
+  <option timestep="{timestep}" gravity="0 0 {-self.g}"/>
+  <worldbody>
+    {(chr(10) + "    ").join(parts)}
+  </worldbody>
+  <contact>{pair}</contact>
+  <keyframe><key name="start" qpos="{_text(qpos)}" qvel="{_text(qvel)}"/></keyframe>
+</mujoco>
+"""
+
+
+def _text(numbers: Any) -> str:
+    return " ".join(repr(float(number) + 0.0) for number in numbers)  # no negative zero
+
+
+def into(orientation: tuple[float, ...], vectors: Any) -> Array:
+    """Vectors of the world, (3,) or (n, 3), in the axes of a body."""
+    w, *axis = orientation
+    return rotated(np.array([w, *(-a for a in axis)]), np.array(vectors))
+
+
+def upright(normal: Any) -> tuple[float, float, float, float]:
+    """The shortest turn, a unit quaternion, that takes z to a normal."""
+    x, y, z = normal
+    if z < -1 + 1e-12:
+        return 0.0, 1.0, 0.0, 0.0
+    w = math.sqrt((1 + z) / 2)
+    return w, -y / (2 * w), x / (2 * w), 0.0

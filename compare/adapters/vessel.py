@@ -1,0 +1,224 @@
+"""The ball in its vessel, by the adapter of any engine: the loop that makes a trajectory of it.
+
+The engine has the scene of a free ball between a plane and a cylinder, and is driven by -m c(|w|) w (9) alone, with the
+velocity w relative to the fluid at the beginning of each step. The loop adds samples, cases, and what becomes of a run
+that breaks down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.adapters.free import BreakdownError, Free, Library
+from compare.adapters.scene import Body, Scene, Surface, Vector
+from mjsim import limits
+from mjsim.classify import Classifier, Contacts
+from mjsim.contact_settings import ContactSettings
+from mjsim.corrections import Ball, resistance
+from mjsim.engine import EVENT_TIMES
+from model import Flow, Header, InputError, Parameters, State, Trajectory
+from model.arrays import Array
+from model.kinematics import Motion, frame, from_world, to_world
+from model.parameters import POSITIVE, check_number
+from model.trajectory import samples
+from model.versions import current_versions
+
+_HUGE = 1e8
+"""A coordinate, velocity or force beyond this, in SI units, has diverged."""
+_REACH = 1e-3
+"""Gap, in radii, up to which a contact is closed by what is seen of the motion alone."""
+NOTED = 1024
+"""Steps of which the cases are told at once."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What a run of any engine is set by; the rest, its adapter declares."""
+
+    timestep: float = 1e-3
+    """s"""
+
+    def __post_init__(self) -> None:
+        check_number("timestep", self.timestep, "s", POSITIVE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vessel(Scene):
+    """A ball in the study's vessel, with its law of drag and its flow."""
+
+    ball: Ball
+    fluid: Flow
+
+    @classmethod
+    def of(cls, p: Parameters, x: State, flow: Flow) -> Vessel:
+        """Of parameters, and of a start at azimuth zero."""
+        place, velocity, spin = (part.tolist() for part in to_world(x, 0.0, p))
+        body = Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3)
+        surfaces = Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)
+        ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
+        return cls(name="vessel", body=body, surfaces=surfaces, g=p.g, ball=ball, fluid=flow)
+
+    @property
+    def forced(self) -> bool:
+        return True
+
+    def force(self, t: float, position: Any, velocity: Any) -> Vector:
+        (x, y, _), (v_x, v_y, v_z) = position, velocity
+        omega_0 = float(self.fluid(t))
+        w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
+        mc = resistance(w_x, w_y, v_z, self.ball)
+        return float(-mc * w_x), float(-mc * w_y), float(-mc * v_z)
+
+
+@dataclass(frozen=True)
+class _Band:
+    """What the classifier needs of an engine: see `mjsim.classify.Regularised`."""
+
+    timestep: float
+    midpoint: float
+    """Where in a step forces are found, in steps."""
+    resolution: float
+    rolls: float = 3.0
+    """Share of `resolution` up to which a contact rolls: how exact that speed is isn't known."""
+
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
+        return np.full(np.shape(load), self.resolution)
+
+
+def simulate(
+    name: str,
+    library: Library,
+    member: str,
+    p: Parameters,
+    x0: npt.ArrayLike,
+    t_end: float,
+    flow: Flow,
+    settings: Settings,
+    sample_interval: float | None,
+    progress: Callable[[float], None],
+) -> Trajectory:
+    """One run of the engine of a name with one of the adapters of its library.
+
+    Where it breaks down, the header says why. Where its adapter doesn't tell what contacts carry, forces are nan, and
+    cases are told by gaps and slip alone.
+
+    Forces of a sample are those of the step that begins there, gaps of touching contacts the engine's own.
+
+    Raises
+    ------
+    InputError
+        If the library is not installed, an argument out of range, or the time step too large for the problem.
+    """
+    h = settings.timestep
+    every, count = limits.sampling(t_end, h, sample_interval)
+    limits.check_timestep(h, p, flow, t_end)
+    if p.fluid_torque:
+        raise InputError(f"fluid_torque = {p.fluid_torque:g} s-1: {name} doesn't take it; mujoco, time-stepping do")
+    x = State.one(x0)
+    limits.check_place(x, p, p.r / 10)
+    total = (count - 1) * every + 1  # of the last sample only forces are needed
+    done, told, failure, theta = 0, 0, "", 0.0
+    rows, kept = np.empty((NOTED, 9 + 2 * 5)), list[npt.NDArray[np.void]]()
+
+    def keep(first: int, last: bool) -> None:
+        """Tell the cases of the steps in `rows`, and keep the samples among them."""
+        nonlocal theta
+        steps = np.arange(first, done)
+        block = _samples(np.asarray(steps * h, float), rows[: len(steps)], theta, engine.ahead, p)
+        theta = block["theta"][-1] if len(block) else theta
+        classifier.add(_contacts(block, band, p), last)
+        kept.append(block[steps % every == 0])
+
+    with closing(library.load(member)) as engine:
+        try:
+            engine.build(Vessel.of(p, x, flow), h)
+            # A wall that moves along for a step is a cylinder to (Omega h)^2.
+            fastest = max(abs(x.omega_c), float(np.abs(flow(np.linspace(0.0, t_end, NOTED))).max()))
+            along = p.R * fastest * (fastest * h) ** 2 / 4
+            band = _Band(h, engine.AHEAD if engine.best else 0.0, engine.RESOLUTION + along)
+            classifier = Classifier([p], band)
+            while done < total:
+                row = rows[done % NOTED]
+                row[:9], row[9:] = np.concatenate(engine.state()), 0.0
+                _step(engine, row)
+                done += 1
+                if done % NOTED == 0 and done < total:
+                    keep(done - NOTED, last=False)
+                    told = done
+                    progress(done / total)
+        except (RuntimeError, InterruptedError) as error:  # what engines raise where they can't go on
+            known = isinstance(error, (BreakdownError, InterruptedError))
+            said = f"{error}" if known else f"could not go on ({' '.join(str(error).split())[:80]})"
+            failure = f"{said} by t = {done * h:g} s"
+        keep(told, last=True)
+        told_by = "contact forces" if engine.TELLS else "gaps and slip"
+        given = {
+            "timestep": h,
+            "declared": engine.DECLARED,
+            "cases_by": told_by,
+            "t_end": float(t_end),
+            "sample_interval": every * h,
+        }
+    given |= {"x0": list(x), "theta_0": 0.0, "event_times": EVENT_TIMES}
+    versions = {**current_versions(), library.name: library.version}
+    header = Header(name, p, flow, given, failure=failure, versions=versions)
+    block = np.concatenate(kept)
+    block["case"] = classifier.cases(0, np.arange(len(block)) * every)
+    return Trajectory.from_blocks(header, [block], classifier.events(0))
+
+
+def _step(engine: Free, row: Array) -> None:
+    """Take a step, and note what its contacts carried."""
+    engine.step(1)
+    if not all((np.abs(part) < _HUGE).all() for part in engine.read()):
+        raise BreakdownError("diverged")
+    if not engine.TELLS:
+        row[10:13] = row[15:18] = np.nan
+        return
+    for contact, force, gap in engine.touches():
+        of = row[9 + 5 * contact :][:5]
+        of[4] = min(gap, of[4]) if of[0] else gap
+        of[0], of[1:4] = 1.0, of[1:4] + force
+
+
+def _samples(time: Array, rows: Array, theta: float, ahead: float, p: Parameters) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case; azimuths go on from `theta`, rad.
+
+    Forces are along the axes of where the ball was when they were found, `ahead` of the velocities in s.
+    """
+    motion = Motion(*np.split(rows[:, :9], 3, axis=1))
+    state, azimuth = from_world(motion, p)
+    block = samples(time, np.unwrap(np.append(theta, azimuth))[1:], state, p)
+    x, y, _ = (motion.position + ahead * motion.velocity).T
+    axes = frame(np.arctan2(y, x))
+    for name, own in zip("AB", np.split(rows[:, 9:], 2, axis=1), strict=True):
+        block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
+        block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])
+    return block
+
+
+def _contacts(block: npt.NDArray[np.void], band: _Band, p: Parameters) -> Contacts:
+    """What the contacts do in successive steps, of samples (n,).
+
+    Where forces aren't known a closed contact bears 1 N, and uses all of its friction if it slips.
+    """
+    A, B = block["force_A"].copy(), block["force_B"].copy()
+    if np.isnan(A).any():
+        A[:], B[:] = 0.0, 0.0
+        A[:, 1], B[:, 0] = block["gap_A"] < _REACH * p.r, block["gap_B"] < _REACH * p.r
+        fast = 3 * band.rolls * band.resolution
+        A[:, 2] = p.mu * A[:, 1] * (block["slip_speed_A"] > fast)
+        B[:, 2] = p.eta * B[:, 0] * (block["slip_speed_B"] > fast)
+    each = (
+        (A[:, 1], B[:, 0]),
+        (np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])),
+        (block["slip_speed_A"], block["slip_speed_B"]),
+        (block["gap_A"], block["gap_B"]),
+    )
+    return Contacts(*(np.stack(pair, axis=-1)[:, None] for pair in each))
