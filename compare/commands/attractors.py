@@ -42,7 +42,8 @@ def add(commands: options.Commands) -> None:
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
     options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
-    command.add_argument("--page", type=options.MARKDOWN, help="write the tables as Markdown, too (default: don't)")
+    tables = "write the tables as Markdown, too (default: don't)"
+    command.add_argument("-o", "--output", type=options.MARKDOWN, dest="page", help=tables)
     options.outputs(command, shown="print as JSON")
 
     example = "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21"
@@ -56,9 +57,9 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
     command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
     running.add_workers(command)
-    command.add_argument("--save", type=options.JSON, help="write the map as JSON")
+    command.add_argument("-o", "--output", type=options.JSON, dest="map", help="write the map as JSON")
     command.add_argument("--plot", type=options.FIGURE, help="draw the map: png, svg or pdf (default: don't)")
-    options.outputs(command, "basins", "print the shares as JSON")
+    options.outputs(command, "basins", "print the shares as JSON", ("--results",))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -187,8 +188,8 @@ def plane(args: argparse.Namespace) -> int:
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     with running.campaign(args, "basins") as campaign:
         mapped = basins(campaign, p, start._asdict(), across, up, args.mujoco, args.timestep)
-    if args.save:
-        mapped.save(args.save)
+    if args.map:
+        mapped.save(args.map)
     if args.plot:
         from compare.view import planes  # here, because drawing takes a second to load
 

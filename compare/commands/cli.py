@@ -32,6 +32,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "figures": ("look", "draw the paper's figures, with measured points where there are results"),
     },
     "the ball": {
+        "parameters": ("predict", "the parameters of the ball that commands take, their units and ranges; the sets"),
         "predict": ("predict", "stationary solutions, thresholds and operating range, from theory"),
         "simulate": ("simulate", "one run with any engine, into an HDF5 file"),
         "inspect": ("look", "what a trajectory file holds"),
@@ -52,6 +53,8 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
 }
 """The commands, as help groups them: the module of each, loaded for nothing else, and what it is for."""
+MOVED = {("compare", "-o"): "--plot", ("attractors", "--page"): "-o", ("basins", "--save"): "-o"}
+"""Options of earlier versions by command, and what they are called now."""
 GONE = {
     "report": "'dualball judge' writes report.html anew, too",
     "search": "it is 'python -m docs.studies.search' in a clone",
@@ -141,6 +144,9 @@ def _parser(words: Sequence[str]) -> options.Parser:
     known = {name: about for group in GROUPS.values() for name, about in group.items()}
     if words and words[0] == "--print-completion":
         _complete(parser, commands, words[1:])
+    for word in words:
+        if renamed := MOVED.get((words[0], word)):
+            raise InputError(f"{words[0]} {word} is {renamed} now")
     if words and words[0] in known:
         module, what = known[words[0]]
         importlib.import_module(f"compare.commands.{module}").add(commands)

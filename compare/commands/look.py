@@ -29,11 +29,11 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--plot", type=options.FIGURE, help="draw the run: png, svg or pdf (default: don't)")
     options.outputs(command)
 
-    command = options.command(commands, "compare", compare, "mine.csv theory.h5 -o difference.png")
+    command = options.command(commands, "compare", compare, "mine.csv theory.h5 --plot difference.png")
     what = "a run, or time and some of its quantities from CSV or any HDF5 file"
     command.add_argument("a", metavar="FILE", help=what)
     command.add_argument("b", metavar="OTHER", help="what it is compared with, the same")
-    command.add_argument("-o", "--output", type=options.FIGURE, help="draw both (png, svg or pdf)")
+    command.add_argument("--plot", type=options.FIGURE, help="draw both: png, svg or pdf (default: don't)")
     options.outputs(command)
 
     command = options.command(commands, "render", render, "run.h5 -o film.gif --from 1 --seconds 10")
@@ -110,8 +110,8 @@ def compare(args: argparse.Namespace) -> int:
 
     a, b = testing.read(args.a), testing.read(args.b)
     about = motions.describe(a, b)
-    if args.output:
-        drawing.save(motions.draw_both(a, b), args.output)
+    if args.plot:
+        drawing.save(motions.draw_both(a, b), args.plot)
     options.show(about, args.json, *motions.tables(about))
     return 0
 

@@ -133,6 +133,10 @@ def results(text: str) -> Path:
     return Path(text)
 
 
+PREFIX = "parameter_"
+"""How the destinations of options begin that are parameters of the ball."""
+
+
 class _Help(argparse.HelpFormatter):
     """Help that says what kind of thing an option takes, and its default if it has one."""
 
@@ -143,6 +147,14 @@ class _Help(argparse.HelpFormatter):
         return "FILE" if of_file else super()._get_default_metavar_for_optional(action)
 
     _get_default_metavar_for_positional = _get_default_metavar_for_optional
+
+    def add_argument(self, action: argparse.Action) -> None:
+        """`dualball parameters` tells of them once, for all commands."""
+        if not action.dest.startswith(PREFIX):
+            super().add_argument(action)
+
+    def add_usage(self, usage: str | None, actions: Iterable[argparse.Action], *more: Any) -> None:
+        super().add_usage(usage, [each for each in actions if not each.dest.startswith(PREFIX)], *more)
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default, text = action.default, action.help or ""
@@ -180,11 +192,13 @@ def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:T
     parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
 
 
-def outputs(parser: Parser, directory: str = "", shown: str = "print JSON") -> None:
+def outputs(
+    parser: Parser, directory: str = "", shown: str = "print JSON", names: tuple[str, ...] = ("-o", "--output")
+) -> None:
     """``--json``; and what all commands have that fill a directory: its name, workers' progress or none."""
     if directory:
         where = "directory of the results; what it holds already is not computed again"
-        parser.add_argument("-o", "--output", type=results, default=Path(directory), metavar="DIR", help=where)
+        parser.add_argument(*names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where)
         parser.add_argument("--quiet", action="store_true", help="no progress")
     parser.add_argument("--json", action="store_true", help=shown)
 
@@ -230,7 +244,8 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
     """Options that choose a parameter set and change some of its values."""
-    group = parser.add_argument_group("parameters", "a set, and values that replace its own")
+    what = "a set, and values that replace its own, as --mu 0.3 --omega-0 25: 'dualball parameters' tells of each"
+    group = parser.add_argument_group("parameters", what)
     source = group.add_mutually_exclusive_group()
     source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
     source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
@@ -238,14 +253,14 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
         meta, option = field.metadata, f"--{field.name.replace('_', '-')}"
         text = meta["meaning"] + f", {meta['allowed']}".replace(", any", "")
         parse = Number(meta["unit"], meta["allowed"])
-        group.add_argument(option, dest=f"parameter_{field.name}", type=parse, help=text)
-    group.add_argument("--drag", dest="parameter_drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}")
+        group.add_argument(option, dest=f"{PREFIX}{field.name}", type=parse, help=text)
+    group.add_argument("--drag", dest=f"{PREFIX}drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}")
 
 
 def parameters(args: argparse.Namespace) -> Parameters:
     """The parameters that the options of `add_parameters` name."""
     chosen = Parameters.load(args.parameters) if args.parameters else Parameters.named(args.set)
-    p = chosen.replace(**given(args, [field.name for field in dataclasses.fields(Parameters)], "parameter_"))
+    p = chosen.replace(**given(args, [field.name for field in dataclasses.fields(Parameters)], PREFIX))
     if max(p.r, p.R) > _LARGE:
         print(f"dualball: warning: r = {p.r:g} m, R = {p.R:g} m: were millimetres meant?", file=sys.stderr)
     return p

@@ -1,4 +1,4 @@
-"""``dualball predict``: what theory says about one set of parameters."""
+"""``dualball predict``: what theory says about one set of parameters; ``parameters``: what a set is."""
 
 from __future__ import annotations
 
@@ -21,15 +21,37 @@ from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
 from compare.report import meter
 from model import Case, Parameters
-from model.drag import REYNOLDS, SCHILLER_NAUMANN
+from model.drag import LAWS, REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES
 
 
 def add(commands: options.Commands) -> None:
-    """Declare the command."""
+    """Declare the commands."""
+    command = options.command(commands, "parameters", catalogue, "--set steel-in-water")
+    options.add_parameters(command)
+    options.outputs(command)
+
     command = options.command(commands, "predict", run, "--set steel-in-water --omega-0 20")
     options.add_parameters(command)
     options.outputs(command, shown="print JSON instead of tables")
+
+
+def catalogue(args: argparse.Namespace) -> int:
+    """Show every parameter, with its value in the set that was asked for, and the names of all sets."""
+    p, rows = options.parameters(args), []
+    for field in Parameters.quantities():
+        meta, value = field.metadata, getattr(p, field.name)
+        allowed = str(meta["allowed"]).replace("any", "")
+        row = {"option": f"--{field.name.replace('_', '-')}", "symbol": meta["symbol"], "value": value}
+        rows.append({"name": field.name} | row | {"unit": meta["unit"], "range": allowed, "meaning": meta["meaning"]})
+    table = Table("option", "value", "unit", "range", "meaning", box=None)
+    for row in rows:
+        table.add_row(row["option"], f"{row['value']:.6g}", readable(row["unit"]), row["range"], row["meaning"])
+    table.add_row("--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}")
+    own = f"Values of {args.parameters or args.set}; other sets: {', '.join(Parameters.names())}."
+    toml = "A file of your own for --parameters: TOML, a line NAME = value each, named as in the options (omega_0)."
+    options.show({"parameters": rows, "drag": p.drag, "sets": Parameters.names()}, args.json, table, "", own, toml)
+    return 0
 
 
 def run(args: argparse.Namespace) -> int:

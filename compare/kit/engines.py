@@ -90,8 +90,8 @@ class Engine:
         """`configure`, but an option that belongs to other engines is an `InputError`."""
         for name in given:
             if name not in self.options:
-                others = ", ".join(each.name for each in ENGINES.values() if name in each.options)
-                raise InputError(f"--{name} is for {others}, not for {self.name}")
+                own = " and ".join(f"--{option}" for option in self.options)
+                raise InputError(f"--{name} is not for {self.name}, which takes {own}")
         return self.configure(given, p)
 
 

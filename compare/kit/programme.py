@@ -92,9 +92,8 @@ class Protocol:
         if (lab.beside and self.engine) or (limited and lab.refine not in lab.engine.refine[:steps]):
             return {}
         if lab.level > Level.QUICK:
-            asked = tuple(known)
-            if lab.beside:
-                asked = asked[: 1 if not self.plain else TWELVE] if limited else self.defaults
+            asked = self.defaults if lab.engine is NEWCOMER else tuple(known)
+            asked = asked[: 1 if not self.plain else TWELVE] if limited else asked
         return {name: p for name, p in known.items() if name in asked}
 
 

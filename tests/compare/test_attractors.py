@@ -21,7 +21,7 @@ HOPPING = Parameters.named("hopping")
 def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """JSON, and a page with a row for each set."""
     page = tmp_path / "page.md"
-    given = ["--set", "hopping", "--start", "omega_c=20", "--time", "1", "--vary", "omega_0=60,70", "--page", str(page)]
+    given = ["--set", "hopping", "--start", "omega_c=20", "--time", "1", "--vary", "omega_0=60,70", "-o", str(page)]
     assert main(["attractors", *given, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert [each["omega_0"] for each in data["sets"]] == [60, 70]

@@ -284,6 +284,16 @@ def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_exampl
     assert not lacking
 
 
+def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["parameters", "--mu", "0.31"]) == 0
+    shown = capsys.readouterr().out
+    for field in Parameters.quantities():
+        option = f"--{field.name.replace('_', '-')} "
+        assert option in shown
+        assert option not in parser_of("sweep").format_help().replace("--mu 0.3 --omega-0 25", "")
+    assert "0.31" in shown
+
+
 NUMBERS = ("x", "nan", "inf", "-1", "0", "1e300", "1e-300", "1" * 400)
 
 
@@ -361,8 +371,8 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("simulate --time 1e-9", "time = 1e-09 s is out of range: to hold a time step it must be >= 0.001"),
         ("simulate --sample-interval=1e-9", "sample_interval = 1e-09 s is out of range"),
         ("simulate -o run.csv", "'run.csv' would hold HDF5: its name must end in .h5"),
-        ("simulate --engine event --timestep 0.1", "drake-defaults, siconos, siconos-defaults, not for event"),
-        ("simulate --restitution 0.5", "--restitution is for event, time-stepping, not for mujoco"),
+        ("simulate --engine event --timestep 0.1", "--timestep is not for event, which takes --rtol and --restitution"),
+        ("simulate --restitution 0.5", "--restitution is not for mujoco, which takes --timestep"),
         ("simulate --engine event --restitution 1.5", "restitution = 1.5 is out of range"),
         ("simulate --flow broken.toml", "broken.toml, line 1: no column is called time; there are 'm', '='"),
         ("simulate --omega-0 5 --ramp 1 2 3", "--omega-0 is for a steady flow, and can't be given beside --ramp"),
@@ -391,9 +401,10 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
         ("predict --mu inf", "argument --mu: inf is out of range: it must be finite and >= 0"),
         ("basins --across y=0:1:2 --up y=0:1:3", "across and up are both y: a plane needs two state variables"),
-        ("basins --across y=0:1:2 --up h=0:99:2 -o new/map", "h = 99 m is out of range"),
+        ("basins --across y=0:1:2 --up h=0:99:2 --results new/map", "h = 99 m is out of range"),
         ("forecast a.xml -o card.md", "'card.md' would hold an HTML page: its name must end in .html or .htm"),
-        ("basins --across y=0:1:2 --up h=0:1:2 --save f.toml", "'f.toml' would hold JSON: its name must end in .json"),
+        ("compare a.h5 b.h5 -o x.png", "compare -o is --plot now"),
+        ("basins --across y=0:1:2 --up h=0:1:2 -o f.toml", "'f.toml' would hold JSON: its name must end in .json"),
         ("report", "no command 'report' any more: 'dualball judge'"),
         ("grade mine.xml", "league --settings FILE.xml"),
         ("serch", "no command 'serch'"),

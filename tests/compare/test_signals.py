@@ -25,7 +25,7 @@ LONG = {
     "figures": "--format svg --format png --format pdf",
     "simulate": "--omega-0 25 --time 2e4 -o new.h5",
     "inspect": "run.h5 --plot new.png",
-    "compare": "run.h5 run.h5 -o new.png",
+    "compare": "run.h5 run.h5 --plot new.png",
     "sweep": "--vary eta=0.1:0.5:20 --time 1e3 --workers 2",
     "collect": "runs -o new.h5",
     "attractors": "--set hopping --starts 1000",
