@@ -22,7 +22,7 @@ class Dart(Free):
     """As in `Free`."""
 
     TELLS = True
-    FEATURES = ("two bodies", "moving surface", "restitution", "tripod")
+    FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")
 
     def make(self) -> None:
         scene, bodies = self.scene, engine.dynamics
@@ -68,7 +68,10 @@ class Dart(Free):
             node.setInertia(bodies.Inertia(body.mass, np.zeros(3), np.diag(body.inertia)))
             size = np.array(body.size)
             for at in body.parts:
-                shape = bodies.BoxShape(2 * size) if body.shape == "box" else bodies.SphereShape(size[0])
+                if body.shape == "disc":
+                    shape = bodies.CylinderShape(size[0], 2 * size[1])
+                else:
+                    shape = bodies.BoxShape(2 * size) if body.shape == "box" else bodies.SphereShape(size[0])
                 self.add(skeleton, node, shape, friction, at)
             self.nodes.append(node)
 

@@ -15,7 +15,7 @@ from compare.adapters.free import CORNERS, Free, State
 from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector
 from model.arrays import Array
 
-FEATURES = ("two bodies", "moving surface", "dry joint", "tripod")
+FEATURES = ("two bodies", "moving surface", "dry joint", "tripod", "disc")
 _HEAVY = 1e6
 """Mass of a wall that moves divided by that of the body, which it doesn't feel."""
 _SOLIMP = 0.999

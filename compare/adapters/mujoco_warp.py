@@ -30,7 +30,7 @@ class Warp(mujoco_free.Bodies):
     PRECISION = "f32"
     TIMESTEPS = (4e-3, 2e-3)  # a step takes 5 ms, a thousand times MuJoCo's
 
-    FEATURES = ("moving surface", "tripod")
+    FEATURES = ("moving surface", "tripod", "disc")
 
     def __init__(self, name: str, declared: str, tune: Any = None) -> None:
         super().__init__(name, _WORST, tune=tune)

@@ -23,6 +23,7 @@ class PyBullet(Free):
     """As in `Free`."""
 
     TELLS = True
+    FEATURES = ("disc",)
     SCALE = 10.0
     """In the best settings its length unit in 1/m, since its tolerances are absolute lengths."""
     here: Mapping[str, int] = {}
@@ -48,10 +49,13 @@ class PyBullet(Free):
             engine.changeDynamics(self.wall, -1, lateralFriction=surface.friction, restitution=0, **here)
             self.turn(point, normal)  # boxes rock on a plane that isn't turned, but has another normal than z
         size = [each * self.scale for each in body.size]
-        kind = {"radius": size[0]} if body.shape == "sphere" else {"halfExtents": size}
-        shape = engine.createCollisionShape(
-            engine.GEOM_SPHERE if body.shape == "sphere" else engine.GEOM_BOX, **kind, **here
-        )
+        kinds: dict[str, tuple[int, dict[str, Any]]] = {
+            "sphere": (engine.GEOM_SPHERE, {"radius": size[0]}),
+            "box": (engine.GEOM_BOX, {"halfExtents": size}),
+            "disc": (engine.GEOM_CYLINDER, {"radius": size[0], "height": 2 * size[-1]}),
+        }
+        kind, given = kinds[body.shape]
+        shape = engine.createCollisionShape(kind, **given, **here)
         self.body = engine.createMultiBody(body.mass, shape, **here)
         free = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0, "maxJointVelocity": 1e9}
         inertia = [each * self.scale**2 for each in body.inertia]

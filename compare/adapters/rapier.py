@@ -24,7 +24,7 @@ class Rapier(Free):
     """As in `Free`."""
 
     PRECISION = "f32"
-    FEATURES = ("two bodies", "moving surface", "restitution", "tripod")
+    FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")
     RESOLUTION = 1e-4
     SMALL = 16
     """Small steps in one, in the best settings: the engine's own, but where a wall has to be placed before each."""
@@ -61,9 +61,13 @@ class Rapier(Free):
         for body, friction in zip(scene.bodies, (1.0, scene.between), strict=False):
             shapes: list[Any] = []
             for at in body.parts.tolist():
-                box, ball = engine.Collider.cuboid, engine.Collider.ball
-                shape = (box(*body.size) if body.shape == "box" else ball(body.size[0])).translation(at).density(0.0)
-                shape = shape.friction(friction).friction_combine_rule(multiply)
+                if body.shape == "disc":  # its axis is y
+                    shape = engine.Collider.cylinder(*body.size[::-1]).rotation((math.pi / 2, 0.0, 0.0))
+                elif body.shape == "box":
+                    shape = engine.Collider.cuboid(*body.size)
+                else:
+                    shape = engine.Collider.ball(body.size[0])
+                shape = shape.translation(at).density(0.0).friction(friction).friction_combine_rule(multiply)
                 shapes.append(shape.restitution(1.0).restitution_combine_rule(multiply))
             start = engine.Isometry3(body.position, engine.Quaternion(*body.orientation))
             moving = engine.RigidBody.dynamic().position(start).linvel(body.velocity).angvel(body.spin)

@@ -56,10 +56,10 @@ class Body:
     spin: Vector
     """Angular velocity, rad/s."""
     shape: str
-    """``sphere``, ``box`` or ``tripod``: three spheres that are joined, and stand."""
+    """``sphere``, ``box``, ``disc``, round its own z axis, or ``tripod``: three spheres that are joined, and stand."""
     size: tuple[float, ...]
-    """Radius; or the three half edges; or of a tripod's feet the radius, how far from the axis, and how far below the
-    centre they are, the first along x; m."""
+    """Radius; or the three half edges; or radius and half the thickness; or of a tripod's feet the radius, how far from
+    the axis, and how far below the centre they are, the first along x; m."""
     mass: float
     """kg"""
     inertia: Vector
@@ -142,6 +142,7 @@ class Scene:
             "restitution": any(surface.restitution for surface in self.surfaces),
             "dry joint": self.joint,
             "tripod": self.body.shape == "tripod",
+            "disc": self.body.shape == "disc",
         }
         return tuple(name for name, needed in asked.items() if needed)
 
@@ -173,7 +174,8 @@ class Scene:
             )
         for name, body in reversed([*zip(("body", "under"), self.bodies, strict=False)]):
             joint = f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>' if self.joint else ""
-            shape, size = ("sphere", body.size[:1]) if body.shape == "tripod" else (body.shape, body.size)
+            shape = {"tripod": "sphere", "disc": "cylinder"}.get(body.shape, body.shape)
+            size = body.size[:1] if body.shape == "tripod" else body.size
             geoms = [
                 f'<geom name="{name}{k or ""}" type="{shape}" size="{_text(size)}" pos="{_text(at)}" friction="0 0 0"/>'
                 for k, at in enumerate(body.parts)

@@ -54,7 +54,7 @@ class Case(Scene):
         alike = zip(*self.contacts, strict=True)
         if (
             "restitution" in self.needs
-            or "T" in self.contacts
+            or ("T" in self.contacts and self.body.shape == "box")
             or any("N" in letters and set(letters) != {"N"} for letters in alike)
         ):
             return "landing"
@@ -129,7 +129,10 @@ class Case(Scene):
 
 
 def reach(body: Body, normal: Array) -> Array:
-    """How far a body reaches from its centre against normals (n, 3), m; a box or a tripod as it stood at the start."""
+    """How far a body reaches from its centre against normals (n, 3), m; all but a sphere as they stood at the start."""
+    if body.shape == "disc":
+        along = np.abs(into(body.orientation, normal)[..., 2])
+        return np.asarray(body.size[0] * np.sqrt(np.maximum(1 - along**2, 0.0)) + body.size[1] * along)
     if body.shape == "box":
         return np.asarray(np.abs(into(body.orientation, normal)) @ np.array(body.size))
     return np.full(len(normal), body.size[0] + (body.size[2] if body.shape == "tripod" else 0.0))

@@ -1,4 +1,4 @@
-"""Exact cases of version 2: on feet, one body on another, on a belt, on a joint, on an edge, after a bounce.
+"""Exact cases of version 2: on feet, one body on another, on a belt, on a joint, on an edge or a rim, after a bounce.
 
 Like `compare.bench.one_contact`: courses are functions of time and of the constants that a wrong engine or theory would
 have otherwise. Those of the tripod and of what it stands on are quadratures, to 1e-12.
@@ -24,7 +24,7 @@ _Motion = tuple[Array, ...]
 
 def cases() -> tuple[Case, ...]:
     """All of them, in the order of their worth."""
-    return (_tripod(), *_stacks(), _belt(), _joint(), _rocking(), _bounce())
+    return (_tripod(), *_stacks(), _belt(), _joint(), _rocking(), _bounce(), _disc())
 
 
 def _tripod() -> Case:
@@ -287,4 +287,48 @@ def _bounce() -> Case:
         scales=(1.0, 6.0, 10.0),
         contacts=lambda t: "N",
         source="Newton's law of restitution, parabolas between",
+    )
+
+
+def _disc() -> Case:
+    mass, radius, thickness, lean, turning = 1.0, 0.2, 0.02, math.radians(80), 0.5
+    sin, cos = math.sin(lean), math.cos(lean)
+
+    def rolls(t: Array, ring: float = 0.5, half: float = thickness, share: float = 1.0) -> _Motion:
+        """Steady rolling on the rim, round a circle at the rate Omega, the disc's axis at `lean` from the vertical.
+
+        The lowest point of the rim is at c = (c_r, c_z) from the centre, outwards and up. With the spin s about the
+        axis it is at rest if the centre goes round at rho = (w_r c_z - w_z c_r)/Omega, w = (s sin, Omega + s cos).
+        Weight and the force -m Omega^2 rho turn the angular momentum: Omega L_r = -c_r m g - c_z m Omega^2 rho. That is
+        linear in s. `ring` is the polar moment divided by m radius^2; with `share` 0 L_r would count for nothing.
+        """
+        c_r, c_z = radius * cos - half * sin, -radius * sin - half * cos
+        across, about = mass * (radius**2 / 4 + half**2 / 3), ring * mass * radius**2
+        fixed, by_spin = -c_r, (sin * c_z - cos * c_r) / turning  # rho = fixed + by_spin s
+        gain = share * turning * about * sin + c_z * mass * turning**2 * by_spin
+        rest = share * turning**2 * sin * cos * (across - about) - c_r * mass * G - c_z * mass * turning**2 * fixed
+        s = rest / gain
+        rho, none = fixed + by_spin * s, 0 * t
+        out = np.stack([np.cos(turning * t), np.sin(turning * t), none], axis=1)
+        along = np.stack([-out[:, 1], out[:, 0], none], axis=1)
+        return rho * out - c_z * _UP, turning * rho * along, s * sin * out + (turning + s * cos) * _UP
+
+    across = mass * (radius**2 / 4 + thickness**2 / 3)
+    return closed(
+        "rolling-disc",
+        "a disc that leans rolls on its rim, round and round",
+        {
+            "shape": "disc",
+            "size": (radius, thickness),
+            "mass": mass,
+            "inertia": (across, across, mass * radius**2 / 2),
+            "orientation": (math.cos(lean / 2), 0.0, math.sin(lean / 2), 0.0),
+        },
+        (Surface("floor", 0.5),),
+        rolls,
+        {"inertia of a ring": {"ring": 1.0}, "no thickness": {"half": 0.0}, "no gyroscopic moment": {"share": 0.0}},
+        until=1.2,
+        scales=(2.0, 1.0, 5.0),
+        contacts=lambda t: "T",
+        source="balances of momentum and angular momentum in axes that go round with the disc",
     )

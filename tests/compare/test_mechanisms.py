@@ -167,7 +167,41 @@ def bouncing(case):
     return states
 
 
+def rolling_on_a_rim(case):
+    """All equations of a disc in space, its rim's lowest point at rest, with the force there from what keeps it so."""
+    body = case.body
+    radius, half = body.size
+
+    def to_rim(axis):  # from the centre to the lowest point of the lower rim
+        level = axis * axis[2] - [0.0, 0.0, 1.0]
+        return radius * level / np.linalg.norm(level) - half * axis
+
+    def rates(t, state):
+        quaternion, velocity, spin = state[3:7], state[7:10], state[10:]
+        axes = rotated(quaternion, np.eye(3)).T
+        inertia, axis = axes @ np.diag(body.inertia) @ axes.T, axes[:, 2]
+        c, tiny = to_rim(axis), 1e-6
+        turned = tiny * np.cross(spin, axis)
+        c_rate = (to_rim(axis + turned) - to_rim(axis - turned)) / (2 * tiny)
+        # a = -(alpha x c + spin x c'), force = m (a + g), inertia alpha + spin x inertia spin = c x force
+        cross = np.array([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])
+        up = np.array([0.0, 0.0, case.g])
+        right = np.cross(c, body.mass * (up - np.cross(spin, c_rate))) - np.cross(spin, inertia @ spin)
+        alpha = np.linalg.solve(inertia - body.mass * cross @ cross, right)
+        a = cross @ alpha - np.cross(spin, c_rate)
+        force = body.mass * (a + up)
+        assert np.hypot(*force[:2]) < case.surfaces[0].friction * force[2]
+        w, *along = quaternion
+        turning = 0.5 * np.array([-spin @ along, *(w * spin + np.cross(spin, along))])
+        return np.concatenate([velocity, turning, a, alpha])
+
+    start = np.concatenate([body.position, body.orientation, body.velocity, body.spin])
+    found = solve_ivp(rates, (0, case.times[-1]), start, t_eval=case.times, **SHARP).y.T
+    return np.concatenate([found[:, :3], found[:, 7:]], axis=1)
+
+
 WAYS = {
+    "rolling-disc": (rolling_on_a_rim, 1e-7),
     "tripod-turns": (tripod, 1e-9),
     "plank": (sliding, 1e-4),
     "thousandfold": (sliding, 1e-9),
