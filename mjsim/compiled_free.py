@@ -8,7 +8,7 @@ from typing import Any
 import numba
 from numba.extending import register_jitable
 
-from mjsim import compiled, corrections, free
+from mjsim import compiled, corrections, world_axes
 from mjsim.corrections import Ball
 from mjsim.coulomb import Coulomb
 from mjsim.coulomb import compiled as kernels
@@ -16,13 +16,20 @@ from mjsim.recorder import SENSORS, SLIPS
 from model.arrays import Array
 
 _driven, _spun, _against, _slip, _unwrapped = (
-    register_jitable(each) for each in (free.driven, free.spun, free.against, free.slip, free.unwrapped)
+    register_jitable(each)
+    for each in (
+        world_axes.driven,
+        world_axes.spun,
+        world_axes.against,
+        world_axes.slip,
+        world_axes.unwrapped,
+    )
 )
 _A_x, _A_y, _B_x, _B_y = (SLIPS - SENSORS).tolist()
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-@compiled.named_after(corrections, free, kernels)
+@compiled.named_after(corrections, world_axes, kernels)
 def _advance(
     m: int, d: int, head: int, ball: Any, ahead: float, fluid: Array,
     qpos: Array, qvel: Array, applied: Array, wall: Array, at: Array, sensors: Array, seen: Array, theta: float,

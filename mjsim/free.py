@@ -23,8 +23,9 @@ import numpy.typing as npt
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, followed, resistance
+from mjsim.corrections import Ball, followed
 from mjsim.coulomb import Coulomb
+from mjsim.world_axes import against, driven, slip, spun, unwrapped
 from model import Parameters, State
 from model.arrays import Array
 from model.kinematics import Motion, from_world, rotated, to_world
@@ -40,65 +41,6 @@ def loops() -> Callable[..., float] | None:
     except ImportError:
         return None
     return advance
-
-
-def driven(place: Any, turned: Any, velocity: Any, omega_0: float, ball: Ball) -> tuple[float, ...]:
-    """Drag (9) and the torque of the fluid on a free ball, N along the vessel's axes and N m along the ball's."""
-    x, y, v_x, v_y, v_z = place[0], place[1], velocity[0], velocity[1], velocity[2]
-    w, a, b, c = turned[0], turned[1], turned[2], turned[3]
-    w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
-    mc = resistance(w_x, w_y, v_z, ball)
-    upright = 2 * (a * c - w * b), 2 * (b * c + w * a), 1 - 2 * (a * a + b * b)  # the vessel's axis along the ball's
-    return (
-        -mc * w_x,
-        -mc * w_y,
-        -mc * v_z,
-        -ball.torque * (velocity[3] - omega_0 * upright[0]),
-        -ball.torque * (velocity[4] - omega_0 * upright[1]),
-        -ball.torque * (velocity[5] - omega_0 * upright[2]),
-    )
-
-
-def spun(turned: Any, velocity: Any) -> tuple[float, float, float]:
-    """Spin of a free ball along the vessel's axes, rad/s."""
-    w, a, b, c = turned[0], turned[1], turned[2], turned[3]
-    x, y, z = velocity[3], velocity[4], velocity[5]
-    return (
-        (1 - 2 * (b * b + c * c)) * x + 2 * (a * b - w * c) * y + 2 * (a * c + w * b) * z,
-        2 * (a * b + w * c) * x + (1 - 2 * (a * a + c * c)) * y + 2 * (b * c - w * a) * z,
-        2 * (a * c - w * b) * x + 2 * (b * c + w * a) * y + (1 - 2 * (a * a + b * b)) * z,
-    )
-
-
-def against(azimuth: float, velocity: Any, spin: Any, ahead: float, R: float, r: float) -> tuple[float, float]:
-    """Velocity of a plane inwards and upwards, m/s, at which what is at rest against it is so against the cylinder
-    `ahead` s later, when velocities are where the place is now.
-
-    By then the azimuth has grown by ahead Omega: of the velocity along the wall ahead Omega^2 R will point into it, and
-    where ball and wall touch the turning about the normal will show as ahead Omega r o_n of slip. A plane without that
-    velocity takes h Omega^2/2 of the ball's speed a second.
-    """
-    out_x, out_y = math.cos(azimuth), math.sin(azimuth)
-    rate = (out_x * velocity[1] - out_y * velocity[0]) / R
-    return ahead * rate * rate * R, -ahead * rate * r * (out_x * spin[0] + out_y * spin[1])
-
-
-def slip(place: Any, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tuple[float, float, float, float]:
-    """Velocities along floor (2) and wall (round, up) at the points of contact where the ball is `ahead` s before."""
-    x, y = place[0] - ahead * velocity[0], place[1] - ahead * velocity[1]
-    rho, r = math.hypot(x, y), ball.r
-    out_x, out_y = x / rho, y / rho
-    return (
-        velocity[0] - r * spin[1],
-        velocity[1] + r * spin[0],
-        out_x * velocity[1] - out_y * velocity[0] + r * spin[2],
-        velocity[2] + r * (spin[0] * out_y - spin[1] * out_x),
-    )
-
-
-def unwrapped(azimuth: float, last: float) -> float:
-    """The turn of an azimuth that is nearest to the last one; that one in a run that has diverged."""
-    return azimuth + math.tau * round((last - azimuth) / math.tau) if math.isfinite(azimuth) else last
 
 
 class Free:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compare.adapters.scene import FACETS, Scene, Surface, Vector
-from mjsim.free import against
+from mjsim.world_axes import against
 from model import InputError
 from model.arrays import Array
 from model.kinematics import tangent
