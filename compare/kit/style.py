@@ -50,6 +50,8 @@ SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
 THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
 FREE_0, FREE_C = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "$\\Omega_c = \\omega_c\\sqrt{R/g}$"
 FREE_X = "$\\omega_x^0\\sqrt{R/g}$"
+LONGEST_BAR = 0.1
+"""Longest half of an error bar, in parts of what is drawn along its axis."""
 LEAST = 1e-16
 """Smaller relative errors are drawn here: an error may be zero."""
 
@@ -98,6 +100,9 @@ def marks(states: Sequence[Measurement]) -> str:
     between = any(m.protocol == "edge" for m in states)
     said = " On the unstable SS: the edge between two motions, which the engine was made to follow." if between else ""
     said += f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the mark is larger."
+    most = max(abs(m.value) for m in states)
+    if any(COVERAGE * m.uncertainty > LONGEST_BAR * most for m in states):
+        said += f" Pale: known to no better than {LONGEST_BAR:.0%} of the axis, without a bar."
     if alone := dict.fromkeys(m.engine for m in states if ENGINES[m.engine].refine != (1,)):
         steps = sorted({500 * coarse_step(m.parameters) for m in states if m.engine in alone})
         at = " or ".join(f"{step:g}" for step in steps)
@@ -193,11 +198,20 @@ def points(
     way: str = "",
     **look: Any,
 ) -> None:
-    """Measured values, one `unit` each, by engine; capped bars of three standard uncertainties."""
+    """Measured values, one `unit` each, by engine; capped bars of three standard uncertainties, pale marks without."""
+    rows = list(rows)
+    for m in rows:
+        axes.update_datalim([(x(m), unit * y(m))])
+    longest = LONGEST_BAR * axes.dataLim.height
     for engine, own in by_engine(rows, lambda m: m.engine).items():
         usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
-        bars = [COVERAGE * unit * m.uncertainty for m in own]
-        axes.errorbar([x(m) for m in own], [unit * y(m) for m in own], bars, **mark_of(engine) | usual | look)
+        for pale in (False, True):
+            shown = [m for m in own if (COVERAGE * unit * m.uncertainty > longest) == pale]
+            bars = [math.nan if pale else COVERAGE * unit * m.uncertainty for m in shown]
+            faint: dict[str, Any] = {"alpha": 0.4} | ({"label": ""} if len(shown) < len(own) else {}) if pale else {}
+            places = [x(m) for m in shown], [unit * y(m) for m in shown]
+            if shown:
+                axes.errorbar(*places, bars, **mark_of(engine) | usual | faint | look)
 
 
 def legend(of: Axes | Figure, **where: Any) -> None:

@@ -22,7 +22,7 @@ from compare.commands import cli, validate
 from compare.gallery import FIGURES
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
-from compare.kit.pages import readable
+from compare.kit.pages import readable, typeset
 from compare.kit.record import Check, Missing, Records
 from compare.kit.workers import processes
 from compare.report import pictures, report, results, wording
@@ -106,8 +106,8 @@ def test_what_the_page_says(page: Path) -> None:
     assert not re.search(r'(?:src|href)="(?!#|data:|runs/|https://doi\.org)', text)
     assert "@import" not in text
     # Resolving power is given by quantity: 3e-9 and 1, divided by 12.
-    assert "a relative error of 3e-10 in ω_c" in good
-    assert "a relative error of 0.08 in ω_c" in coarse
+    assert "a relative error of 3e-10 in <i>ω</i><sub>c</sub>" in good
+    assert "a relative error of 0.08 in <i>ω</i><sub>c</sub>" in coarse
     # A refutation that was expected is not a failure.
     assert "Expected:" not in row(text, "doubted")
     assert "Expected: confirmed." in bad
@@ -151,7 +151,7 @@ def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page: Path) -> 
         for heading, found in wording.findings(verdict).items():
             assert f"{heading.lower()} {found}" in line
             assert f"<dt>{heading}</dt>" in row(text, verdict.claim.id)
-            assert found in row(text, verdict.claim.id)
+            assert html.unescape(typeset(found)) in row(text, verdict.claim.id)
     summary = validate.summary(VERDICTS).plain
     assert wording.headline(RAN) in summary
     assert wording.missing(RAN) in summary
@@ -427,3 +427,15 @@ def test_a_set_of_ones_own_may_leave_a_claim_open_and_the_studys_may_not(
 def test_an_error_as_large_as_the_number_would_not_be_noticed() -> None:
     said = wording.noticed({"omega_c": 1e-3, "force_Ay": 3e3})
     assert said == "a relative error of 0.001 in ω_c; none in A_y, which are too coarse"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("ω_c < A_z", "<i>ω</i><sub>c</sub> &lt; <i>A</i><sub>z</sub>"),
+        ("ω̃_x, ω₀", "<i>ω̃</i><sub>x</sub>, ω₀"),
+        ("slip_x of run_of(m)", "slip_x of run_of(m)"),
+    ],
+)
+def test_symbols_are_typeset_and_names_of_programs_are_not(text: str, shown: str) -> None:
+    assert typeset(text) == shown

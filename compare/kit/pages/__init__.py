@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -39,12 +40,24 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
     return "".join(shown), error.end
 
 
+def typeset(text: str) -> str:
+    """Text of a page with symbols such as ω_c or A_z as mathematics, in HTML; all else is escaped."""
+    import markupsafe  # comes with jinja2
+
+    escaped = str(markupsafe.escape(text))
+    shown = re.sub(
+        r"(?<![\w.])([A-Za-zΑ-ω]\u0303?)_([A-Za-z0-9]{1,3}(?:[⁰²])?)(?![\w(])", r"<i>\1</i><sub>\2</sub>", escaped
+    )
+    return markupsafe.Markup(shown)
+
+
 def render(package: str, template: str, **values: Any) -> str:
     """A template of a package, filled in; what is not marked safe is escaped, a value that is missing is an error."""
     import jinja2  # here, because the terminal has no pages
 
     loader = jinja2.ChoiceLoader([jinja2.PackageLoader(package), jinja2.PackageLoader("compare.kit.pages")])
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment.filters["typeset"] = typeset
     return environment.get_template(template).render(**values)
 
 
