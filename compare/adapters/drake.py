@@ -79,16 +79,23 @@ class Drake(Free):
         self.ball = self.wall = self.numbers(ball)
         self.put(self.ball, [*body.orientation, *body.position], [*body.spin, *body.velocity])
         for surface in moving:
-            turns = self.numbers(walls[surface.name])
-            self.put(turns, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, surface.turning, 0.0, 0.0, 0.0])
-            self.wall = turns if surface.radius else self.wall
+            if surface.turning:
+                turns = plant.GetJointByName(surface.name)
+                self.x[plant.num_positions() + turns.velocity_start()] = surface.turning
+            else:
+                self.wall = self.numbers(walls[surface.name])
 
     def heavy(self, surface: Surface) -> Any:
-        """A body that floats without gravity, for a surface that moves."""
-        own, turning = self.plant.AddModelInstance(surface.name), engine.UnitInertia(HEAVY, HEAVY, HEAVY)
-        inertia = engine.SpatialInertia(HEAVY * self.scene.body.mass, np.zeros(3), turning)
-        self.plant.set_gravity_enabled(own, False)
-        return self.plant.AddRigidBody(surface.name, own, inertia)
+        """A turntable on its hinge, or a body that floats without gravity, for a surface that moves."""
+        plant, own = self.plant, self.plant.AddModelInstance(surface.name)
+        plant.set_gravity_enabled(own, False)
+        mass = self.scene.body.mass * (1.0 if surface.turning else HEAVY)  # the engine's own stiffness is by mass
+        inertia = engine.SpatialInertia(mass, np.zeros(3), engine.UnitInertia(HEAVY, HEAVY, HEAVY))
+        body = plant.AddRigidBody(surface.name, own, inertia)
+        if surface.turning:
+            frames = plant.world_body().body_frame(), body.body_frame()
+            plant.AddJoint(engine.RevoluteJoint(surface.name, *frames, [0.0, 0.0, 1.0]))
+        return body
 
     def shapes(self) -> list[tuple[Any, Any]]:
         """The shape of the body; a box in the best settings is its corners."""
