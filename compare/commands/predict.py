@@ -110,7 +110,7 @@ def reading(p: Parameters) -> str:
 def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     """What `described` says of p: thresholds, solutions, the reading and what to mind, for the terminal.
 
-    Where the model is off for a real fluid that comes first, and the numbers have no more digits than it leaves.
+    Where the model is off for a real fluid that comes first, and the numbers have three digits.
     """
     off = data["model_error"]
 

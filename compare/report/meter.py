@@ -30,8 +30,8 @@ def doubts(off: float) -> list[str]:
         return []
     return [
         "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the fluid's torque on "
-        f"the spinning ball, changes its numbers by up to {off:.0%}, more than {real_fluid.LIMIT:.0%}: they are shown "
-        "with no more digits than that leaves."
+        f"the spinning ball, changes its numbers by up to {off:.0%}, more than {real_fluid.LIMIT:.0%}: all that "
+        "follows may be off by as much."
     ]
 
 
@@ -60,7 +60,10 @@ AT_WALLS = (
 
 
 def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
-    """A number with at most `most` digits, and none beyond the first that its relative error `off` makes uncertain."""
+    """A number with at most `most` digits, and beyond the third none that its relative error `off` makes uncertain.
+
+    With fewer than three what differs by half would look alike.
+    """
     if not math.isfinite(value):
         return _NONE
     left = most
@@ -68,7 +71,7 @@ def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
         return "0"
     if off:
         size = abs(value)
-        left = min(most, max(1, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1))
+        left = min(most, max(3, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1))
     return f"{float(f'{value:.{left}g}'):.{most}g}"
 
 

@@ -47,10 +47,10 @@ def test_design_as_json_and_as_a_page(tmp_path: Path, capsys: pytest.CaptureFixt
     assert made["thresholds"]["omega_03"]["lowest"] == pytest.approx(math.sqrt(p.g / (p.j * p.R)))
     assert "a ball not denser than the fluid floats" in made["refused"]["cork"]
     text = page.read_text("utf-8")
-    # The model is off by half of each number, which leaves few digits; what is chosen or given has all.
+    # The model is off by half of each number, which leaves three digits; what is chosen or given has all.
     assert made["model_holds"] is False
     assert text.index("hold for this fluid") < text.index("ω₀₂")
-    for shown in (f"{worst['omega_0']:.2g}", f"{values['eta']:.4g}", f"{2 * math.pi / 3:.4g}"):
+    for shown in (f"{worst['omega_0']:.3g}", f"{values['eta']:.4g}", f"{2 * math.pi / 3:.4g}"):
         assert shown in text
     assert text.count("<svg") == 3
     assert "cork can't be used" in text
@@ -64,7 +64,7 @@ def test_design_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     shown = " ".join(capsys.readouterr().out.split())
     assert "No meter within the bounds covers the flows up to 60 rad/s. Best: ball, r = 0.005 m, R = 0.02 m" in shown
     end = operating_range(Parameters.from_fluid(**METER["fluid"], r=0.005, R=0.02, rho_b=3000, mu=0.2, eta=0.2))
-    assert f"at worst ω₀ = {float(f'{end:.1g}'):g} rad/s, {end / 60:.1g} times the fastest flow" in shown
+    assert f"at worst ω₀ = {end:.3g} rad/s, {end / 60:.3g} times the fastest flow" in shown
     assert shown.startswith("Warning: the paper's model doesn't hold for this fluid.")
 
 
