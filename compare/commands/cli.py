@@ -53,7 +53,12 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
 }
 """The commands, as help groups them: the module of each, loaded for nothing else, and what it is for."""
-MOVED = {("compare", "-o"): "--plot", ("attractors", "--page"): "-o", ("basins", "--save"): "-o"}
+MOVED = {
+    ("compare", "-o"): "--plot",
+    ("compare", "--output"): "--plot",
+    ("attractors", "--page"): "-o",
+    ("basins", "--save"): "-o",
+}
 """Options of earlier versions by command, and what they are called now."""
 GONE = {
     "report": "'dualball judge' writes report.html anew, too",

@@ -153,7 +153,7 @@ def test_no_basins(changes, start, message, tmp_path):
 
 
 def test_command_basins(capsys, tmp_path):
-    to = ["--output", str(tmp_path), "--workers", "0"]
+    to = ["--results", str(tmp_path), "--workers", "0"]
     across = ["--omega-0", "40", "--across", "omega_c=5:45:2", "--up", "slip_x=0:1:2"]
     assert cli.main(["basins", *across, *to, "--json"]) == 0
     assert '"shares"' in capsys.readouterr().out

@@ -123,7 +123,7 @@ def test_two_runs_side_by_side(theory: Trajectory, tmp_path: Path, capsys: pytes
     storage.save(theory, a)
     storage.save(analytic.simulate(P.replace(omega_0=24.0), [0.0] * 6, 9.0), b)
     Path(partial).write_text("\n".join(f"{t} {w + 0.5}" for t, w in zip(theory.time, theory.omega_c, strict=True)))
-    assert cli.main(["compare", a, b, "-o", picture]) == 0
+    assert cli.main(["compare", a, b, "--plot", picture]) == 0
     assert Path(picture).stat().st_size > 10_000
     shown = capsys.readouterr().out
     assert all(text in shown for text in ("omega_0 = 25.0 in a, 24.0 in b", "RR 0.", "from 0 to 9 s", "force_Bx"))
