@@ -35,7 +35,6 @@ SCENES = {
     "cart": "cart with its wheels braked",
 }
 PYRAMIDAL = {"cone": mujoco.mjtCone.mjCONE_PYRAMIDAL}
-IMPLICIT = {"integrator": mujoco.mjtIntegrator.mjINT_IMPLICITFAST}
 SOFT: dict[str, Any] = {"law": {}}
 RIGID: dict[str, Any] = {"law": {"rigid": True}}
 PLAIN: dict[str, Any] = {}
@@ -52,6 +51,8 @@ WAYS: dict[str, dict[str, Any]] = {
 PILES, CHOSEN, BODIES, SETTLING, LAST = 100, 10, 18, 5.0, 1.0
 STILL, RISES = 1e-9, (1e-9, 1e-2)
 """Most that a body at rest moves in the last second, m; rises of energy that are counted, J."""
+SHORT = 5e-4
+"""A shorter time step than MuJoCo's own, s."""
 
 
 class Stepper(Protocol):
@@ -440,7 +441,7 @@ def settle(model: Any, stepper: Stepper) -> tuple[float, float]:
     for k in range(round((SETTLING + LAST) / 0.01)):
         if k == round(SETTLING / 0.01):
             place = data.xpos.copy()
-        stepper.step(data, 5)
+        stepper.step(data, round(0.01 / model.opt.timestep))
         if data.time > SETTLING / 2:
             mujoco.mj_energyVel(model, data)
             energy = data.energy[1] + G * float(model.body_mass @ data.xipos[:, 2])
@@ -458,18 +459,20 @@ def fallen(way: dict[str, Any], mixed: bool, seed: int) -> tuple[float, float]:
 
 def piles() -> Rows:
     """How many piles come to rest, and how energy rises."""
-    counted = [f"energy rises by more than {rise:.0e} J in" for rise in RISES]
-    rows = [["piles", "way", "at rest to 1e-9 m", "largest drift in a second: median, m", *counted, "by at most, J"]]
-    euler = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
-    implicit = {f"{name}, implicitfast": way | IMPLICIT for name, way in euler.items()}
-    tried: list[tuple[bool, dict[str, dict[str, Any]]]] = [(False, euler), (True, euler | implicit)]
-    for mixed, (name, way) in ((mixed, way) for mixed, ways in tried for way in ways.items()):
-        with ProcessPoolExecutor() as pool:
-            done = pool.map(functools.partial(fallen, way, mixed), range(PILES), chunksize=5)
-            drift, rise = np.transpose(list(done))
-        kind = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}"
-        rose = [str((rise > least).sum()) for least in RISES]
-        rows.append([kind, name, str((drift < STILL).sum()), f"{np.median(drift):.0e}", *rose, f"{rise.max():.0e}"])
+    rises = [f"energy rises by more than {rise:.0e} J in" for rise in RISES]
+    middle = ["by: median, J", "most but ten, J", "most, J"]
+    rows = [["piles", "way", "at rest to 1e-9 m", "largest drift in a second: median, m", *rises, *middle]]
+    ways: dict[str, dict[str, Any]] = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
+    shorter = {f"{name}, {1e3 * SHORT} ms": way | {"timestep": SHORT} for name, way in ways.items()}
+    for mixed, tried in ((False, ways), (True, ways | shorter)):
+        for name, way in tried.items():
+            with ProcessPoolExecutor() as pool:
+                done = pool.map(functools.partial(fallen, way, mixed), range(PILES), chunksize=5)
+                drift, rise = np.transpose(list(done))
+            kind = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}"
+            rose = [str((rise > least).sum()) for least in RISES]
+            quantiles = [f"{x:.0e}" for x in np.quantile(rise, (0.5, 1 - 10 / PILES, 1.0))]
+            rows.append([kind, name, str((drift < STILL).sum()), f"{np.median(drift):.0e}", *rose, *quantiles])
     return rows
 
 

@@ -61,11 +61,13 @@ def _layout(struct: str) -> type[ctypes.Structure]:
 _DATA = (
     "time", "ncon", "nefc", "ne", "nf", "warning", "geom_xpos", "geom_xmat", "contact", "efc_KBIP", "efc_R", "efc_D",
     "efc_diagA", "efc_vel", "efc_aref", "efc_frictionloss", "efc_J", "efc_J_rownnz", "efc_J_rowadr",
-    "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D", "qvel",
+    "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D", "qvel", "xpos", "xmat",
+    "crb", "cvel", "subtree_com", "qfrc_bias",
 )  # fmt: skip
 (
     TIME, NCON, NEFC, NE, NF, WARNING, XPOS, XMAT, CONTACT, KBIP, R, D, DIAG, VEL, AREF, LOSS, J, ROWNNZ,
-    ROWADR, COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D, QVEL,
+    ROWADR, COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D, QVEL, ORIGIN, AXES_OF,
+    INERTIA, SPIN, CENTRE, BIAS,
 ) = range(len(_DATA))  # fmt: skip
 _CONTACT = ("dist", "pos", "frame", "friction", "mu", "dim", "geom", "efc_address", "includemargin")
 DIST, POS, FRAME, FRICTION, MU, DIM, GEOM, ADDRESS, INCLUDE = range(len(_DATA), len(_DATA) + len(_CONTACT))
@@ -256,21 +258,24 @@ def _value(struct: int, name: int) -> float:
 
 # -- what a simulation remembers ---------------------------------------------------------------------------------------
 
-KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH, CHAINS = range(0, 22, 2)
+KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH, CHAINS, FREE = range(0, 24, 2)
 """Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their
 axes in those of both bodies, friction and regular friction (24); their places (4); rows (`ROW`); Jacobians and their
-columns; what dry friction bore; poses at which these were taken; a contact; contacts by their geoms (`_chain`)."""
-COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, TURNED, PENDING, RESETS, SOLVES = range(
-    22, 33
-)
-"""Counts: contacts now and before, rows, dry rows now and before, contacts and rows of the engine; whether contacts
-have their forces in the axes of bodies; whether forces are still to be found; resets by the engine; solutions."""
-MOMENT, LASTED, LEAST, CALLED = 33, 34, 35, 47
+columns; what dry friction bore; poses at which these were taken; a contact; contacts by their geoms (`_chain`); bodies
+that nothing joins to others (`law.free_bodies`)."""
+(
+    COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, COUNT_FREE, TURNED, PENDING, RESETS,
+    SOLVES,
+) = range(24, 36)  # fmt: skip
+"""Counts: contacts now and before, rows, dry rows now and before, contacts and rows of the engine, free bodies; whether
+contacts have their forces in the axes of bodies; whether forces are still to be found; resets by the engine; solutions.
+"""
+MOMENT, LASTED, LEAST, CALLED = range(36, 40)
 """Time and time step of the step under way, s; distance by which contacts must move for points to be put back, m; time
 of the last call, s."""
-RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED = range(36, 47)
+RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED = range(40, 51)
 """The numbers of a `law.Law`, in its order."""
-HEAD = 48
+HEAD = 51
 INDEX, FIRST, LENGTH, AT = range(4)
 """Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
 SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
@@ -358,6 +363,8 @@ def control(m: int, d: int, head: int) -> None:
             _find(m, d, head)
             _hand_on(m, d, head)
         _copy_rows(m, d, head)
+    if counts[COUNT_FREE]:
+        _gyrate(m, d, head)
     if counts[COUNT] + counts[COUNT_DRY] == 0:
         counts[PENDING] = 0
         return
@@ -683,6 +690,59 @@ def _hand_on(m: int, d: int, head: int) -> float:
         remembered = counts[DRY_BEFORE] == counts[COUNT_DRY]
         rows[ROW * (counts[COUNT_ROWS] + i) + MEMORY] = _block(head, DRY)[i] if remembered else 0.0
     return math.sqrt(moved / 2) if fewer else 0.0
+
+
+@compiled
+def _cross(a: Any, b: Any) -> Any:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def _dot(a: Any, b: Any) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@compiled
+def _sum(a: Any, x: float, b: Any) -> Any:
+    """a + x b."""
+    return a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
+
+
+@compiled
+def _gyrate(m: int, d: int, head: int) -> None:
+    """Gyroscopic forces on free bodies by the implicit midpoint rule, which keeps energy and the size of the angular
+    momentum; and such that the centre of mass keeps its velocity where it is not the body's origin."""
+    counts, h, bias = _int64(head), _value(m, STEP), _array(d, BIAS)
+    free, inertias, speeds = _int64(counts[FREE]), _array(d, INERTIA), _array(d, SPIN)
+    centres, origins, axes = _array(d, CENTRE), _array(d, ORIGIN), _array(d, AXES_OF)
+    for i in range(counts[COUNT_FREE]):
+        body, dof = free[2 * i], free[2 * i + 1]
+        b, c = 10 * body, 3 * body
+        mass, spin = inertias[b + 9], (speeds[6 * body], speeds[6 * body + 1], speeds[6 * body + 2])
+        arm = centres[c] - origins[c], centres[c + 1] - origins[c + 1], centres[c + 2] - origins[c + 2]
+        x = inertias[b], inertias[b + 3], inertias[b + 4]
+        y = inertias[b + 3], inertias[b + 1], inertias[b + 5]
+        z = inertias[b + 4], inertias[b + 5], inertias[b + 2]
+        volume, one, two, three = _dot(x, _cross(y, z)), _cross(y, z), _cross(z, x), _cross(x, y)
+        momentum = _dot(x, spin), _dot(y, spin), _dot(z, spin)
+        middle = spin
+        for _ in range(law.ITERATIONS):
+            turn = _sum((0.0, 0.0, 0.0), h / 2, middle)
+            size = _dot(turn, turn)
+            change = _sum(_cross(momentum, turn), -size, momentum)
+            change = _sum((0.0, 0.0, 0.0), 1 / (1 + size), _sum(change, _dot(turn, momentum), turn))
+            middle = _sum(spin, 1 / volume, (_dot(one, change), _dot(two, change), _dot(three, change)))
+        after = _sum(middle, 1.0, _sum(middle, -1.0, spin))
+        size, across = math.sqrt(_dot(after, after)) + 1e-300, _cross(after, arm)
+        turned = _sum(across, -1.0, across)
+        turned = _sum(turned, math.sin(h * size) / size / h, _cross(after, across))
+        turned = _sum(turned, (math.cos(h * size) - 1) / h, across)
+        force = _sum((0.0, 0.0, 0.0), mass, _sum(turned, -1.0, _cross(spin, _cross(spin, arm))))
+        moment = _sum(_sum(_cross(arm, force), -2 / h, change), -1.0, _cross(spin, momentum))
+        for j, push in enumerate(force):
+            bias[dof + j] += push
+            for k, twist in enumerate(moment):
+                bias[dof + 3 + j] += axes[9 * body + 3 * k + j] * twist
 
 
 @compiled
@@ -1152,8 +1212,12 @@ class Simulation:
         self._model, self._head, self._data = model, np.zeros(HEAD, np.int64), 0
         self._real = self._head.view(float)
         self.address = self._head.ctypes.data
-        self._real[RIGID:CALLED] = [float(value) for value in dataclasses.astuple(numbers)]
+        self._real[RIGID:HEAD] = [float(value) for value in dataclasses.astuple(numbers)]
         self._real[LEAST] = numbers.near * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
+        free = law.free_bodies(model) if numbers.rigid else np.empty((0, 2))
+        room(self.address, FREE, free.size)
+        self._head[COUNT_FREE] = len(free)
+        self._array(FREE, free.size).view(np.int64)[:] = free.ravel()
         self.reset()
         weakref.finalize(self, _free, self._head)
 

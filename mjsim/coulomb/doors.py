@@ -231,26 +231,26 @@ def _see_ahead(model: Any) -> None:
 
 
 def _damp_at_the_end(model: Any) -> None:
-    """Dampers, at the speed after a step, as inertia: h times their damping.
+    """Dampers, at the speed after a step, as inertia: h times their damping; the integrator becomes Euler's.
 
     That is what MuJoCo's integrators do, but only after contacts have been solved for, so that velocities are not those
     which contacts asked for. Of implicit integrators the dampers of joints, tendons and servos on them are kept.
     """
     option, euler, h = model.opt, mujoco.mjtIntegrator.mjINT_EULER, model.opt.timestep
-    implicit, inertia = option.integrator != euler, np.array(h * model.dof_damping)
-    if not implicit and option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
+    implicit = option.integrator != euler
+    if implicit or not option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
+        model.dof_armature += h * model.dof_damping
+    option.integrator = euler
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    if not implicit:
         return
-    tendons = h * model.tendon_damping * implicit
-    for k in np.flatnonzero(model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)).tolist() if implicit else []:
+    tendons = h * model.tendon_damping
+    for k in np.flatnonzero(model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)).tolist():
         servo = -h * model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
         kind, target = mujoco.mjtTrn(model.actuator_trntype[k]), model.actuator_trnid[k, 0]
         if kind == mujoco.mjtTrn.mjTRN_TENDON:
             tendons[target] += servo
         elif kind == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[target] >= int(mujoco.mjtJoint.mjJNT_SLIDE):
-            inertia[model.jnt_dofadr[target]] += servo
-    if inertia.any() or tendons.any():
-        model.dof_armature += inertia
-        if hasattr(model, "tendon_armature"):  # MuJoCo 3.3.0 has none
-            model.tendon_armature += tendons
-        option.integrator = euler
-        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+            model.dof_armature[model.jnt_dofadr[target]] += servo
+    if hasattr(model, "tendon_armature"):  # MuJoCo 3.3.0 has none
+        model.tendon_armature += tendons

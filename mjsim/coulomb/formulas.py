@@ -23,6 +23,7 @@ Whole = npt.NDArray[np.intp]
 _BAD = slice(mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQACC + 1)
 _ELLIPTIC, _PGS = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_PGS
 _DIAGONAL = "efc_diagA" if hasattr(mujoco.MjData, "efc_diagA") else "efc_diagApprox"
+_TINY = 1e-300
 _COLUMNS = np.array([2, 4, 1, 3, 5])
 """Where forces along the tangents, and moments about normal and tangents, stand in rows (axis; force, moment)."""
 
@@ -52,12 +53,36 @@ def _gravity(model: Any) -> float:
     return math.hypot(*model.opt.gravity.tolist()) or 9.81
 
 
+def _gyrate(model: Any, data: Any, free: Whole) -> None:
+    """Gyroscopic forces on free bodies by the implicit midpoint rule, which keeps energy and the size of the angular
+    momentum; and such that the centre of mass keeps its velocity where it is not the body's origin."""
+    body, h = free[:, 0], model.opt.timestep
+    mass, inertia = data.crb[body, 9:], data.crb[body][:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+    arm, spin = data.subtree_com[body] - data.xpos[body], data.cvel[body, :3]
+    momentum, mobility = np.einsum("nij,nj->ni", inertia, spin), np.linalg.inv(inertia)
+    middle = spin
+    for _ in range(law.ITERATIONS):
+        turn = h / 2 * middle
+        along = (turn * momentum).sum(1, keepdims=True)
+        change = (along * turn - np.cross(turn, momentum)) - (turn**2).sum(1, keepdims=True) * momentum
+        change /= 1 + (turn**2).sum(1, keepdims=True)
+        middle = spin + np.einsum("nij,nj->ni", mobility, change)
+    after = 2 * middle - spin
+    size, across = np.linalg.norm(after, axis=1, keepdims=True) + _TINY, np.cross(after, arm)
+    turned = np.sin(h * size) / size * np.cross(after, across) + (np.cos(h * size) - 1) * across
+    force = mass * (turned / h - np.cross(spin, np.cross(spin, arm)))
+    moment = np.cross(arm, force) - 2 * change / h - np.cross(spin, momentum)
+    axes = data.xmat[body].reshape(-1, 3, 3)
+    data.qfrc_bias[free[:, 1:] + range(6)] += np.hstack((force, np.einsum("nij,ni->nj", axes, moment)))
+
+
 class Simulation:
     """What one simulation remembers."""
 
     def __init__(self, model: Any, numbers: law.Law) -> None:
         self._law = numbers
         self._least = numbers.near * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
+        self._free = law.free_bodies(model) if numbers.rigid else np.empty((0, 2), int)
         self.reset()
 
     def reset(self) -> None:
@@ -124,6 +149,8 @@ class Simulation:
                 self._find(model, data, _poses(data))
                 self._hand_on(model, *before)
             self._copy_rows(model, data)
+        if len(self._free):
+            _gyrate(model, data, self._free)
         if not len(self._rows):
             self._pending, self._found = None, self._memory
             return

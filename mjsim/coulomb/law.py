@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,8 @@ APART = 1e9
 """Approach that a contact allows which is open, m s-2."""
 USUAL = 2e-3
 """MuJoCo's own time step, s."""
+ITERATIONS = 20
+"""Iterations of the implicit midpoint rule; each takes the angle of half a step, rad, from the error, as a factor."""
 CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
 
@@ -58,3 +61,10 @@ class Law:
     """Share of the larger radius up to which two points of contact count as one."""
     fixed: float = 1e-4
     """Share of the larger radius up to which a contact that has moved on its bodies is fixed on them."""
+
+
+def free_bodies(model: Any) -> npt.NDArray[np.int64]:
+    """Bodies that nothing joins to others, and the first degree of freedom of each, (n, 2)."""
+    last = model.jnt_dofadr[model.jnt_type == 0] + 5
+    alone = last[~np.isin(last, model.dof_parentid)]
+    return np.column_stack((model.dof_bodyid[alone], alone - 5)).astype(np.int64)

@@ -466,6 +466,35 @@ def test_never_more_energy(geom, velocity, rigid):
     assert np.mean(ours) <= np.mean(plain) + np.std(plain) + 1e-6
 
 
+@pytest.mark.parametrize("kind", ["capsule", "box", "cylinder"])
+@pytest.mark.parametrize("centre", ["0 0 0", ".1 .05 0"])
+def test_what_spins_keeps_its_energy(kind, centre):
+    """With rigid contacts: Euler's method alone takes the moment of the beginning of a step, and feeds it."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/>'
+        f'<geom type="{kind}" size=".02 .05 .03" pos="{centre}" quat="1 .3 .2 .1"/></body></worldbody></mujoco>'
+    )
+    law = Coulomb(model, rigid=True)
+
+    def after(step):
+        data = mujoco.MjData(model)
+        data.qvel[3:] = 1, 12, 60
+        found = []
+        for steps in (0, 600):
+            step(data, steps)
+            mujoco.mj_forward(model, data)
+            mujoco.mj_energyVel(model, data)
+            mujoco.mj_subtreeVel(model, data)
+            found.append((data.energy[1], np.linalg.norm(data.subtree_angmom[1]), data.subtree_linvel[1].copy()))
+        return found
+
+    (energy, momentum, velocity), (later, kept, then) = after(law.step)
+    assert (later, kept) == pytest.approx((energy, momentum), rel=1e-12)
+    assert then == pytest.approx(velocity, abs=1e-11)
+    (energy, *_), (later, *_) = after(lambda data, steps: mujoco.mj_step(model, data, steps))
+    assert later > 1.05 * energy
+
+
 @WAYS
 @pytest.mark.parametrize("seeds", [[3], pytest.param(range(20), marks=pytest.mark.slow)])
 def test_piles_come_to_rest(seeds, rigid):

@@ -48,6 +48,7 @@ SCENES = {
     "sparse": (boxes(11, apart=0.2, up=0.0), ".3 .005 .0001"),
     "stack": (STACK, ".6 .005 .0001"),
     "box": (boxes(1), ".6 .005 .0001"),
+    "off its centre": (boxes(1, geom='<geom type="capsule" size=".03 .05" pos=".02 .01 0" quat="1 .2 .3 0"/>'), ".6"),
 }
 
 
