@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import itertools
 import logging
-import math
 from typing import Any
 
 import numpy as np
 import pydrake.all as engine
 
 from compare.adapters.free import Free, State, Touch
-from compare.adapters.scene import Surface, Vector
+from compare.adapters.scene import Surface, Vector, facing
 from model.arrays import Array
 
 STIFFNESS, DISSIPATION, STICTION = 1e7, 100.0, 1e-8
@@ -30,7 +29,9 @@ STIFFNESS, DISSIPATION, STICTION = 1e7, 100.0, 1e-8
 reciprocal of the dissipation: with less it is thrown back, with more it stays sunk in for long. Where the wall is
 placed anew before each step a hundred times the stiffness makes the contact chatter, and TAMSI fail."""
 HEAVY = 1e6
-"""Mass of a surface that moves, divided by the body's; moment of inertia divided by mass, m2: nothing slows it."""
+"""Mass of a wall that moves, divided by the body's: nothing slows it."""
+ROUND = 1e6
+"""Moment of inertia of a surface that moves, divided by its mass, m2: nothing turns it."""
 SIZE = 100.0
 """Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
 
@@ -72,7 +73,7 @@ class Drake(Free):
         plant.Finalize()
         if self.best:
             plant.set_stiction_tolerance(STICTION)
-        self.diagram = builder.Build()
+        self.diagram = builder.Build()  # which, as its context, must outlive the plant's
         self.root = self.diagram.CreateDefaultContext()
         self.context = plant.GetMyMutableContextFromRoot(self.root)
         self.force, self.x = np.zeros(plant.num_velocities()), plant.GetPositionsAndVelocities(self.context)
@@ -90,7 +91,7 @@ class Drake(Free):
         plant, own = self.plant, self.plant.AddModelInstance(surface.name)
         plant.set_gravity_enabled(own, False)
         mass = self.scene.body.mass * (1.0 if surface.turning else HEAVY)  # the engine's own stiffness is by mass
-        inertia = engine.SpatialInertia(mass, np.zeros(3), engine.UnitInertia(HEAVY, HEAVY, HEAVY))
+        inertia = engine.SpatialInertia(mass, np.zeros(3), engine.UnitInertia(ROUND, ROUND, ROUND))
         body = plant.AddRigidBody(surface.name, own, inertia)
         if surface.turning:
             frames = plant.world_body().body_frame(), body.body_frame()
@@ -148,8 +149,7 @@ class Drake(Free):
         self.force[first + 3 : first + 6] = force
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        half = math.atan2(-normal[1], -normal[0]) / 2
-        self.put(self.wall, [math.cos(half), 0.0, 0.0, math.sin(half), *point], [0.0, 0.0, 0.0, *velocity])
+        self.put(self.wall, [*facing(normal), *point], [0.0, 0.0, 0.0, *velocity])
 
     def touches(self) -> list[Touch]:
         results = self.plant.get_contact_results_output_port().Eval(self.context)

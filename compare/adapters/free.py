@@ -102,7 +102,7 @@ class Free(ABC):
     def step(self, n: int) -> None:
         """Take n steps."""
         scene = self.scene
-        radii = [surface.radius for surface in scene.surfaces if self.best and surface.radius]
+        radii = [surface.radius or 0.0 for surface in scene.surfaces if self.moves(surface)]
         half, reach = self.timestep / 2, scene.body.size[0]
         for _ in range(n):
             if scene.forced or radii:

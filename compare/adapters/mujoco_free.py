@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 
 import mjsim
 from compare.adapters.free import CORNERS, Free, State
-from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector
+from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector, facing
 from model.arrays import Array
 
 FEATURES = ("two bodies", "moving surface", "dry joint", "tripod", "disc")
@@ -76,8 +75,8 @@ class Lawful(Bodies):
         self.law.step(self.data)
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        half, wall = math.atan2(-normal[1], -normal[0]) / 2, self.model.body("wall")
-        wall.pos, wall.quat = point, (math.cos(half), 0.0, 0.0, math.sin(half))
+        wall = self.model.body("wall")
+        wall.pos, wall.quat = point, facing(normal)
         self.data.qpos[-2:], self.data.qvel[-2:] = 0.0, (velocity @ normal, velocity[2])
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import rapier3d as engine
 
 from compare.adapters.free import CORNERS, Free, State
-from compare.adapters.scene import Scene, Vector
+from compare.adapters.scene import Scene, Vector, facing
 from model.arrays import Array
 
 
@@ -87,8 +87,8 @@ class Rapier(Free):
         body.add_force(force)
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        half, wall = math.atan2(-normal[1], -normal[0]) / 2, self.world.rigid_bodies[self.wall]
-        wall.position = engine.Isometry3(point.tolist(), engine.Quaternion(math.cos(half), 0.0, 0.0, math.sin(half)))
+        wall = self.world.rigid_bodies[self.wall]
+        wall.position = engine.Isometry3(point.tolist(), engine.Quaternion(*facing(normal)))
         wall.linvel = velocity.tolist()
 
 

@@ -213,6 +213,12 @@ def into(orientation: tuple[float, ...], vectors: Any) -> Array:
     return rotated(np.array([w, *(-a for a in axis)]), np.array(vectors))
 
 
+def facing(normal: Any) -> tuple[float, float, float, float]:
+    """The turn about z, a unit quaternion, that takes -x to a horizontal normal."""
+    half = math.atan2(-normal[1], -normal[0]) / 2
+    return math.cos(half), 0.0, 0.0, math.sin(half)
+
+
 def upright(normal: Any) -> tuple[float, float, float, float]:
     """The shortest turn, a unit quaternion, that takes z to a normal."""
     x, y, z = normal

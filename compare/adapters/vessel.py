@@ -35,6 +35,9 @@ _REACH = 1e-3
 """Gap, in radii, up to which a contact is closed by what is seen of the motion alone."""
 NOTED = 1024
 """Steps of which the cases are told at once."""
+_CARRIED = 5
+"""Numbers of a contact in a step's row, after the ball's nine: whether it carried anything, its force, N, its gap, m.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +51,13 @@ class Settings:
         check_number("timestep", self.timestep, "s", POSITIVE)
 
 
+def geometry(p: Parameters, x: State) -> dict[str, Any]:
+    """What a scene of the study's ball has, by its fields: the ball at azimuth zero, floor and wall, gravity."""
+    place, velocity, spin = (part.tolist() for part in to_world(x, 0.0, p))
+    body = Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3)
+    return {"body": body, "surfaces": (Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)), "g": p.g}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Vessel(Scene):
     """A ball in the study's vessel, with its law of drag and its flow."""
@@ -58,11 +68,8 @@ class Vessel(Scene):
     @classmethod
     def of(cls, p: Parameters, x: State, flow: Flow) -> Vessel:
         """Of parameters, and of a start at azimuth zero."""
-        place, velocity, spin = (part.tolist() for part in to_world(x, 0.0, p))
-        body = Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3)
-        surfaces = Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)
         ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
-        return cls(name="vessel", body=body, surfaces=surfaces, g=p.g, ball=ball, fluid=flow)
+        return cls(name="vessel", **geometry(p, x), ball=ball, fluid=flow)
 
     @property
     def forced(self) -> bool:
@@ -124,7 +131,7 @@ def simulate(
     limits.check_place(x, p, p.r / 10)
     total = (count - 1) * every + 1  # of the last sample only forces are needed
     done, told, failure, theta = 0, 0, "", 0.0
-    rows, kept = np.empty((NOTED, 9 + 2 * 5)), list[npt.NDArray[np.void]]()
+    rows, kept = np.empty((NOTED, 9 + 2 * _CARRIED)), list[npt.NDArray[np.void]]()
 
     def keep(first: int, last: bool) -> None:
         """Tell the cases of the steps in `rows`, and keep the samples among them."""
@@ -138,11 +145,14 @@ def simulate(
     with closing(library.load(member)) as engine:
         try:
             engine.build(Vessel.of(p, x, flow), h)
-            # A wall that moves along for a step is a cylinder to (Omega h)^2.
-            fastest = max(abs(x.omega_c), float(np.abs(flow(np.linspace(0.0, t_end, NOTED))).max()))
-            along = p.R * fastest * (fastest * h) ** 2 / 4
-            band = _Band(h, engine.AHEAD if engine.best else 0.0, engine.RESOLUTION + along)
-            classifier = Classifier([p], band)
+        except RuntimeError as error:
+            raise InputError(f"{name} can't build the vessel: {' '.join(str(error).split())[:80]}") from error
+        # A wall that moves along for a step is a cylinder to (Omega h)^2.
+        fastest = max(abs(x.omega_c), float(np.abs(flow(np.linspace(0.0, t_end, NOTED))).max()))
+        along = p.R * fastest * (fastest * h) ** 2 / 4
+        band = _Band(h, engine.ahead / h, engine.RESOLUTION + along)
+        classifier = Classifier([p], band)
+        try:
             while done < total:
                 row = rows[done % NOTED]
                 row[:9], row[9:] = np.concatenate(engine.state()), 0.0
@@ -178,11 +188,12 @@ def _step(engine: Free, row: Array) -> None:
     engine.step(1)
     if not all((np.abs(part) < _HUGE).all() for part in engine.read()):
         raise BreakdownError("diverged")
+    carried = row[9:].reshape(-1, _CARRIED)
     if not engine.TELLS:
-        row[10:13] = row[15:18] = np.nan
+        carried[:, 1:4] = np.nan
         return
     for contact, force, gap in engine.touches():
-        of = row[9 + 5 * contact :][:5]
+        of = carried[contact]
         of[4] = min(gap, of[4]) if of[0] else gap
         of[0], of[1:4] = 1.0, of[1:4] + force
 

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 import analytic
-from compare.adapters.scene import Body, Surface
+from compare.adapters.scene import Surface
+from compare.adapters.vessel import geometry
 from compare.bench import mechanisms, one_contact
 from compare.bench.case import TOLERANCE, VERSION, Case
 from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
@@ -168,12 +169,10 @@ def ball(
         return run(p.replace(**changed), 1e-9, restitution)[0]
 
     exact, motion = run(p, SHARP)
-    place, velocity, spin = (part.tolist() for part in to_world(x0, 0.0, p))
     return Case(
         name=name,
         about=f"a ball in a vessel: {about}",
-        body=Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3),
-        surfaces=(Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)),
+        **geometry(p, x0),
         times=motion.time[1:],
         exact=exact,
         contacts=tuple(case.name for case in motion.cases[1:]),
@@ -181,7 +180,6 @@ def ball(
         source=f"analytic.simulate, event-driven, rtol {SHARP:g}",
         scales=(p.R, p.R * omega_0, p.R * omega_0 / p.r),
         wrong={text: mistaken(**how) for text, how in wrong.items()},
-        g=p.g,
         drag=p.c,
         flow=omega_0,
         motion=(p, x0),
