@@ -258,24 +258,25 @@ def _value(struct: int, name: int) -> float:
 
 # -- what a simulation remembers ---------------------------------------------------------------------------------------
 
-KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH, CHAINS, FREE = range(0, 24, 2)
+KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH, CHAINS, FREE, SPINS = range(0, 26, 2)
 """Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their
 axes in those of both bodies, friction and regular friction (24); their places (4); rows (`ROW`); Jacobians and their
 columns; what dry friction bore; poses at which these were taken; a contact; contacts by their geoms (`_chain`); bodies
-that nothing joins to others (`law.free_bodies`)."""
+that nothing joins to others (`law.free_bodies`), and of each how much angular momentum other moments than gyroscopic
+ones gave it in the last step, in world axes, and the one that it would have without them now, in its own, N m s."""
 (
     COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, COUNT_FREE, TURNED, PENDING, RESETS,
     SOLVES,
-) = range(24, 36)  # fmt: skip
+) = range(26, 38)  # fmt: skip
 """Counts: contacts now and before, rows, dry rows now and before, contacts and rows of the engine, free bodies; whether
 contacts have their forces in the axes of bodies; whether forces are still to be found; resets by the engine; solutions.
 """
-MOMENT, LASTED, LEAST, CALLED = range(36, 40)
+MOMENT, LASTED, LEAST, CALLED = range(38, 42)
 """Time and time step of the step under way, s; distance by which contacts must move for points to be put back, m; time
 of the last call, s."""
-RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED = range(40, 51)
+RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED = range(42, 53)
 """The numbers of a `law.Law`, in its order."""
-HEAD = 51
+HEAD = 53
 INDEX, FIRST, LENGTH, AT = range(4)
 """Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
 SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
@@ -364,7 +365,7 @@ def control(m: int, d: int, head: int) -> None:
             _hand_on(m, d, head)
         _copy_rows(m, d, head)
     if counts[COUNT_FREE]:
-        _gyrate(m, d, head)
+        _gyrate(m, d, head, known, over)
     if counts[COUNT] + counts[COUNT_DRY] == 0:
         counts[PENDING] = 0
         return
@@ -709,15 +710,27 @@ def _sum(a: Any, x: float, b: Any) -> Any:
 
 
 @compiled
-def _gyrate(m: int, d: int, head: int) -> None:
-    """Gyroscopic forces on free bodies by the implicit midpoint rule, which keeps energy and the size of the angular
-    momentum; and such that the centre of mass keeps its velocity where it is not the body's origin."""
+def _rotated(a: Any, turn: Any) -> Any:
+    """A vector turned about an axis, by an angle as long as the axis, rad."""
+    square, across = _dot(turn, turn) + 1e-300, _cross(turn, a)
+    angle = math.sqrt(square)
+    return _sum(_sum(a, math.sin(angle) / angle, across), (1 - math.cos(angle)) / square, _cross(turn, across))
+
+
+@compiled
+def _gyrate(m: int, d: int, head: int, known: bool, over: bool) -> None:
+    """Gyroscopic forces on free bodies by the implicit midpoint rule, under the moments of the step before.
+
+    A body that turns freely keeps its energy and the size of its angular momentum; and its centre of mass keeps its
+    velocity where it is not the body's origin.
+    """
     counts, h, bias = _int64(head), _value(m, STEP), _array(d, BIAS)
-    free, inertias, speeds = _int64(counts[FREE]), _array(d, INERTIA), _array(d, SPIN)
-    centres, origins, axes = _array(d, CENTRE), _array(d, ORIGIN), _array(d, AXES_OF)
+    free, spins = _int64(counts[FREE]), _block(head, SPINS)
+    inertias, speeds, centres = _array(d, INERTIA), _array(d, SPIN), _array(d, CENTRE)
+    origins, axes = _array(d, ORIGIN), _array(d, AXES_OF)
     for i in range(counts[COUNT_FREE]):
-        body, dof = free[2 * i], free[2 * i + 1]
-        b, c = 10 * body, 3 * body
+        body, dof, twist, coasting = free[2 * i], free[2 * i + 1], 6 * i, 6 * i + 3
+        b, c, o = 10 * body, 3 * body, 9 * body
         mass, spin = inertias[b + 9], (speeds[6 * body], speeds[6 * body + 1], speeds[6 * body + 2])
         arm = centres[c] - origins[c], centres[c + 1] - origins[c + 1], centres[c + 2] - origins[c + 2]
         x = inertias[b], inertias[b + 3], inertias[b + 4]
@@ -725,24 +738,35 @@ def _gyrate(m: int, d: int, head: int) -> None:
         z = inertias[b + 4], inertias[b + 5], inertias[b + 2]
         volume, one, two, three = _dot(x, _cross(y, z)), _cross(y, z), _cross(z, x), _cross(x, y)
         momentum = _dot(x, spin), _dot(y, spin), _dot(z, spin)
-        middle = spin
+        pushed = spins[twist], spins[twist + 1], spins[twist + 2]
+        if not known:
+            pushed = 0.0, 0.0, 0.0
+        elif over:
+            was = spins[coasting], spins[coasting + 1], spins[coasting + 2]
+            u = axes[o], axes[o + 1], axes[o + 2]
+            v = axes[o + 3], axes[o + 4], axes[o + 5]
+            w = axes[o + 6], axes[o + 7], axes[o + 8]
+            gained = _sum(momentum, -1.0, (_dot(u, was), _dot(v, was), _dot(w, was)))
+            pushed = _rotated(gained, _sum((0.0, 0.0, 0.0), -h, spin))
+        half, middle, change = _sum(momentum, 0.5, pushed), spin, pushed
         for _ in range(law.ITERATIONS):
             turn = _sum((0.0, 0.0, 0.0), h / 2, middle)
             size = _dot(turn, turn)
-            change = _sum(_cross(momentum, turn), -size, momentum)
-            change = _sum((0.0, 0.0, 0.0), 1 / (1 + size), _sum(change, _dot(turn, momentum), turn))
+            change = _sum(_sum(_cross(half, turn), 0.5, pushed), -size, momentum)
+            change = _sum((0.0, 0.0, 0.0), 1 / (1 + size), _sum(change, _dot(turn, half), turn))
             middle = _sum(spin, 1 / volume, (_dot(one, change), _dot(two, change), _dot(three, change)))
-        after = _sum(middle, 1.0, _sum(middle, -1.0, spin))
-        size, across = math.sqrt(_dot(after, after)) + 1e-300, _cross(after, arm)
-        turned = _sum(across, -1.0, across)
-        turned = _sum(turned, math.sin(h * size) / size / h, _cross(after, across))
-        turned = _sum(turned, (math.cos(h * size) - 1) / h, across)
-        force = _sum((0.0, 0.0, 0.0), mass, _sum(turned, -1.0, _cross(spin, _cross(spin, arm))))
-        moment = _sum(_sum(_cross(arm, force), -2 / h, change), -1.0, _cross(spin, momentum))
-        for j, push in enumerate(force):
-            bias[dof + j] += push
-            for k, twist in enumerate(moment):
-                bias[dof + 3 + j] += axes[9 * body + 3 * k + j] * twist
+        change = _sum(change, 1.0, _sum(change, -1.0, pushed))
+        coasts, after = _sum(momentum, 1.0, change), _sum(middle, 1.0, _sum(middle, -1.0, spin))
+        across = _cross(after, arm)
+        swung = _sum(_rotated(across, _sum((0.0, 0.0, 0.0), h, after)), -1.0, across)
+        force = _sum(_sum((0.0, 0.0, 0.0), mass / h, swung), -mass, _cross(spin, _cross(spin, arm)))
+        moment = _sum(_sum(_cross(arm, force), -1 / h, change), -1.0, _cross(spin, momentum))
+        for j in range(3):
+            bias[dof + j] += force[j]
+            spins[twist + j], spins[coasting + j] = pushed[j], 0.0
+            for k in range(3):
+                bias[dof + 3 + j] += axes[o + 3 * k + j] * moment[k]
+                spins[coasting + j] += axes[o + 3 * k + j] * coasts[k]
 
 
 @compiled
@@ -1218,6 +1242,7 @@ class Simulation:
         room(self.address, FREE, free.size)
         self._head[COUNT_FREE] = len(free)
         self._array(FREE, free.size).view(np.int64)[:] = free.ravel()
+        room(self.address, SPINS, 6 * len(free))
         self.reset()
         weakref.finalize(self, _free, self._head)
 
@@ -1254,7 +1279,8 @@ class Simulation:
 
     def state(self) -> dict[str, Array]:
         if math.isnan(self._real[MOMENT]):
-            return {"contacts": np.empty((0, W)), "joints": np.empty(0), "time": np.full(2, math.nan)}
+            spins = np.zeros((self._head[COUNT_FREE], 6))
+            return {"contacts": np.empty((0, W)), "joints": np.empty(0), "spins": spins, "time": np.full(2, math.nan)}
         if self._head[PENDING]:
             retain(self._model._address, self._data, self.address)
         if not self._head[TURNED]:  # what goes on from here does as what is restored
@@ -1263,9 +1289,11 @@ class Simulation:
             self._head[TURNED], self._head[COUNT_FOUND] = 1, -1
         contacts = self._array(KEPT, W * self._head[COUNT]).reshape(-1, W)
         dry = self._array(DRY, self._head[COUNT_DRY])
-        return {"contacts": contacts.copy(), "joints": dry.copy(), "time": self._real[[MOMENT, LASTED]]}
+        spins, time = self._array(SPINS, 6 * self._head[COUNT_FREE]).reshape(-1, 6), self._real[[MOMENT, LASTED]]
+        return {"contacts": contacts.copy(), "joints": dry.copy(), "spins": spins.copy(), "time": time}
 
-    def restore(self, contacts: Array, joints: Array, time: Array) -> None:
+    def restore(self, contacts: Array, joints: Array, spins: Array, time: Array) -> None:
+        self._array(SPINS, spins.size)[:] = spins.ravel()
         for block, count, values in ((KEPT, COUNT, contacts), (DRY, COUNT_DRY, joints)):
             room(self.address, block, values.size)
             self._array(block, values.size)[:] = values.ravel()

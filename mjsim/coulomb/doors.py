@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from .law import WIDTH, Array, Law
+from .law import WIDTH, Array, Law, free_bodies
 
 try:
     from . import compiled as kernels
@@ -93,7 +93,8 @@ class Coulomb:
             simulation.reset()
 
     def state(self) -> dict[str, Array]:
-        """A copy of what is remembered: contacts, (n, `law.WIDTH`), friction of joints, time and time step, s."""
+        """A copy of what is remembered: contacts, (n, `law.WIDTH`), friction of joints, spins of free bodies with rigid
+        contacts, (m, 6), time and time step, s."""
         return self._own.state()
 
     def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
@@ -105,11 +106,14 @@ class Coulomb:
             If it isn't one.
         """
         try:
-            values = {name: np.array(state[name], float) for name in ("contacts", "joints", "time")}
+            values = {name: np.array(state[name], float) for name in ("contacts", "joints", "spins", "time")}
         except (KeyError, TypeError) as error:
             raise ValueError(f"not a state of Coulomb: {error}") from None
-        if values["contacts"].shape[1:] != (WIDTH,) or values["time"].shape != (2,):
-            raise ValueError(f"not a state of Coulomb: contacts of shape {values['contacts'].shape}, not (n, {WIDTH})")
+        free = len(free_bodies(self.model)) if self._law.rigid else 0
+        shapes = {"contacts": (values["contacts"].size // WIDTH, WIDTH), "spins": (free, 6), "time": (2,)}
+        for name, shape in shapes.items():
+            if values[name].shape != shape:
+                raise ValueError(f"not a state of Coulomb: {name} of shape {values[name].shape}, not {shape}")
         self._own.restore(**values)
 
     # -- steps of its own ----------------------------------------------------------------------------------------------

@@ -53,27 +53,12 @@ def _gravity(model: Any) -> float:
     return math.hypot(*model.opt.gravity.tolist()) or 9.81
 
 
-def _gyrate(model: Any, data: Any, free: Whole) -> None:
-    """Gyroscopic forces on free bodies by the implicit midpoint rule, which keeps energy and the size of the angular
-    momentum; and such that the centre of mass keeps its velocity where it is not the body's origin."""
-    body, h = free[:, 0], model.opt.timestep
-    mass, inertia = data.crb[body, 9:], data.crb[body][:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
-    arm, spin = data.subtree_com[body] - data.xpos[body], data.cvel[body, :3]
-    momentum, mobility = np.einsum("nij,nj->ni", inertia, spin), np.linalg.inv(inertia)
-    middle = spin
-    for _ in range(law.ITERATIONS):
-        turn = h / 2 * middle
-        along = (turn * momentum).sum(1, keepdims=True)
-        change = (along * turn - np.cross(turn, momentum)) - (turn**2).sum(1, keepdims=True) * momentum
-        change /= 1 + (turn**2).sum(1, keepdims=True)
-        middle = spin + np.einsum("nij,nj->ni", mobility, change)
-    after = 2 * middle - spin
-    size, across = np.linalg.norm(after, axis=1, keepdims=True) + _TINY, np.cross(after, arm)
-    turned = np.sin(h * size) / size * np.cross(after, across) + (np.cos(h * size) - 1) * across
-    force = mass * (turned / h - np.cross(spin, np.cross(spin, arm)))
-    moment = np.cross(arm, force) - 2 * change / h - np.cross(spin, momentum)
-    axes = data.xmat[body].reshape(-1, 3, 3)
-    data.qfrc_bias[free[:, 1:] + range(6)] += np.hstack((force, np.einsum("nij,ni->nj", axes, moment)))
+def _rotated(vectors: Array, turn: Array) -> Array:
+    """Vectors turned about axes, each by an angle as long as its axis, rad; all (n, 3)."""
+    angle = np.linalg.norm(turn, axis=1, keepdims=True) + _TINY
+    across = np.cross(turn, vectors) / angle
+    swung: Array = vectors + np.sin(angle) * across + (1 - np.cos(angle)) * np.cross(turn, across) / angle
+    return swung
 
 
 class Simulation:
@@ -86,9 +71,10 @@ class Simulation:
         self.reset()
 
     def reset(self) -> None:
-        self.restore(np.empty((0, law.WIDTH)), np.empty(0), np.full(2, math.nan))
+        self.restore(np.empty((0, law.WIDTH)), np.empty(0), np.zeros((len(self._free), 6)), np.full(2, math.nan))
 
-    def restore(self, contacts: Array, joints: Array, time: Array) -> None:
+    def restore(self, contacts: Array, joints: Array, spins: Array, time: Array) -> None:
+        self._twist, self._coasting = np.hsplit(spins, 2)
         self._kept, self._dry, (self._moment, self._lasted) = contacts.T.copy(), joints.copy(), time.tolist()
         self._called = self._moment
         self._turned, self._pending, self._resets = True, None, b""
@@ -104,7 +90,8 @@ class Simulation:
             self._carry_on(self._data)
             self._turned, self._counts = True, (-1, -1)
         time = np.array([self._moment, self._lasted])
-        return {"contacts": self._kept.T.copy(), "joints": self._dry.copy(), "time": time}
+        spins = np.hstack((self._twist, self._coasting))
+        return {"contacts": self._kept.T.copy(), "joints": self._dry.copy(), "spins": spins, "time": time}
 
     def serve(self, data: int) -> Simulation:
         """This, for the simulation at an address."""
@@ -150,7 +137,7 @@ class Simulation:
                 self._hand_on(model, *before)
             self._copy_rows(model, data)
         if len(self._free):
-            _gyrate(model, data, self._free)
+            self._gyrate(model, data, known, over)
         if not len(self._rows):
             self._pending, self._found = None, self._memory
             return
@@ -405,6 +392,35 @@ class Simulation:
         kept[law.LIFT] = lift = np.clip(kept[law.LIFT] - model.opt.timestep / self._law.servo * gap, 0.0, margin)
         spring = np.where((lift > 0) | (gap <= 0), stiffness[:, 0] * stiffness[:, 2] * (margin - lift), law.APART)
         self._reference[self._normals] -= spring[self._normals_of]
+
+    def _gyrate(self, model: Any, data: Any, known: bool, over: bool) -> None:
+        """Gyroscopic forces on free bodies by the implicit midpoint rule, under the moments of the step before.
+
+        A body that turns freely keeps its energy and the size of its angular momentum; and its centre of mass keeps its
+        velocity where it is not the body's origin.
+        """
+        (body, dof), h = self._free.T, model.opt.timestep
+        mass, inertia = data.crb[body, 9:], data.crb[body][:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+        arm, axes = data.subtree_com[body] - data.xpos[body], data.xmat[body].reshape(-1, 3, 3)
+        spin = data.cvel[body, :3]
+        momentum, mobility = np.einsum("nij,nj->ni", inertia, spin), np.linalg.inv(inertia)
+        if not known:
+            self._twist = np.zeros((len(body), 3))
+        elif over:
+            self._twist = _rotated(momentum - np.einsum("nij,nj->ni", axes, self._coasting), -h * spin)
+        pushed, middle = momentum + self._twist / 2, spin
+        for _ in range(law.ITERATIONS):
+            turn = h / 2 * middle
+            square, along = (turn**2).sum(1, keepdims=True), (turn * pushed).sum(1, keepdims=True)
+            change = (self._twist / 2 + along * turn - np.cross(turn, pushed) - square * momentum) / (1 + square)
+            middle = spin + np.einsum("nij,nj->ni", mobility, change)
+        change = 2 * change - self._twist
+        self._coasting = np.einsum("nij,ni->nj", axes, momentum + change)
+        after = 2 * middle - spin
+        across = np.cross(after, arm)
+        force = mass * ((_rotated(across, h * after) - across) / h - np.cross(spin, np.cross(spin, arm)))
+        moment = np.cross(arm, force) - change / h - np.cross(spin, momentum)
+        data.qfrc_bias[dof[:, None] + range(6)] += np.hstack((force, np.einsum("nij,ni->nj", axes, moment)))
 
     def _hold(self) -> None:
         """What memory adds: of soft contacts friction, of pyramids what differs from the mean."""

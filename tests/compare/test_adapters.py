@@ -30,6 +30,13 @@ def test_an_engine_reaches_its_order(name: str) -> None:
     assert run(CASES["lands"], f"{OWN}.{name}:defaults", steps=(2e-3,)).error < 2
 
 
+def test_what_spins_and_rolls_has_second_order() -> None:
+    """A disc on its rim, whose gyroscopic moments are as large as those of its contact (1.6e-2 without these)."""
+    coarse, fine = (run(CASES["rolling-disc"], f"{OWN}.mujoco_free:best", steps=(h,)).error for h in (4e-3, 2e-3))
+    assert coarse < 1e-3
+    assert coarse / fine > 3.5
+
+
 @pytest.mark.slow  # they compile for minutes where they haven't run before
 @pytest.mark.parametrize("engine", ["newton:xpbd", "mujoco_warp:best"])
 def test_engines_on_warp(engine: str) -> None:

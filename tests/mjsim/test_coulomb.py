@@ -315,7 +315,10 @@ def test_what_is_refused():
     with pytest.raises(ValueError, match="model is a MjData"):
         Coulomb(data)
     with pytest.raises(ValueError, match="not a state"):
-        Coulomb(model).restore({"contacts": np.zeros((1, 3)), "joints": [], "time": [0, 0]})
+        Coulomb(model).restore({"contacts": [], "joints": [], "time": [0, 0]})
+    for wrong in ({"contacts": np.zeros((1, 3))}, {"contacts": 0.0}, {"spins": np.zeros((1, 6))}, {"time": [0, 0, 0]}):
+        with pytest.raises(ValueError, match=f"not a state of Coulomb: {next(iter(wrong))} of shape"):
+            Coulomb(model).restore(Coulomb(model).state() | wrong)
     off = scene(option="/><option")[0]
     off.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
     with pytest.raises(ValueError, match="actuation is disabled"), Coulomb(off).installed():

@@ -82,7 +82,7 @@ def run(monkeypatch, form, model, law, steps, installed=False):
     return np.array(path), state
 
 
-def check_same(monkeypatch, make, law, steps=150, installed=False):
+def check_same(monkeypatch, make, law, steps=120, installed=False):
     (one, mine), (other, its) = (run(monkeypatch, form, make(), law, steps, installed) for form in (compiled, formulas))
     np.testing.assert_allclose(other[:40], one[:40], rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(other, one, rtol=1e-4, atol=1e-4)  # rounding grows as bodies tumble
