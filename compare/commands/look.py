@@ -38,17 +38,22 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "render", render, "run.h5 -o film.gif --from 1 --seconds 10")
     command.add_argument("file", type=Path, help="a run")
-    command.add_argument("-o", "--output", type=options.FILM, required=True, help="picture.png or film.gif")
+    command.add_argument("-o", "--output", type=options.FILM, required=True, help="picture.png, film.gif, or page.html")
     second, radii = options.Number("s", POSITIVE), options.Number("radii", NOT_NEGATIVE)
     for option, kind, usual, meaning in (
         ("width", options.Number(allowed=Range(160, 1920, whole=True)), None, "pixels (default: 960, of a film 640)"),
         ("at", options.moment, None, "time of a picture (default: the end)"),
-        ("from", options.moment, 0.0, "start of a film, in the time of the run"),
-        ("seconds", second, 6.0, "length of a film; shorter if the run ends before"),
-        ("speed", options.Number(allowed=Range(1e-3, 1e3)), 0.25, "speed of a film; 1 is real time"),
+        ("from", options.moment, 0.0, "start of a film or page, in the time of the run"),
+        ("seconds", second, None, "length of a film, at most (usually 6, of a page 60)"),
+        ("speed", options.Number(allowed=Range(1e-3, 1e3)), 0.25, "speed of a film or page; 1 is real time"),
         ("force-arrow", radii, 3.0, "length of the arrow of a force m g"),
         ("slip-arrow", radii, 3.0, "length of the arrow of the fastest slip"),
-        ("rate", options.Number(allowed=Range(1, 1000, whole=True)), 20, "frames a second"),
+        (
+            "rate",
+            options.Number(allowed=Range(1, 1000, whole=True)),
+            None,
+            "frames a second (default: 20, of a page 60)",
+        ),
     ):
         dest = "start" if option == "from" else option.replace("-", "_")
         command.add_argument(f"--{option}", dest=dest, type=kind, default=usual, help=meaning)
@@ -117,7 +122,7 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def render(args: argparse.Namespace) -> int:
-    """Draw a picture or a film."""
+    """Draw a picture, a film, or a page to look round in."""
     from compare.view import render  # here, because drawing takes a second to load
 
     names = ("at", "width", "start", "seconds", "speed", "rate", "force_arrow", "slip_arrow")

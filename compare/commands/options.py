@@ -121,7 +121,7 @@ JSON = Output("JSON", (".json",))
 MARKDOWN = Output("Markdown", (".md",))
 PAGE = Output("an HTML page", (".html", ".htm"))
 FIGURE = Output("a figure", (".png", ".svg", ".pdf"))
-FILM = Output("a picture or a film", (".png", ".gif"))
+FILM = Output("a picture, a film or a page", (".png", ".gif", ".html"))
 SUFFIXES = {suffix for each in (HDF5, JSON, MARKDOWN, PAGE, FIGURE, FILM) for suffix in each.suffixes}
 """Names of files end in these."""
 

@@ -23,7 +23,7 @@ from analytic.bifurcation.diagram import Exists
 from compare.branches import ends, slipping_curve
 from compare.kit.style import COLOURS, FORCE
 from compare.subjects.thresholds.figures import TINTS
-from compare.view.render import orientations
+from compare.view.geometry import orientations
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
 from model.kinematics import frame, to_world
 

@@ -7,7 +7,6 @@ with the angular velocity it has, from an arbitrary beginning.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import importlib
 import io
@@ -27,24 +26,22 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from mujoco.rendering.classic import gl_context
 from PIL import Image, ImageDraw, ImageFont
-from scipy.spatial.transform import Rotation
 
 from compare.kit import style
 from compare.kit.style import BALL, FORCE, INK, SLIP
+from compare.view import page
+from compare.view.geometry import ARROW, STEP, geometry, resampled
 from mjsim import ContactSettings, scene
 from model import Case, InputError, Trajectory
 from model.arrays import Array
 from model.files import check_writable, write_bytes
-from model.kinematics import frame, slip_velocities, to_world
+from model.kinematics import to_world
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
-from model.trajectory import columns
 
+MOST_FRAMES = 8000
+"""Frames of a film or page, of which a page then is smaller than 3 MB."""
 WIDTHS = Range(160, 1920)
 """Of pictures, pixels."""
-TRAIL_STEP = 5e-3
-"""Longest time between points of the trail and of the rotation, s."""
-ARROW = 3.0
-"""Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball, unless said."""
 OFFSCREEN = ("egl", "osmesa")
 """Kinds of OpenGL that need no display, the faster first."""
 _HIDDEN = 5
@@ -65,31 +62,33 @@ def write(
     at: float | None = None,
     width: int | None = None,
     start: float = 0.0,
-    seconds: float = 6.0,
+    seconds: float | None = None,
     speed: float = 0.25,
-    rate: int = 20,
+    rate: int | None = None,
     **arrows: Any,
 ) -> str:
-    """Write a picture (png) or a film (gif), as the name of the file says, in 16:10; return in words what was written.
+    """Write a picture (png), a film (gif), both in 16:10, or a page (html); return in words what was written.
 
     Parameters
     ----------
     at : the time of a picture, s; the end for None
     width : pixels; 960 for a picture and 640 for a film if None
-    start, seconds, speed, rate : a film begins at `start` in s, is slowed down by `speed`, has `rate` frames a second,
-        and takes so many seconds, fewer if the run ends before
+    start, seconds, speed, rate : a film or page begins at `start` in s, is slowed down by `speed`, has `rate` frames a
+        second, and takes so many seconds, fewer if the run ends before; 6 s at 20 frames a second, of a page 60 s at 60
     arrows : `force_arrow` and `slip_arrow` of `frames`
 
     Raises `InputError` for what can't be shown, or on a machine without OpenGL; `StorageError` if the file can't be
     written.
     """
     kind = output.suffix.lower()
-    if kind not in (".png", ".gif"):
-        raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif")
+    if kind not in (".png", ".gif", ".html"):
+        raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif, a page to look round in an .html")
     check_writable(output)
     if len(run.time) == 0:
         raise InputError("the run has no samples to show")
-    film, end = kind == ".gif", float(run.time[-1])
+    film, end = kind != ".png", float(run.time[-1])
+    usual = (60.0, 60) if kind == ".html" else (6.0, 20)
+    seconds, rate = usual[0] if seconds is None else seconds, usual[1] if rate is None else rate
     name, begin, width = ("from", start, width or 640) if film else ("time", end if at is None else at, width or 960)
     check_number(name, begin, "s", Range(float(run.time[0]), end), "to be within the run it")
     check_number("width", width, "pixels", WIDTHS)
@@ -97,7 +96,15 @@ def write(
         check_number(name, value, unit, POSITIVE)
     for name, radii in arrows.items():
         check_number(name, radii, "radii", NOT_NEGATIVE)
-    times = np.arange(begin, min(begin + seconds * speed, end) + 1e-12, speed / rate) if film else np.array([begin])
+    step, until = speed / rate, min(begin + seconds * speed, end)
+    if film and (until - begin) / step > MOST_FRAMES:
+        raise InputError(
+            f"{(until - begin) / step:.4g} frames are more than {MOST_FRAMES}: choose fewer seconds, or a lower rate"
+        )
+    times = np.arange(begin, until + 1e-12, step) if film else np.array([begin])
+    if kind == ".html":
+        write_bytes(output, page.write(run, times, speed, **arrows).encode())
+        return f"{output}: {len(times)} frames"
     shown, note = resampled(run, times), f"× {speed:.3g}" if film else ""
     slips = bool(np.any(run.slip_speed_A + run.slip_speed_B))
     pairs = frames(run, times, width, **arrows)
@@ -166,23 +173,13 @@ def frames(
     Raises `InputError` if there is no OpenGL, or the run holds no scene with a ball.
     """
     p, now = run.header.parameters, resampled(run, times)
-    steps = max(1, math.ceil((run.time[-1] - run.time[0]) / TRAIL_STEP))
-    past = resampled(run, np.linspace(run.time[0], run.time[-1], steps + 1))
-    turns = orientations(past)[np.searchsorted(past.time, times).clip(max=steps)]
-    centres, axes = to_world(now.x, now.theta, p).position, frame(now.theta)
-    # Of floor and wall, (2, n, 3) in world axes: normals, contact points, forces, slips in the tangent plane.
-    normals = np.stack([axes[:, 1], axes[:, 0]])
-    contacts = centres - p.r * normals
-    forces, slips = (
-        np.einsum("nab,cna->cnb", axes, v) for v in ([now.force_A, now.force_B], slip_velocities(now.x, p))
-    )
-    slips -= np.sum(slips * normals, axis=-1, keepdims=True) * normals
-    fastest = max(float(np.abs(v).max()) for v in slip_velocities(run.x, p))
+    seen = geometry(run, now, force_arrow, slip_arrow)
+    past = seen.past
 
     height = width * 10 // 16
     inset = height * 5 // 12
     model = _model(run, 2 * width, 2 * height)
-    data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / TRAIL_STEP)
+    data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / STEP)
     mujoco.mj_forward(model, data)
     choose_opengl()
     above, behind = mujoco.MjvCamera(), mujoco.MjvCamera()
@@ -193,8 +190,8 @@ def frames(
         mujoco.Renderer(model, 2 * height, 2 * width, most) as outside,
         mujoco.Renderer(model, 2 * inset, 2 * inset, most) as beside,
     ):
-        for k, centre in enumerate(centres):
-            data.geom_xpos[ball], data.geom_xmat[ball] = centre, turns[k].as_matrix().ravel()
+        for k, centre in enumerate(seen.centres):
+            data.geom_xpos[ball], data.geom_xmat[ball] = centre, seen.turns[k].as_matrix().ravel()
             # From behind the ball and a little inwards, so that floor and wall are both seen edge-on.
             behind.lookat, behind.azimuth = centre, math.degrees(now.theta[k]) + 78.0
             outside.update_scene(data, above)
@@ -210,15 +207,13 @@ def frames(
                     mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[i], points[i + 1])
             arrows = []
             for normal, contact, force, slip in zip(
-                normals[:, k], contacts[:, k], forces[:, k], slips[:, k], strict=True
+                seen.normals[:, k], seen.contacts[:, k], seen.forces[:, k], seen.slips[:, k], strict=True
             ):
-                arrows.append((0.16 * p.r, contact, force * (force_arrow * p.r / (p.m * p.g)), FORCE))
-                if fastest > 0 and np.any(force):
-                    begin = contact + 0.1 * p.r * normal
-                    arrows.append((0.13 * p.r, begin, slip * (slip_arrow * p.r / fastest), SLIP))
+                arrows.append((0.16 * p.r, contact, force, FORCE))
+                arrows.append((0.13 * p.r, contact + 0.1 * p.r * normal, slip, SLIP))
             images = []
             for renderer in (outside, beside):
-                for spot in turns[k].apply(_SPOTS):
+                for spot in seen.turns[k].apply(_SPOTS):
                     geom = _add(renderer.scene, mujoco.mjtGeom.mjGEOM_SPHERE, "#8a6d1f")
                     geom.size[:], geom.pos[:] = 0.11 * p.r, centre + 0.95 * p.r * spot
                 for thick, begin, arrow, colour in arrows:
@@ -278,30 +273,6 @@ def _model(run: Trajectory, width: int, height: int) -> Any:
     glass = {"rgba": (0.45, 0.65, 0.80, 0.22), "contype": 0, "conaffinity": 0}
     made.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
     return made.compile()
-
-
-def resampled(run: Trajectory, times: Array) -> Trajectory:
-    """The run at times (n,) in s, interpolated linearly; the case is that of the last sample before."""
-    place = np.interp(times, run.time, np.arange(len(run.time)))
-    before = place.astype(int)
-    after, share = np.minimum(before + 1, len(run.time) - 1), place - before
-
-    def at(values: Array) -> Array:
-        change = values[after] - values[before]
-        return np.asarray(values[before] + change * share.reshape(-1, *[1] * (values.ndim - 1)))
-
-    values: dict[str, Any] = {name: at(getattr(run, name)) for name in columns(Trajectory) if name != "case"}
-    return dataclasses.replace(run, **values, case=run.case[before])
-
-
-def orientations(run: Trajectory) -> Rotation:
-    """How the ball is turned at each sample, from its angular velocity in the middle between them; upright at first."""
-    middle = resampled(run, (run.time[1:] + run.time[:-1]) / 2)
-    spin = to_world(middle.x, middle.theta, run.header.parameters).spin
-    turned = [Rotation.identity()]
-    for step in Rotation.from_rotvec(spin * np.diff(run.time)[:, None]):
-        turned.append(step * turned[-1])
-    return Rotation.concatenate(turned)
 
 
 @functools.cache

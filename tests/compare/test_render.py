@@ -12,9 +12,10 @@ import analytic
 import mjsim
 from compare.commands import cli
 from compare.kit import style
-from compare.view import render
+from compare.view import geometry, render
 from model import Case, InputError, Parameters, Trajectory, storage
 from model.kinematics import angular_velocity
+from tests.compare.test_report import BROWSER
 
 WIDTH = 320
 
@@ -78,18 +79,55 @@ def test_command_writes_pictures_and_films(run: Trajectory, tmp_path: Path, caps
     assert "320 × 200" in capsys.readouterr().out
 
 
+def test_a_page_plays_in_a_browser_without_network(run: Trajectory, tmp_path: Path) -> None:
+    """Frames, numbers and the case follow the slider; nothing is fetched, nothing fails."""
+    pytest.importorskip("nicegui")
+    sync = pytest.importorskip("playwright.sync_api")
+    if BROWSER is None:
+        pytest.skip("there is no browser")
+    file = tmp_path / "run.html"
+    assert render.write(run, file, start=0.1, speed=0.5, rate=50).endswith(": 71 frames")  # ends of 0.7 s of the run
+    assert file.stat().st_size < 3e6
+    with sync.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--enable-unsafe-swiftshader"])
+        page, wrong, fetched = browser.new_page(), list[str](), list[str]()
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda request: fetched.append(request.url))
+        page.goto(file.as_uri())
+        page.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
+        for k, time in ((0, 0.1), (70, 0.8)):
+            page.locator("#place").fill(str(k))
+            page.wait_for_function(f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')")
+            now = geometry.resampled(run, np.array([time]))
+            assert page.locator("#case").inner_text() == Case(now.case[0]).name
+            assert f"ω_c = {now.omega_c[0]:.2f} rad/s" in page.locator("#numbers").inner_text()
+        assert page.locator("#play").inner_text() == "Play"
+        browser.close()
+    assert not wrong
+    assert [url for url in fetched if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_a_page_without_what_it_needs(run: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=r"1\.6e\+04 frames are more than 8000: choose fewer seconds, or a lower rate"):
+        render.write(run, tmp_path / "run.html", speed=0.05, rate=1000)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'"):
+        render.write(run, tmp_path / "run.html", rate=10)
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None:
     """Rolling steadily, about an axis that itself goes round: the mean turn about z is that of o_y."""
     p, x = reference.replace(omega_0=5.0), np.array([0, 0, 5.0, 0, 0, 0])
     run = mjsim.simulate(p, x, 0.05, sample_interval=0.005)
-    rotations = render.orientations(run)
+    rotations = geometry.orientations(run)
     step = (rotations[1] * rotations[0].inv()).magnitude() / (run.time[1] - run.time[0])
     # The rotation vector over a step is that of its middle, exact to the second order.
     assert step == pytest.approx(float(np.linalg.norm(angular_velocity(x, p))), rel=(5.0 * 5e-3) ** 2)
 
 
 def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
-    between = render.resampled(run, np.array([0.104, 0.8]))
+    between = geometry.resampled(run, np.array([0.104, 0.8]))
     assert between.omega_c == pytest.approx([0.6 * run.omega_c[10] + 0.4 * run.omega_c[11], run.omega_c[-1]])
     assert between.force_A[1] == pytest.approx(run.force_A[-1])
     assert between.case.tolist() == [run.case[10], run.case[-1]]
@@ -98,7 +136,7 @@ def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("film.mp4", {}, r"cannot write film\.mp4: a picture is a \.png, a film a \.gif"),
+        ("film.mp4", {}, r"cannot write film\.mp4: a picture is a \.png, a film a \.gif, a page"),
         ("nowhere/p.png", {}, "there is no directory nowhere"),
         ("p.png", {"at": 9.0}, r"time = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$"),
         ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
