@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import socket
+import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 from model.errors import StorageError
 
 _SUFFIX = ".part"
-_HOST = socket.gethostname().replace(".", "-")
+_HOST = platform.node().replace(".", "-")
 _under_way: set[Path] = set()
 """Temporary files of this process."""
 

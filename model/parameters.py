@@ -8,7 +8,6 @@ import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from importlib import resources
 from pathlib import Path
 from typing import Any, Self
 
@@ -18,7 +17,7 @@ from model import drag as laws
 from model.errors import InputError, StorageError, suggestion
 from model.files import write_text
 
-_SETS = resources.files("model") / "parameter_sets"
+_SETS = Path(__file__).parent / "parameter_sets"
 
 
 @dataclass(frozen=True)
@@ -234,7 +233,7 @@ class Parameters:
     @staticmethod
     def names() -> list[str]:
         """Names of the sets that come with the package."""
-        return sorted(entry.name.removesuffix(".toml") for entry in _SETS.iterdir() if entry.name.endswith(".toml"))
+        return sorted(path.stem for path in _SETS.glob("*.toml"))
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

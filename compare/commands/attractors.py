@@ -30,13 +30,13 @@ from model.kinematics import UNITS, VARIABLES
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(commands, "attractors", run, "--set hopping --starts 10")
+    command = options.command(commands, "attractors", run, "--set hopping --random 10")
     options.add_parameters(command)
     running.add_engine(command)
     command.set_defaults(engine=EVENT)
     running.add_start(command)
-    unless, most = "random starts, unless one is given by --start", "how long to follow a run at most"
-    command.add_argument("--starts", type=options.count, default=20, help=unless)
+    unless, most = "N random starts, unless one is given by --start", "how long to follow a run at most"
+    command.add_argument("--random", type=options.count, default=20, help=unless)
     command.add_argument("--seed", type=options.seed, default=0, help="seed of the random starts")
     command.add_argument("--time", type=options.seconds, help=f"{most} (default {LASTING:g}/c)")
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     """Find the attractors of every set of parameters, and show them."""
     axes, ways = map(Axis.several, (args.vary, args.follow))
     ranges = {way.name: way.ends for way in ways}
-    starts = np.array([running.start(args)]) if args.start else args.starts
+    starts = np.array([running.start(args)]) if args.start else args.random
 
     def simulate(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
         return carry_out([running.task(args, p, x0=State.of(x0), t_end=duration, sample_interval=interval)])[0]

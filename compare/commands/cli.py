@@ -44,7 +44,6 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "design": ("design", "the best meter for a fluid and a range of flows, within bounds"),
         "render": ("look", "a picture or film of a run: the scene, contact forces, slip, case"),
         "explore": ("look", "a page on this machine to play with: theory as sliders move, the motion in 3-D"),
-        "view": ("look", "the ball in MuJoCo's viewer, driven by the study's own loop"),
     },
     "contacts and engines": {
         "forecast": ("bench", "what the contacts of a MuJoCo model will do: depth, creep, hovering, largest step"),
@@ -54,15 +53,22 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
 }
 """The commands, as help groups them: the module of each, loaded for nothing else, and what it is for."""
 MOVED = {
-    ("compare", "-o"): "--plot",
-    ("compare", "--output"): "--plot",
-    ("attractors", "--page"): "-o",
-    ("basins", "--save"): "-o",
+    "compare -o": "--plot",
+    "compare --output": "--plot",
+    "attractors --page": "-o",
+    "attractors --starts": "--random",
+    "basins --save": "-o",
+    "sweep --hold": "--time",
+    "render --from": "--at",
+    "render --seconds": "--time",
+    "render --force-arrow": "--arrows FORCE SLIP",
+    "render --slip-arrow": "--arrows FORCE SLIP",
 }
 """Options of earlier versions by command, and what they are called now."""
 GONE = {
     "report": "'dualball judge' writes report.html anew, too",
     "search": "it is 'python -m docs.studies.search' in a clone",
+    "view": "'dualball simulate --view' opens the viewer, 'dualball explore' a page with the motion in 3-D",
     "grade": "'dualball league --settings FILE.xml' puts settings on the exact cases, 'dualball forecast' any model",
 }
 """Commands of earlier versions, and what to use now."""
@@ -130,7 +136,8 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
     words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in argv]
     words = [re.sub(r"^--[\w-]+", lambda option: option[0].replace("_", "-"), word) for word in words]
-    _parser(words).parse_args(words or ["--help"], args)
+    words = words or ["--help"]
+    _parser(words).parse_args(words, args)
     args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
     with options.no_empty_directories(args), signals.raised():
         return int(args.run(args))
@@ -147,20 +154,22 @@ def _parser(words: Sequence[str]) -> options.Parser:
     parser.add_argument("--version", action="version", version=f"dualball {version('dualball')}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS)
     known = {name: about for group in GROUPS.values() for name, about in group.items()}
-    if words and words[0] == "--print-completion":
+    if words[0] == "--print-completion":
         _complete(parser, commands, words[1:])
-    for word in words:
-        if renamed := MOVED.get((words[0], word)):
-            raise InputError(f"{words[0]} {word} is {renamed} now")
-    if words and words[0] in known:
+    for old in (f"{words[0]} {word.partition('=')[0]}" for word in words):
+        if old in MOVED:
+            raise InputError(f"{old} is {MOVED[old]} now")
+    if words[0] in known:
         module, what = known[words[0]]
         importlib.import_module(f"compare.commands.{module}").add(commands)
         commands.choices[words[0]].description = what
         return parser
-    if words and words[0] in GONE:
+    if words[0] in GONE:
         raise InputError(f"there is no command {words[0]!r} any more: {GONE[words[0]]}")
-    if words and not words[0].startswith("-"):
+    if not words[0].startswith("-"):
         raise InputError(f"there is no command {words[0]!r}{suggestion(words[0], known)}; see 'dualball --help'")
+    if words[0] not in ("-h", "--help", "--version"):
+        raise InputError(f"there is no option {words[0]!r}{suggestion(words[0], ['--help', '--version'])}")
     listed = []
     for title, group in GROUPS.items():
         listed.append(f"\n{title.capitalize()}:")

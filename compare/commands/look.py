@@ -1,16 +1,15 @@
-"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; ``view``, a live ball, and ``explore``."""
+"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``explore``, what theory says."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from compare.commands import options, running
+from compare.commands import options
 from compare.kit import collection, drawing
 from compare.view import inspection
-from mjsim import ContactSettings
-from model import Flow, InputError, storage
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range
+from model import InputError, storage
+from model.parameters import NOT_NEGATIVE, Range
 
 
 def add(commands: options.Commands) -> None:
@@ -36,18 +35,14 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--plot", type=options.FIGURE, help="draw both: png, svg or pdf (default: don't)")
     options.outputs(command)
 
-    command = options.command(commands, "render", render, "run.h5 -o film.gif --from 1 --seconds 10")
+    command = options.command(commands, "render", render, "run.h5 -o film.gif --at 1 --time 10")
     command.add_argument("file", type=Path, help="a run")
     command.add_argument("-o", "--output", type=options.FILM, required=True, help="picture.png, film.gif, or page.html")
-    second, radii = options.Number("s", POSITIVE), options.Number("radii", NOT_NEGATIVE)
     for option, kind, usual, meaning in (
         ("width", options.Number(allowed=Range(160, 1920, whole=True)), None, "pixels (default: 960, of a film 640)"),
-        ("at", options.moment, None, "time of a picture (default: the end)"),
-        ("from", options.moment, 0.0, "start of a film or page, in the time of the run"),
-        ("seconds", second, None, "length of a film, at most (usually 6, of a page 60)"),
-        ("speed", options.Number(allowed=Range(1e-3, 1e3)), 0.25, "speed of a film or page; 1 is real time"),
-        ("force-arrow", radii, 3.0, "length of the arrow of a force m g"),
-        ("slip-arrow", radii, 3.0, "length of the arrow of the fastest slip"),
+        ("at", options.moment, None, "time of the run: of a picture (default: the end), where a film or page begins"),
+        ("time", options.seconds, None, "duration of a film, at most (default: 6, of a page 60)"),
+        ("speed", options.speed, 0.25, "speed of a film or page; 1 is real time"),
         (
             "rate",
             options.Number(allowed=Range(1, 1000, whole=True)),
@@ -55,15 +50,10 @@ def add(commands: options.Commands) -> None:
             "frames a second (default: 20, of a page 60)",
         ),
     ):
-        dest = "start" if option == "from" else option.replace("-", "_")
-        command.add_argument(f"--{option}", dest=dest, type=kind, default=usual, help=meaning)
-
-    command = options.command(commands, "view", view, "--omega-0 25 --speed 0.5")
-    options.add_parameters(command)
-    running.add_flow(command)
-    running.add_start(command)
-    command.add_argument("--timestep", type=options.seconds, help="time step (default: that of the study)")
-    command.add_argument("--speed", type=options.Number(allowed=Range(1e-3, 1e3)), default=1.0, help="1 is real time")
+        command.add_argument(f"--{option}", type=kind, default=usual, help=meaning)
+    radii, names = options.Number("radii", NOT_NEGATIVE), ("FORCE", "SLIP")
+    lengths = "lengths of the arrows of a force m g and of the fastest slip (default 3 3)"
+    command.add_argument("--arrows", nargs=2, type=radii, default=(3.0, 3.0), metavar=names, help=lengths)
 
     command = options.command(commands, "explore", explore, "--set hopping --port 8081")
     options.add_parameters(command)
@@ -125,18 +115,9 @@ def render(args: argparse.Namespace) -> int:
     """Draw a picture, a film, or a page to look round in."""
     from compare.view import render  # here, because drawing takes a second to load
 
-    names = ("at", "width", "start", "seconds", "speed", "rate", "force_arrow", "slip_arrow")
-    print(render.write(storage.load(args.file), args.output, **{name: getattr(args, name) for name in names}))
-    return 0
-
-
-def view(args: argparse.Namespace) -> int:
-    """Open the viewer."""
-    from compare.view import viewer  # here, because nothing else needs it
-
-    p = options.parameters(args)
-    settings = ContactSettings.for_problem(p, **options.given(args, ["timestep"]))
-    viewer.view(p, running.start(args), running.flow(args) or Flow.steady(p.omega_0), settings, args.speed)
+    asked = {name: getattr(args, name) for name in ("at", "time", "width", "speed", "rate")}
+    force, slip = args.arrows
+    print(render.write(storage.load(args.file), args.output, **asked, force_arrow=force, slip_arrow=slip))
     return 0
 
 

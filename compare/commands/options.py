@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from compare.kit.pages import readable
 from model import InputError, Parameters, drag
+from model.errors import suggestion
 from model.files import check_writable
 from model.parameters import ANY, NOT_NEGATIVE, Range
 
@@ -27,7 +28,13 @@ Commands = Any
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises `InputError`, one line, where argparse would print the usage and exit, and for an output that is read."""
+    """Raises `InputError`, one line, where argparse would print the usage and exit, and for an output that is read.
+
+    Options are written in full.
+    """
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(allow_abbrev=False, **given)
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message}; see '{self.prog} --help'")
@@ -35,6 +42,11 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, *given: Any) -> tuple[argparse.Namespace, list[str]]:  # type: ignore[override]
         """As argparse does; no output may be a file that another argument names, or a link to one."""
         found, rest = super().parse_known_args(*given)
+        for word in rest:
+            if word.startswith("-"):
+                option = word.partition("=")[0]
+                self.error(f"there is no option {option!r}{suggestion(option, self._option_string_actions)}")
+            self.error(f"{word!r} is one argument too many")
         for action in (each for each in self._actions if isinstance(each.type, Output)):
             output: Path | None = getattr(found, action.dest, None)
             others = (value for name, value in vars(found).items() if name != action.dest)
@@ -93,6 +105,8 @@ seed = Number(allowed=Range(0, 2**32, whole=True))
 seconds = Number("s", Range(1e-9, 1e9))
 """A duration, or a time step."""
 moment = Number("s", NOT_NEGATIVE)
+speed = Number(allowed=Range(1e-3, 1e3))
+"""Of what is shown: times real time."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,12 @@ from compare.commands import options, running, signals
 from compare.kit import campaign, collection, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.view import inspection
+from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, storage
 from model.files import reading_json, write_text
+
+DURATION = 10.0
+"""Of a run, s, unless asked otherwise."""
 
 
 def add(commands: options.Commands) -> None:
@@ -25,9 +29,12 @@ def add(commands: options.Commands) -> None:
     options.add_parameters(command)
     running.add_flow(command)
     running.add_start(command)
-    command.add_argument("--time", type=options.seconds, default=10.0, help="duration")
+    command.add_argument("--time", type=options.seconds, help=f"duration (default {DURATION:g})")
     running.add_samples(command)
     command.add_argument("-o", "--output", type=options.HDF5, help="HDF5 file to write (default: none)")
+    live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
+    command.add_argument("--view", action="store_true", help=live)
+    command.add_argument("--speed", type=options.speed, help="speed of --view (default 1, real time)")
     options.outputs(command, shown="print the description as JSON")
 
     command = options.command(commands, "sweep", grid, "--vary omega_0=10:30:21")
@@ -38,9 +45,9 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--seed", type=options.seed, default=0, help="seed of the points of --random")
     ways, meaning = ("held", "up", "down", "both"), "held: a run for each point; else one run, omega_0 in steps"
     command.add_argument("--direction", choices=ways, default="held", help=meaning)
-    command.add_argument("--hold", type=options.seconds, default=20.0, help="time at each step")
     running.add_engine(command)
-    command.add_argument("--time", type=options.seconds, default=30.0, help="duration of a run that is held")
+    lasts = "duration of a run that is held, and else of each step"
+    command.add_argument("--time", type=options.seconds, default=30.0, help=lasts)
     running.add_samples(command)
     means = "store what each run settles to, for collect, and not its samples"
     command.add_argument("--means-only", action="store_true", help=means)
@@ -56,6 +63,11 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
+    if args.view:
+        return live(args)
+    if args.speed:
+        raise InputError("--speed is for --view")
+    args.time = args.time or DURATION
     task = running.task(args, options.parameters(args), flow=running.flow(args))
     heard: list[int] = []  # the first signal ends the run with its samples, the second without
     with tempfile.TemporaryDirectory() as scratch, signals.answered(heard.append):
@@ -75,12 +87,27 @@ def run(args: argparse.Namespace) -> int:
         return 128 + heard[0] if heard else 1 if failure else 0
 
 
+def live(args: argparse.Namespace) -> int:
+    """Open the viewer."""
+    from compare.view import viewer  # here, because nothing else needs it
+
+    for name in ("output", "time", "sample_interval"):
+        if getattr(args, name):
+            raise InputError(f"--view keeps nothing and ends with its window: it goes without --{name}")
+    p = options.parameters(args)
+    settings = running.settings(args, p)
+    if not isinstance(settings, ContactSettings):
+        raise InputError(f"--view shows MuJoCo, not {args.engine.name}")
+    viewer.view(p, running.start(args), running.flow(args) or Flow.steady(p.omega_0), settings, args.speed or 1.0)
+    return 0
+
+
 def grid(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
     p, axes = options.parameters(args), sweep.Axis.several(args.vary)
     if args.direction != "held":
         omegas = sweep.levels(axes, args.direction)
-        flow, lasts = Flow.staircase(omegas, args.hold), args.hold * len(omegas)
+        flow, lasts = Flow.staircase(omegas, args.time), args.time * len(omegas)
         tasks = [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
     else:
         sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
@@ -103,7 +130,7 @@ def grid(args: argparse.Namespace) -> int:
 
 def _keep_apart(args: argparse.Namespace, p: Parameters) -> None:
     """Raise `InputError` if the directory holds another sweep, with which `collect` would mix this one."""
-    names = ("vary", "random", "seed", "direction", "hold", "start", "time", "timestep", "rtol", "restitution",
+    names = ("vary", "random", "seed", "direction", "start", "time", "timestep", "rtol", "restitution",
              "sample_interval", "means_only")  # fmt: skip
     asked = {name: getattr(args, name) for name in names} | {"engine": args.engine.name} | dataclasses.asdict(p)
     if (path := args.output / "sweep.json").exists():

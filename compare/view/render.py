@@ -61,8 +61,7 @@ def write(
     output: Path,
     at: float | None = None,
     width: int | None = None,
-    start: float = 0.0,
-    seconds: float | None = None,
+    time: float | None = None,
     speed: float = 0.25,
     rate: int | None = None,
     **arrows: Any,
@@ -71,10 +70,10 @@ def write(
 
     Parameters
     ----------
-    at : the time of a picture, s; the end for None
+    at : the time of a picture, the end for None; where a film or page begins, 0 for None; s
     width : pixels; 960 for a picture and 640 for a film if None
-    start, seconds, speed, rate : a film or page begins at `start` in s, is slowed down by `speed`, has `rate` frames a
-        second, and takes so many seconds, fewer if the run ends before; 6 s at 20 frames a second, of a page 60 s at 60
+    time, speed, rate : a film or page is slowed down by `speed`, has `rate` frames a second, and takes `time` in s,
+        less if the run ends before; 6 s at 20 frames a second, of a page 60 s at 60
     arrows : `force_arrow` and `slip_arrow` of `frames`
 
     Raises `InputError` for what can't be shown, or on a machine without OpenGL; `StorageError` if the file can't be
@@ -88,18 +87,18 @@ def write(
         raise InputError("the run has no samples to show")
     film, end = kind != ".png", float(run.time[-1])
     usual = (60.0, 60) if kind == ".html" else (6.0, 20)
-    seconds, rate = usual[0] if seconds is None else seconds, usual[1] if rate is None else rate
-    name, begin, width = ("from", start, width or 640) if film else ("time", end if at is None else at, width or 960)
-    check_number(name, begin, "s", Range(float(run.time[0]), end), "to be within the run it")
+    lasts, rate = usual[0] if time is None else time, usual[1] if rate is None else rate
+    begin, width = (0.0 if film else end) if at is None else at, width or (640 if film else 960)
+    check_number("at", begin, "s", Range(float(run.time[0]), end), "to be within the run it")
     check_number("width", width, "pixels", WIDTHS)
-    for name, value, unit in (("seconds", seconds, "s"), ("speed", speed, "1"), ("rate", rate, "s-1")):
+    for name, value, unit in (("time", lasts, "s"), ("speed", speed, "1"), ("rate", rate, "s-1")):
         check_number(name, value, unit, POSITIVE)
     for name, radii in arrows.items():
         check_number(name, radii, "radii", NOT_NEGATIVE)
-    step, until = speed / rate, min(begin + seconds * speed, end)
+    step, until = speed / rate, min(begin + lasts * speed, end)
     if film and (until - begin) / step > MOST_FRAMES:
         raise InputError(
-            f"{(until - begin) / step:.4g} frames are more than {MOST_FRAMES}: choose fewer seconds, or a lower rate"
+            f"{(until - begin) / step:.4g} frames are more than {MOST_FRAMES}: choose a shorter time, or a lower rate"
         )
     times = np.arange(begin, until + 1e-12, step) if film else np.array([begin])
     if kind == ".html":

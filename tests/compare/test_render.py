@@ -70,7 +70,7 @@ def test_a_picture_shows_the_case_and_the_ball_moves(run: Trajectory, picture: C
 def test_command_writes_pictures_and_films(run: Trajectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, film = tmp_path / "run.h5", tmp_path / "film.gif"
     storage.save(run, file)
-    options = ["--from", "0.2", "--seconds", "0.4", "--speed", "0.5", "--rate", "10", "--width", str(WIDTH)]
+    options = ["--at", "0.2", "--time", "0.4", "--speed", "0.5", "--rate", "10", "--width", str(WIDTH)]
     assert cli.main(["render", str(file), "-o", str(film), *options]) == 0
     with Image.open(film) as frames:
         assert frames.n_frames == 5  # both ends of 0.4 s at 10 a second
@@ -86,7 +86,7 @@ def test_a_page_plays_in_a_browser_without_network(run: Trajectory, tmp_path: Pa
     if BROWSER is None:
         pytest.skip("there is no browser")
     file = tmp_path / "run.html"
-    assert render.write(run, file, start=0.1, speed=0.5, rate=50).endswith(": 71 frames")  # ends of 0.7 s of the run
+    assert render.write(run, file, at=0.1, speed=0.5, rate=50).endswith(": 71 frames")  # ends of 0.7 s of the run
     assert file.stat().st_size < 3e6
     with sync.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--enable-unsafe-swiftshader"])
@@ -108,7 +108,7 @@ def test_a_page_plays_in_a_browser_without_network(run: Trajectory, tmp_path: Pa
 
 
 def test_a_page_without_what_it_needs(run: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"1\.6e\+04 frames are more than 8000: choose fewer seconds, or a lower rate"):
+    with pytest.raises(InputError, match=r"1\.6e\+04 frames are more than 8000: choose a shorter time, or"):
         render.write(run, tmp_path / "run.html", speed=0.05, rate=1000)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'"):
@@ -138,9 +138,9 @@ def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
     [
         ("film.mp4", {}, r"cannot write film\.mp4: a picture is a \.png, a film a \.gif, a page"),
         ("nowhere/p.png", {}, "there is no directory nowhere"),
-        ("p.png", {"at": 9.0}, r"time = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$"),
+        ("p.png", {"at": 9.0}, r"at = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$"),
         ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
-        ("p.gif", {"start": 2.0}, "from = 2 s is out of range"),
+        ("p.gif", {"at": 2.0}, "at = 2 s is out of range"),
         ("p.gif", {"speed": 0.0}, "speed = 0 is out of range"),
     ],
 )

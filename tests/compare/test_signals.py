@@ -28,7 +28,7 @@ LONG = {
     "compare": "run.h5 run.h5 --plot new.png",
     "sweep": "--vary eta=0.1:0.5:20 --time 1e3 --workers 2",
     "collect": "runs -o new.h5",
-    "attractors": "--set hopping --starts 1000",
+    "attractors": "--set hopping --random 1000",
     "basins": "--across omega_c=0:150:21 --up slip_x=-900:900:21 --workers 2",
     "design": "meter.toml -o new.html",
     "render": "run.h5 -o new.gif",
@@ -132,7 +132,7 @@ def test_work_ends(whole: Path, tmp_path: Path, command: str, number: signal.Sig
 @pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("after", [0.2, 0.5, 1.5, 4.0, 10.0])
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "view"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_ends_at_any_moment(
     whole: Path, tmp_path: Path, command: str, after: float, number: signal.Signals
 ) -> None:

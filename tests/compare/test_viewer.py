@@ -60,8 +60,8 @@ def test_no_display_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     monkeypatch.setattr("platform.system", lambda: "Linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    assert cli.main(["view", "--omega-0", "20"]) == 2
+    assert cli.main(["simulate", "--view", "--omega-0", "20"]) == 2
     shown = capsys.readouterr().err
     assert "there is no display" in shown
     assert shown.count("\n") == 1
-    assert cli.main(["view", "--speed", "0"]) == 2
+    assert cli.main(["simulate", "--view", "--speed", "0"]) == 2
