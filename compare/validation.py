@@ -28,6 +28,7 @@ from compare.report import results
 from compare.report.results import Summary
 from compare.witnesses import hear
 from model import Parameters
+from model.errors import check_type
 
 Announce = Callable[[Verdict], None]
 """Called with every verdict as soon as it is there."""
@@ -65,10 +66,12 @@ def validate(
     Raises
     ------
     InputError
-        For an unknown claim.
+        For an unknown claim, or sets that are no `Parameters`.
     StorageError
         If the directory can't be written or holds results of another version.
     """
+    for p in (sets or {}).values():
+        check_type("sets", p, Parameters)
     forget()
     output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
     results.open_directory(output)

@@ -21,6 +21,7 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.stepping import Polar
 from model import Events, Flow, Header, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
+from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_number
 from model.trajectory import SAMPLE
@@ -87,7 +88,7 @@ class Run:
         progress: Callable[[float], None] | None = None,
         build: Callable[[Parameters, ContactSettings], tuple[Any, str]] | None = None,
     ) -> None:
-        limits.check_counts(parameters, x0s, flows)
+        limits.check_runs(parameters, x0s, flows, settings)
         self._parameters, self._flows, self._settings = list(parameters), list(flows), settings
         self._journal, self._progress = journal, progress
         self._interval, self._count = limits.sampling(t_end, settings.timestep, sample_interval)
@@ -240,10 +241,11 @@ def simulate(
     Raises
     ------
     InputError
-        If an argument is out of range.
+        If an argument is of another type or out of range.
     SimulationError
         If the run diverges, or is given up as its steps are divided again and again; it carries the samples so far.
     """
+    limits.check_runs([p], [x0], [flow], settings)
     flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
     asked = [p], [x0], t_end, flows, settings
     run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, batched=False, progress=progress)
@@ -276,12 +278,10 @@ def simulate_many(
     InputError
         If an argument is out of range, or numbers of runs differ.
     """
-    flows: Sequence[Flow]
-    if flow is None:
-        flows = [Flow.steady(p.omega_0) for p in parameters]
-    else:
-        flows = [flow] * len(parameters) if isinstance(flow, Flow) else flow
-    limits.check_counts(parameters, x0s, flows)
+    check_type("parameters", parameters, Sequence)
+    asked = flow if isinstance(flow, Sequence) else [flow] * len(parameters)
+    limits.check_runs(parameters, x0s, asked, settings)
+    flows = [own or Flow.steady(p.omega_0) for own, p in zip(asked, parameters, strict=True)]
     if threads is None:
         threads = max(1, min(os.cpu_count() or 1, len(flows) // RUNS_A_THREAD))
     parts = min(int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True))), len(flows))

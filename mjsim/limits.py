@@ -11,17 +11,27 @@ import numpy.typing as npt
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
 from model import Flow, InputError, Parameters, State, time_scales
+from model.errors import check_type
 from model.kinematics import slip_speeds
 from model.parameters import Range, check_number
 
 
-def check_counts(parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], flows: Sequence[Flow]) -> None:
-    """Refuse runs that lack parameters, a start or a flow, and none at all."""
+def check_runs(
+    parameters: Sequence[Parameters],
+    x0s: Sequence[npt.ArrayLike],
+    flows: Sequence[Flow | None],
+    settings: ContactSettings | None,
+) -> None:
+    """Refuse runs that lack parameters, a start or a flow, none at all, and what is of another type."""
     if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
         raise InputError(
             f"every run needs parameters, a start and a flow, but there are {len(parameters)} parameter sets, "
             f"{len(x0s)} starts and {len(flows)} flows"
         )
+    for p, flow in zip(parameters, flows, strict=True):
+        check_type("p", p, Parameters)
+        check_type("flow", flow, Flow | None)
+    check_type("settings", settings, ContactSettings | None)
 
 
 def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, get_args
 
 if TYPE_CHECKING:
     from model.trajectory import Trajectory
@@ -23,6 +24,13 @@ class SimulationError(RuntimeError):
     def __init__(self, message: str, trajectory: Trajectory) -> None:
         super().__init__(message)
         self.trajectory = trajectory
+
+
+def check_type(name: str, value: object, kind: type | UnionType) -> None:
+    """`InputError` for a value of another type, as for a dict where `Parameters` are needed."""
+    if not isinstance(value, kind):
+        kinds = [each.__name__ for each in get_args(kind) or (kind,) if each is not NoneType]
+        raise InputError(f"{name} must be {' or '.join(kinds)}, not {type(value).__name__}")
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

@@ -101,9 +101,12 @@ def rotated(quaternion: Array, vector: Array) -> Array:
 def full_state(x: npt.ArrayLike) -> Array:
     """Return states of shape (..., 8), adding h = v_h = 0 to states of shape (..., 6).
 
-    Raises `InputError` for another length or a value that is not finite.
+    Raises `InputError` for what isn't numbers, for another length or a value that is not finite.
     """
-    state = np.asarray(x, dtype=float)
+    try:
+        state = np.asarray(x, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"a state must be numbers, not {x!r}") from error
     if state.ndim == 0 or state.shape[-1] not in (6, 8):
         six = f"6 entries ({', '.join(VARIABLES[:6])})"
         raise InputError(f"a state has {six} or 8 (with h, v_h), not {state.shape}")

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from analytic.stationary import slipping_branch
 from model import InputError, Parameters, State
 from model.arrays import Array, Real
+from model.errors import check_type
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ def thresholds(p: Parameters) -> Thresholds:
 
     p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only.
     """
+    check_type("p", p, Parameters)
     Omega = threshold_curves(p, p.mu, p.eta)
     unit = np.sqrt(p.g / p.R)
     omega = {name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}

@@ -11,6 +11,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.stationary import slipping_branch
 from analytic.stationary import solutions as stationary
 from model import Case, InputError, Parameters
+from model.errors import check_type
 
 
 class End(Enum):
@@ -40,6 +41,7 @@ def operating_limit(p: Parameters) -> OperatingLimit:
     where the floor lets go, but it is alone up to omega_02 only: a flow beyond may leave the ball on the wall, which
     drops it with transients and impacts when the flow falls below omega_02 again (unloading).
     """
+    check_type("p", p, Parameters)
     if p.c == 0:
         return OperatingLimit(0.0, End.NO_DRAG)
     if p.mu == 0 or p.eta == 0:

@@ -22,6 +22,7 @@ from analytic.mechanics.rigid_body import Forces as Forces
 from model import Case, Contact, InputError, Parameters, State
 from model.arrays import Array, Real
 from model.cases import TRAITS
+from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES
 
 STEP = 1e-100
@@ -266,6 +267,7 @@ def direction(along_sine: Real, along_cosine: Real) -> Direction:
 
 
 def _checked(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[State, Array]:
+    check_type("p", p, Parameters)
     state = check_state(case, x, p)
     fluid = np.asarray(p.omega_0 if omega_0 is None else omega_0, dtype=float)
     _refuse(~np.isfinite(fluid), fluid, "omega_0", "must be finite", "rad s-1")

@@ -28,6 +28,7 @@ from analytic.stationary.solutions import StationarySolution, stable_solutions
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
+from model.errors import check_type
 from model.kinematics import VARIABLES, full_state, state_units
 from model.parameters import POSITIVE, check_number
 
@@ -146,6 +147,7 @@ def attractors(
 
     Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
     """
+    check_type("p", p, Parameters)
     states = random_starts(p, starts, seed) if isinstance(starts, int) else np.atleast_2d(full_state(starts))
     if lasting is None and p.c == 0:
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")

@@ -14,7 +14,8 @@ import numpy.typing as npt
 from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
 from model import Flow, InputError, Parameters, State
 from model.arrays import Array
-from model.kinematics import TURNING, VARIABLES
+from model.errors import check_type
+from model.kinematics import TURNING, VARIABLES, full_state
 from model.parameters import POSITIVE, Range, check_number
 
 
@@ -63,9 +64,14 @@ def simulate_many(
     from analytic.simulation import stepping, time_stepping  # here, since numba takes a while to load
 
     settings = settings or Settings(method="time-stepping")
-    sets = [parameters] if isinstance(parameters, Parameters) else list(parameters)
-    starts = np.atleast_2d(np.asarray(x0s, dtype=float))
-    flows = [flow] if flow is None or isinstance(flow, Flow) else list(flow)
+    sets = list(parameters) if isinstance(parameters, Sequence) else [parameters]
+    starts = np.atleast_2d(full_state(x0s))
+    flows = list(flow) if isinstance(flow, Sequence) else [flow]
+    check_type("settings", settings, Settings)
+    for p in sets:
+        check_type("parameters", p, Parameters)
+    for one in flows:
+        check_type("flow", one, Flow | None)
     count = max(len(sets), len(starts), len(flows))
     if {len(sets), len(starts), len(flows)} - {1, count}:
         raise InputError(

@@ -15,6 +15,7 @@ from analytic.simulation.motion import Recorder
 from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
 from analytic.stationary import solutions as stationary
 from model import Case, Flow, Header, InputError, Parameters, SimulationError, Trajectory
+from model.errors import check_type
 from model.parameters import check_names, check_number
 
 
@@ -52,11 +53,14 @@ def simulate(
     Raises
     ------
     InputError
-        If an argument is out of range, or the ball starts inside floor or wall, or with a speed into one it touches
-        (unless ``initial_impact``).
+        If an argument is of another type or out of range, or the ball starts inside floor or wall, or with a speed into
+        one it touches (unless ``initial_impact``).
     SimulationError
         If the run can't go on, or `progress` ends it; it carries the samples so far.
     """
+    check_type("p", p, Parameters)
+    check_type("flow", flow, Flow | None)
+    check_type("settings", settings, Settings | None)
     check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     settings = dataclasses.replace(settings or Settings(), **changes)
     if settings.method == "event":

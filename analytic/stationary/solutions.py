@@ -22,6 +22,7 @@ from analytic.stationary import slipping_branch
 from model import Case, InputError, Parameters, State
 from model.arrays import Array
 from model.drag import QUADRATIC, STOKES
+from model.errors import check_type
 
 _MIRROR, _MIRROR_FORCE = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0), np.array([1.0, 1.0, -1.0])
 """Signs of state and forces of the other sense of rotation."""
@@ -90,6 +91,7 @@ def stationary_solutions(p: Parameters, cases: Collection[Case] = tuple(Case)) -
     Solutions with inadmissible forces are listed with ``exists`` False. For omega_0 = 0 there are RR, RS and NS; for
     c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and eta < j.
     """
+    check_type("p", p, Parameters)
     if p.omega_0 < 0:
         return [
             replace(
