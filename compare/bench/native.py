@@ -6,8 +6,7 @@ knows yet whether they work.
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,26 +18,14 @@ from compare.adapters.mujoco_free import Bodies, pairs
 from compare.adapters.scene import Scene
 from compare.bench.settled import load
 from model import InputError
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
+from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, check_number
 
-_FEW = Range(0, 1e5, whole=True)
-NUMBERS: dict[str, tuple[str, Range, str]] = {
-    "timestep": ("s", POSITIVE, "time step"),
-    "impratio": ("1", POSITIVE, "impedance of friction, divided by that of the normal force"),
-    "iterations": ("1", _FEW, "most iterations of the solver"),
-    "tolerance": ("1", NOT_NEGATIVE, "tolerance at which the solver stops"),
-    "noslip_iterations": ("1", _FEW, "iterations that suppress slip"),
+OPTIONS = {
+    **dict.fromkeys(("timestep", "impratio"), POSITIVE),
+    **dict.fromkeys(("tolerance", "iterations", "noslip_iterations"), NOT_NEGATIVE),
+    **dict.fromkeys(("integrator", "cone", "solver"), ANY),
 }
-"""Options of the engine that are numbers: unit, range and meaning."""
-CHOICES = {
-    option: {name: int(getattr(kind, f"{prefix}_{name.upper()}")) for name in names.split()}
-    for option, kind, prefix, names in (
-        ("integrator", mujoco.mjtIntegrator, "mjINT", "Euler RK4 implicit implicitfast discrete"),
-        ("cone", mujoco.mjtCone, "mjCONE", "pyramidal elliptic"),
-        ("solver", mujoco.mjtSolver, "mjSOL", "PGS CG Newton"),
-    )
-}
-"""Options of the engine that are chosen by name, and its numbers for the names."""
+"""Options of the engine that decide on contacts, and their ranges."""
 _DOWN = 0.7
 """Least share of down in the way from the ball to its floor."""
 _FAR = 1024.0
@@ -56,53 +43,30 @@ class Pair:
     margin: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Native:
-    """Options of the engine and the two contacts, floor (A) and wall (B); the defaults are MuJoCo's.
+    """Options of the engine, by their names in `OPTIONS`, and the two contacts, floor (A) and wall (B)."""
 
-    Raises `InputError` for what the engine itself could not run.
-    """
-
-    timestep: float = 0.002
-    integrator: str = "Euler"
-    cone: str = "pyramidal"
-    solver: str = "Newton"
-    impratio: float = 1.0
-    iterations: int = 100
-    tolerance: float = 1e-8
-    noslip_iterations: int = 0
-    A: Pair = Pair()
-    B: Pair = Pair()
+    option: Mapping[str, float]
+    A: Pair
+    B: Pair
     note: str = ""
-    """What the file that it was read from lacks, and what stands for it."""
-
-    def __post_init__(self) -> None:
-        for name, (unit, allowed, _) in NUMBERS.items():
-            check_number(name, getattr(self, name), unit, allowed)
-        for name, known in CHOICES.items():
-            check_choice(name, getattr(self, name), list(known))
+    """What the file that they were read from lacks, and what stands for it."""
 
     def tune(self, spec: Any, scene: Scene, timestep: float) -> None:
         """Set a scene of free bodies: a wall as the wall, all else as the floor."""
-        own = ((self.B if name == "wall" else self.A, pair) for name, pair in pairs(spec, scene))
-        dataclasses.replace(self, timestep=timestep).set(spec, own)
-
-    def set(self, spec: Any, contacts: Iterable[tuple[Pair, Any]]) -> None:
-        """Set options, and the pairs of a scene each to one of ours."""
-        for name in NUMBERS:
-            setattr(spec.option, name, getattr(self, name))
-        for name, known in CHOICES.items():
-            setattr(spec.option, name, known[getattr(self, name)])
-        for own, pair in contacts:
-            for field in dataclasses.fields(Pair):
-                setattr(pair, field.name, getattr(own, field.name))
+        for name, value in {**self.option, "timestep": timestep}.items():
+            setattr(spec.option, name, value)
+        for surface, pair in pairs(spec, scene):
+            for name, value in vars(self.B if surface == "wall" else self.A).items():
+                setattr(pair, name, value)
 
 
 def entry(path: Path) -> Bodies:
     """An engine for the league: MuJoCo with the settings of a file, at its own time step; errors as of `read`."""
     settings = read(path)
     made = Bodies(path.stem, settings.note, tune=settings.tune)
-    made.TIMESTEPS = (settings.timestep,)
+    made.TIMESTEPS = (settings.option["timestep"],)
     return made
 
 
@@ -118,7 +82,7 @@ def read(path: Path) -> Native:
     StorageError
         If the file can't be read.
     InputError
-        If it is no MJCF, or lacks a ball or anything for it to pair.
+        If it is no MJCF, lacks a ball or anything for it to pair, or has an option that is out of range.
     """
     model, _ = load(path)
     moves = model.body_weldid[model.geom_bodyid] > 0
@@ -136,11 +100,10 @@ def read(path: Path) -> Native:
         )
     missing, other = ("floor", "wall") if walls else ("wall", "floor")
     note = f"{path}: there is no {missing} that the ball can touch; the contact with its {other} stands for both"
-    note = "" if floors and walls else note
-    same: dict[str, Any] = {name: getattr(model.opt, name) for name in NUMBERS}
-    for name, known in CHOICES.items():
-        same[name] = next(key for key, value in known.items() if value == getattr(model.opt, name))
-    return Native(**same, A=(floors or walls)[0], B=(walls or floors)[0], note=note)
+    option = {name: getattr(model.opt, name) for name in OPTIONS}
+    for name, allowed in OPTIONS.items():
+        check_number(f"{path}: {name}", option[name], "1", allowed)
+    return Native(option, (floors or walls)[0], (walls or floors)[0], "" if floors and walls else note)
 
 
 def _contacts(model: Any, ball: int) -> tuple[list[Pair], list[Pair]]:

@@ -55,7 +55,7 @@ MINE = """
 """
 Path("mine.xml").write_text(MINE)
 mine = native.read(Path("mine.xml"))
-print(f"step {mine.timestep} s, cone {mine.cone}, impratio {mine.impratio}")
+print(f"step {mine.option['timestep']} s, impratio {mine.option['impratio']}")
 print(f"floor: solref {mine.A.solref}, solimp {mine.A.solimp}")
 
 # %% [markdown]

@@ -1,5 +1,6 @@
 """Settings of an MJCF file reach the engine as MuJoCo itself reads them, and bad files are refused by name."""
 
+import dataclasses
 import json
 import re
 from collections.abc import Callable
@@ -63,16 +64,20 @@ def test_the_league_takes_the_settings_of_a_file(tmp_path: Path, capsys: pytest.
     assert errors["elliptic"] < errors["pyramidal"] / 30
 
 
-def test_settings_come_through_to_the_engine() -> None:
-    options = {"integrator": "implicitfast", "cone": "elliptic", "solver": "CG", "impratio": 7.0, "iterations": 33}
-    options |= {"tolerance": 1e-5, "noslip_iterations": 2}
-    given = Native(**options, A=Pair(solref=(0.005, 0.8), margin=1e-4), B=Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3)))
+def test_settings_come_through_to_the_engine(read: Callable[[str], Native]) -> None:
+    text = (
+        '<option integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" tolerance="1e-5" '
+        'noslip_iterations="2"/>'
+    )
+    A, B = Pair(solref=(0.005, 0.8), margin=1e-4), Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3))
+    given = dataclasses.replace(read(mjcf(FLOOR + WALL + BALL, text)), A=A, B=B)
     (case,) = (case for case in cases() if case.name == "rolls-on-both")
     body = Bodies("mine", "", tune=given.tune)
     body.build(case, 0.0015)
     option = body.model.opt
     assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
     assert (option.impratio, option.iterations, option.cone) == (7.0, 33, mujoco.mjtCone.mjCONE_ELLIPTIC)
+    assert (option.integrator, option.solver) == (mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtSolver.mjSOL_CG)
     names = [body.model.geom(body.model.pair_geom1[k]).name for k in range(body.model.npair)]
     floor, wall = names.index("floor"), next(k for k, name in enumerate(names) if name.startswith("wall"))
     assert body.model.pair_solref[floor].tolist() == [0.005, 0.8]
@@ -83,7 +88,8 @@ def test_settings_come_through_to_the_engine() -> None:
 def test_a_scene_of_our_own_is_read_back(read: Callable[[str], Native]) -> None:
     settings = ContactSettings.at(5e-4)
     of_scene = read(scene.build(Parameters.named("reference"), settings)[1])
-    assert (of_scene.timestep, of_scene.cone, of_scene.impratio) == (5e-4, "elliptic", settings.impratio)
+    read_back = (of_scene.option[name] for name in ("timestep", "cone", "impratio"))
+    assert tuple(read_back) == (5e-4, mujoco.mjtCone.mjCONE_ELLIPTIC, settings.impratio)
     for pair in (of_scene.A, of_scene.B):
         assert pair.solref == settings.spring
         assert pair.solreffriction[0] == settings.solreffriction
@@ -134,6 +140,7 @@ def test_impedance_is_the_engines(depth: float) -> None:
         (mjcf(FLOOR + BALL, '<contact><pair geom1="ball" geom2="wall"/></contact>'), "MuJoCo refuses it"),
         (mjcf(FLOOR + BALL, '<include file="absent.xml"/>'), "MuJoCo refuses it"),
         (mjcf(FLOOR + BALL, '<option cone="round"/>'), "MuJoCo refuses it"),
+        (mjcf(FLOOR + BALL, '<option tolerance="-1"/>'), "tolerance = -1 is out of range: must be >= 0"),
     ],
 )
 def test_files_without_such_contacts(read: Callable[[str], Native], text: str, message: str) -> None:
