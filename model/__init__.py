@@ -4,26 +4,18 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from model.cases import Case, Contact
-    from model.errors import InputError, SimulationError, StorageError
-    from model.flow import Flow
-    from model.kinematics import State
-    from model.parameters import Parameters
-    from model.trajectory import Events, Header, Trajectory
+    from model.cases import Case as Case
+    from model.cases import Contact as Contact
+    from model.errors import InputError as InputError
+    from model.errors import SimulationError as SimulationError
+    from model.errors import StorageError as StorageError
+    from model.flow import Flow as Flow
+    from model.kinematics import State as State
+    from model.parameters import Parameters as Parameters
+    from model.trajectory import Events as Events
+    from model.trajectory import Header as Header
+    from model.trajectory import Trajectory as Trajectory
 
-__all__ = [
-    "Case",
-    "Contact",
-    "Events",
-    "Flow",
-    "Header",
-    "InputError",
-    "Parameters",
-    "SimulationError",
-    "State",
-    "StorageError",
-    "Trajectory",
-]
 _MODULES = {
     **dict.fromkeys(("Case", "Contact"), "cases"),
     **dict.fromkeys(("InputError", "SimulationError", "StorageError"), "errors"),
@@ -32,6 +24,7 @@ _MODULES = {
     "Parameters": "parameters",
     **dict.fromkeys(("Events", "Header", "Trajectory"), "trajectory"),
 }
+__all__ = [*_MODULES]
 
 
 def __getattr__(name: str) -> Any:

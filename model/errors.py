@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, get_args
-
-if TYPE_CHECKING:
-    from model.trajectory import Trajectory
+from typing import Any, get_args
 
 
 class InputError(ValueError):
@@ -19,9 +16,10 @@ class StorageError(InputError):
 
 
 class SimulationError(RuntimeError):
-    """A run that could not reach its end: the message names time and state; `trajectory` holds what there is."""
+    """A run that could not reach its end: the message names time and state."""
 
-    def __init__(self, message: str, trajectory: Trajectory) -> None:
+    def __init__(self, message: str, trajectory: Any) -> None:
+        """`trajectory` is the `model.Trajectory` that there is of it."""
         super().__init__(message)
         self.trajectory = trajectory
 

@@ -129,19 +129,7 @@ def simulate(
         raise InputError(f"fluid_torque = {p.fluid_torque:g} s-1: {name} doesn't take it; mujoco, time-stepping do")
     x = State.one(x0)
     limits.check_place(x, p, p.r / 10)
-    total = (count - 1) * every + 1  # of the last sample only forces are needed
-    done, told, failure, theta = 0, 0, "", 0.0
-    rows, kept = np.empty((NOTED, 9 + 2 * _CARRIED)), list[npt.NDArray[np.void]]()
-
-    def keep(first: int, last: bool) -> None:
-        """Tell the cases of the steps in `rows`, and keep the samples among them."""
-        nonlocal theta
-        steps = np.arange(first, done)
-        block = _samples(np.asarray(steps * h, float), rows[: len(steps)], theta, engine.ahead, p)
-        theta = block["theta"][-1] if len(block) else theta
-        classifier.add(_contacts(block, band, p), last)
-        kept.append(block[steps % every == 0])
-
+    total, failure = (count - 1) * every + 1, ""  # of the last sample only forces are needed
     with closing(library.load(member)) as engine:
         try:
             engine.build(Vessel.of(p, x, flow), h)
@@ -149,53 +137,64 @@ def simulate(
             raise InputError(f"{name} can't build the vessel: {' '.join(str(error).split())[:80]}") from error
         # A wall that moves along for a step is a cylinder to (Omega h)^2.
         fastest = max(abs(x.omega_c), float(np.abs(flow(np.linspace(0.0, t_end, NOTED))).max()))
-        along = p.R * fastest * (fastest * h) ** 2 / 4
-        band = _Band(h, engine.ahead / h, engine.RESOLUTION + along)
-        classifier = Classifier([p], band)
+        steps = _Steps(engine, h, p, every, p.R * fastest * (fastest * h) ** 2 / 4)
         try:
-            while done < total:
-                row = rows[done % NOTED]
-                row[:9], row[9:] = np.concatenate(engine.state()), 0.0
-                _step(engine, row)
-                done += 1
-                if done % NOTED == 0 and done < total:
-                    keep(done - NOTED, last=False)
-                    told = done
-                    progress(done / total)
+            while steps.done < total:
+                steps.take()
+                if steps.done % NOTED == 0 and steps.done < total:
+                    steps.tell(last=False)
+                    progress(steps.done / total)
         except (RuntimeError, InterruptedError) as error:  # what engines raise where they can't go on
             known = isinstance(error, (BreakdownError, InterruptedError))
             said = f"{error}" if known else f"could not go on ({' '.join(str(error).split())[:80]})"
-            failure = f"{said} by t = {done * h:g} s"
-        keep(told, last=True)
-        told_by = "contact forces" if engine.TELLS else "gaps and slip"
-        given = {
-            "timestep": h,
-            "declared": engine.DECLARED,
-            "cases_by": told_by,
-            "t_end": float(t_end),
-            "sample_interval": every * h,
-        }
+            failure = f"{said} by t = {steps.done * h:g} s"
+        steps.tell(last=True)
+        declared, told_by = engine.DECLARED, "contact forces" if engine.TELLS else "gaps and slip"
+    given = {"timestep": h, "declared": declared, "cases_by": told_by}
+    given |= {"t_end": float(t_end), "sample_interval": every * h}
     given |= {"x0": list(x), "theta_0": 0.0, "event_times": EVENT_TIMES}
     versions = {**current_versions(), library.name: library.version}
     header = Header(name, p, flow, given, failure=failure, versions=versions)
-    block = np.concatenate(kept)
-    block["case"] = classifier.cases(0, np.arange(len(block)) * every)
-    return Trajectory.from_blocks(header, [block], classifier.events(0))
+    block = np.concatenate(steps.kept)
+    block["case"] = steps.classifier.cases(0, np.arange(len(block)) * every)
+    return Trajectory.from_blocks(header, [block], steps.classifier.events(0))
 
 
-def _step(engine: Free, row: Array) -> None:
-    """Take a step, and note what its contacts carried."""
-    engine.step(1)
-    if not all((np.abs(part) < _HUGE).all() for part in engine.read()):
-        raise BreakdownError("diverged")
-    carried = row[9:].reshape(-1, _CARRIED)
-    if not engine.TELLS:
-        carried[:, 1:4] = np.nan
-        return
-    for contact, force, gap in engine.touches():
-        of = carried[contact]
-        of[4] = min(gap, of[4]) if of[0] else gap
-        of[0], of[1:4] = 1.0, of[1:4] + force
+class _Steps:
+    """The steps of a run: what each shows is noted, and told as samples and cases, many steps at once."""
+
+    def __init__(self, engine: Free, timestep: float, p: Parameters, every: int, along: float) -> None:
+        """One of so many steps is a sample; `along` is how fast the plane slips that stands for the wall, m s-1."""
+        self.engine, self.timestep, self.p, self.every, self.done = engine, timestep, p, every, 0
+        self.band = _Band(timestep, engine.ahead / timestep, engine.RESOLUTION + along)
+        self.classifier = Classifier([p], self.band)
+        self.kept = list[npt.NDArray[np.void]]()
+        self._rows, self._told, self._theta = np.empty((NOTED, 9 + 2 * _CARRIED)), 0, 0.0
+
+    def take(self) -> None:
+        """A step: the state before it, and what contacts carried in it."""
+        engine, row = self.engine, self._rows[self.done % NOTED]
+        row[:9], row[9:] = np.concatenate(engine.state()), 0.0
+        engine.step(1)
+        if not all((np.abs(part) < _HUGE).all() for part in engine.read()):
+            raise BreakdownError("diverged")
+        carried = row[9:].reshape(-1, _CARRIED)
+        if not engine.TELLS:
+            carried[:, 1:4] = np.nan
+        for contact, force, gap in engine.touches() if engine.TELLS else ():
+            of = carried[contact]
+            of[4] = min(gap, of[4]) if of[0] else gap
+            of[0], of[1:4] = 1.0, of[1:4] + force
+        self.done += 1
+
+    def tell(self, last: bool) -> None:
+        """Tell the cases of the steps since, and keep the samples among them."""
+        steps, self._told = np.arange(self._told, self.done), self.done
+        time = np.asarray(steps * self.timestep, float)
+        block = _samples(time, self._rows[: len(steps)], self._theta, self.engine.ahead, self.p)
+        self._theta = block["theta"][-1] if len(block) else self._theta
+        self.classifier.add(_contacts(block, self.band, self.p), last)
+        self.kept.append(block[steps % self.every == 0])
 
 
 def _samples(time: Array, rows: Array, theta: float, ahead: float, p: Parameters) -> npt.NDArray[np.void]:

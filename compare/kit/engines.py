@@ -142,7 +142,8 @@ def _theory(method: str, *task: Any) -> Trajectory:
         settings = replace(settings, method=method)
         return analytic.simulate(p, x0, t_end, flow, settings, sample_interval=interval, progress=progress)
     except SimulationError as error:
-        return error.trajectory
+        run: Trajectory = error.trajectory
+        return run
 
 
 def _adapted(library: Library, marks: str) -> tuple[Engine, Engine]:
