@@ -169,17 +169,18 @@ def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
 
 
 def write_columns(
-    file: h5py.File, columns: Mapping[str, Sequence[Any] | npt.NDArray[Any]], scale: str
+    file: h5py.File, columns: Mapping[str, Sequence[Any] | npt.NDArray[Any]], *scales: str
 ) -> dict[str, h5py.Dataset]:
-    """Write columns (n,) of numbers or of text, of which the first, `scale`, is the scale of their dimension."""
-    written = {}
+    """Write columns of numbers or of text; the first ones, `scales`, are the scales of the dimensions of the others."""
+    written: dict[str, h5py.Dataset] = {}
     for name, values in columns.items():
-        text = h5py.string_dtype() if len(values) and isinstance(values[0], str) else None
+        text = h5py.string_dtype() if np.size(values) and isinstance(np.ravel(values)[0], str) else None
         written[name] = file.create_dataset(name, data=np.asarray(values, object) if text else values, dtype=text)
-        if name == scale:
-            written[name].make_scale(scale)
+        if name in scales:
+            written[name].make_scale(name)
         else:
-            written[name].dims[0].attach_scale(written[scale])
+            for dimension, scale in zip(written[name].dims, scales, strict=True):
+                dimension.attach_scale(written[scale])
     return written
 
 

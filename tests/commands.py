@@ -10,11 +10,19 @@ NEEDED = {
     "collect": "runs",
     "compare": "run.h5 run.h5",
     "design": "meter.toml",
+    "forecast": "scene.xml",
     "inspect": "run.h5",
     "render": "run.h5 -o film.gif",
     "sweep": "--vary eta=0.1,0.2 --time 0.01 --workers 0",
 }
 """What a command can't do without."""
+METER = """
+fluid = {nu_f = 1e-6, rho_f = 1000}
+flow = {slowest = 2, fastest = 40}
+bounds = {r = [2e-3, 8e-3], R = [2e-2, 8e-2], mu = 0.1, eta = 0.1, rho_b = 7800}
+"""
+SCENE = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
+<body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>"""
 
 
 def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:

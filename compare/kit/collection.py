@@ -1,8 +1,8 @@
 """What many runs settled to, in one file.
 
-`collect` writes one row a run: its parameters, the mean over its last quarter, how sure that is, and its last case. The
-file opens in xarray with the dimension ``run``, along which the parameters that vary are coordinates. `save_means`
-writes the same of a batch whose samples nobody wants.
+`collect` writes of each run its parameters, the mean over its last quarter, how sure that is, and its last case. The
+file opens in xarray. The parameters that vary are the dimensions of a grid, if the runs are one, each point once; else
+coordinates along the dimension ``run``. `save_means` writes the same of a batch whose samples nobody wants.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import numpy.typing as npt
 from rich.table import Table
@@ -32,7 +33,8 @@ from model.kinematics import VARIABLES
 from model.trajectory import CONVENTIONS, attributes, columns
 from model.versions import current_versions
 
-SCHEMA, SCHEMA_VERSION = "dualball-collection", 1
+SCHEMA, SCHEMA_VERSION = "dualball-collection", 2
+"""The first version knew no grids."""
 MEANS, MEANS_VERSION = "dualball-means", 1
 """What a file of the means of a batch says of itself."""
 FEWEST = 6
@@ -88,15 +90,37 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     coordinates, about = varied(collected), _attributes()
     order = np.lexsort([collected[name] for name in ("run", *reversed(coordinates))])
     collected = {name: values[order] for name, values in collected.items()}
+    dimensions, collected = _arranged(collected, coordinates)
     with WholeFile(output) as whole:
         title = f"What {len(rows)} balls settled to, measured over the last part of each run"
         whole.file.attrs.update(Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION)
-        for name, stored in write_columns(whole.file, collected, "run").items():
+        for name, stored in write_columns(whole.file, collected, *dimensions).items():
             stored.attrs.update(about[name])
-            if coordinates and name not in ("run", *coordinates):
+            if dimensions == ["run"] and coordinates and name not in ("run", *coordinates):
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
     return len(rows)
+
+
+def _arranged(of: Columns, coordinates: list[str]) -> tuple[list[str], Columns]:
+    """The dimensions and columns of sorted runs: those of a grid if each of its points is there once."""
+    axes = {name: np.unique(of[name]) for name in coordinates}
+    shape = [len(values) for values in axes.values()]
+    if not axes or math.prod(shape) != len(of["run"]):
+        return ["run"], of
+    points = np.ravel_multi_index([np.searchsorted(values, of[name]) for name, values in axes.items()], shape)
+    if not np.array_equal(points, np.arange(len(points))):
+        return ["run"], of
+    return coordinates, axes | {name: values.reshape(shape) for name, values in of.items() if name not in axes}
+
+
+def _flat(file: h5py.File) -> Columns:
+    """The columns of a collection, an entry a run."""
+    of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
+    if not run.is_scale:
+        names = [next(iter(dimension.keys())) for dimension in run.dims]
+        of |= dict(zip(names, np.meshgrid(*(of[name] for name in names), indexing="ij"), strict=True))
+    return {name: values.ravel() for name, values in of.items()}
 
 
 def _gathered(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
@@ -218,7 +242,7 @@ def describe(path: Path) -> dict[str, Any]:
         if schema == SCHEMA:
             if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
                 raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
-            return described({name: column(dataset(file, name)) for name in file})
+            return described(_flat(file))
     if schema not in (MEANS, storage.BATCH):
         return {}
     return described({name: values for name, values in _rows(path, path).items() if name not in _HELD})

@@ -1,26 +1,22 @@
 """The command line: right answers for right questions, one clear line for the others."""
 
-import argparse
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
-import analytic
-from compare.commands import cli, options
+from compare.commands import cli
 from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
-from tests.commands import COMMANDS, NEEDED, parser_of, refused
+from tests.commands import COMMANDS, parser_of, refused
 
 ROOT = Path(cli.__file__).parents[2]
 
@@ -145,8 +141,8 @@ def test_sweep_and_collect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert cli.main(["sweep", "--vary", "omega_0=5:10:3", "--vary", "eta=0.1,0.3", *where]) == 0
     assert cli.main(["collect", str(tmp_path / "runs"), "-o", str(tmp_path / "all.h5")]) == 0
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
-        assert data.sizes["run"] == 6
-        assert sorted(set(data.omega_0.values)) == [5.0, 7.5, 10.0]
+        assert dict(data.sizes) == {"omega_0": 3, "eta": 2}
+        assert data.omega_0.values.tolist() == [5.0, 7.5, 10.0]
         assert np.isfinite(data.omega_c).all()
         assert data.omega_c.units == "rad s-1"
         assert all(data[name].long_name for name in data.variables)
@@ -292,65 +288,6 @@ def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> No
         assert option in shown
         assert option not in parser_of("sweep").format_help().replace("--mu 0.3 --omega-0 25", "")
     assert "0.31" in shown
-
-
-NUMBERS = ("x", "nan", "inf", "-1", "0", "1e300", "1e-300", "1" * 400)
-
-
-def drawn(command: str) -> Iterator[list[str]]:
-    """Bad inputs by a command's own parser: of each option a wrong type, sign, size, nothing, or what isn't there."""
-    yield ["--nonsense"]
-    for action in parser_of(command)._actions:
-        if action.nargs == 0:
-            continue
-        option = action.option_strings[-1:]
-        values = [[]] if option else []
-        if isinstance(action.type, options.Number):
-            bad = [text for text in NUMBERS if refuses(action.type, text)]
-            bad += ["1e300", "1e-300"] if action.dest.startswith("parameter_") else []
-            bad += ["1e300"] if action.dest in ("ramp", "staircase", "sine") else []
-            values += [[text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in bad]
-        else:
-            of_file = action.type in (Path, options.results) or isinstance(action.type, options.Output)
-            values.append(["file/absent.h5" if of_file else "no such thing"])
-        if action.dest == "start":
-            values += [[f"omega_c={text}"] for text in ("x", "nan", "1e300", "")]
-        yield from ([*option, *value] for value in values)
-
-
-def refuses(parse: options.Number, text: str) -> bool:
-    try:
-        parse(text)
-    except argparse.ArgumentTypeError:
-        return True
-    return False
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_bad_inputs_drawn_from_the_parsers(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Each is refused in a line, within 10 s, and leaves no file; there are more than a thousand."""
-    monkeypatch.chdir(tmp_path)
-    Path("file").touch()
-    Path("runs").mkdir()
-    storage.save(analytic.simulate(Parameters.named("reference"), [0] * 6, 0.1), "run.h5")
-    before, given = sorted(Path().rglob("*")), NEEDED.get(command, "").split()
-
-    def late(*_: object) -> None:
-        pytest.fail(f"{words} took more than 10 s")
-
-    signal.signal(signal.SIGALRM, late)
-    count = 0
-    for words in drawn(command):
-        signal.alarm(10)
-        try:
-            refused(capsys, command, *(given if words[0].startswith("-") else []), *words)
-        finally:
-            signal.alarm(0)
-        assert sorted(Path().rglob("*")) == before, words
-        count += 1
-    assert count > 1
 
 
 @pytest.mark.parametrize(

@@ -37,19 +37,35 @@ def runs(grid: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(grid, tmp_path / "runs"))
 
 
-def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
+def test_the_varied_parameters_of_a_grid_are_dimensions(grid: Path, tmp_path: Path) -> None:
     assert collection.collect(grid, tmp_path / "all.h5") == 6
+    with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
+        assert dict(data.sizes) == {"eta": 2, "omega_0": 3}
+        assert data.omega_c.dims == ("eta", "omega_0")
+        assert data.omega_0.units == "rad s-1"
+        np.testing.assert_array_equal(data.omega_0, OMEGAS)
+        np.testing.assert_array_equal(data.eta, ETAS)
+        file, _, key = str(data.run.sel(eta=ETAS[1], omega_0=OMEGAS[0]).values).partition("/")
+        run = storage.load(grid / file / key)
+        assert (run.header.parameters.eta, run.header.parameters.omega_0) == (ETAS[1], OMEGAS[0])
+        assert data.omega_c.sel(eta=ETAS[1], omega_0=OMEGAS[0]) == pytest.approx(np.mean(run.omega_c[751:]), rel=1e-2)
+        assert np.isfinite(data.omega_c).all()
+        assert set(data.mu.values.flat) == {P.mu}
+    about = collection.describe(tmp_path / "all.h5")
+    assert about["varied"] == ["eta", "omega_0"]
+    assert about["ranges"]["omega_0"] == [min(OMEGAS), max(OMEGAS)]
+    assert len(about["names"]) == 6
+
+
+def test_the_varied_parameters_of_other_runs_are_coordinates(runs: Path, tmp_path: Path) -> None:
+    """Of a grid in which a point is missing."""
+    min(runs.glob("*.h5")).unlink()
+    assert collection.collect(runs, tmp_path / "all.h5") == 5
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         assert set(data.coords) == {"run", "omega_0", "eta"}
         assert data.omega_0.dims == ("run",)
-        assert data.omega_0.units == "rad s-1"
-        table = data.omega_c.set_index(run=["omega_0", "eta"]).unstack("run")
         pairs = list(zip(data.eta.values.tolist(), data.omega_0.values.tolist(), strict=True))
-        assert pairs == [(eta, omega) for eta in ETAS for omega in OMEGAS]  # whatever the files are called
-        np.testing.assert_array_equal(table.omega_0, OMEGAS)
-        np.testing.assert_array_equal(table.eta, ETAS)
-        assert np.isfinite(table).all()
-        assert set(data.mu.values) == {P.mu}
+        assert pairs == sorted(pairs)  # whatever the files are called
     assert collection.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
 
 

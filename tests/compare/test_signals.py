@@ -16,7 +16,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Records
 from compare.report import results
 from model import Parameters, storage
-from tests.commands import COMMANDS
+from tests.commands import COMMANDS, METER, SCENE
 from tests.measured import measured
 
 ROOT = Path(__file__).parents[2]
@@ -37,13 +37,6 @@ LONG = {
     "league": "--engine event --engine mujoco --workers 2",
 }
 """What takes each command long."""
-METER = """
-fluid = {nu_f = 1e-6, rho_f = 1000}
-flow = {slowest = 2, fastest = 40}
-bounds = {r = [2e-3, 8e-3], R = [2e-2, 8e-2], mu = 0.1, eta = 0.1, rho_b = 7800}
-"""
-SCENE = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
-<body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>"""
 
 
 @pytest.fixture(scope="module")
