@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import Array, Contacts, parameters
+from compare.bench.contact_law import Array, Contacts, geom_names, parameters
 from mjsim import Coulomb
 
 CHECKS = 3
@@ -90,39 +90,64 @@ def apply(model: Any, option: str, value: Sequence[float]) -> None:
             own[own[:, 0] > value[0] if value[0] > 0 else own[:, 0] < 0] = value
 
 
+@dataclass(frozen=True)
+class AtRest:
+    """A settled model: its contacts, what was measured of them, and what passes for good."""
+
+    model: Any
+    data: Any
+    contacts: Contacts
+    rows: Array
+    """Of the contacts, in the model's own coordinates."""
+    number: Array
+    """By which `data` has them."""
+    radius: Array
+    """Of the smaller body of each, m."""
+    moves: Array
+    found: Mapping[str, Array]
+    creep: float
+    depth: Array
+
+    @np.errstate(over="ignore")
+    def harm(self, c: Contacts) -> dict[str, Array]:
+        """By what may be wrong with each contact, see `FAULTS`: how many times what passes for good."""
+        law = c.law()
+        speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
+        return {
+            "creep": np.where(self.moves, 0, speed / self.creep),
+            "depth": np.where(self.moves, 0, law.depth / self.depth),
+            "largest_step": np.full(len(speed), 0.0 if c.stable(c.timestep) else 2.0),
+        }
+
+
 def change(
-    model: Any,
-    data: Any,
-    c: Contacts,
-    number: Array,
-    harm: Callable[[Contacts], dict[str, Array]],
-    worst: tuple[str, Array, Mapping[str, float]],
-    names: Sequence[str],
-    calm: Callable[[Any], bool],
+    scene: AtRest, pair: str, members: Sequence[int], harm: Mapping[str, float], calm: Callable[[Any], bool]
 ) -> tuple[Change | None, dict[str, Array]]:
     """The first option, in its mildest value, that makes all contacts good, or else the one that helps most.
 
-    Also the harm that is left then. `worst` is the pair that is worst, which contacts are its own, and how many times
-    of each fault it has; `names` are those of geoms; `calm` says whether a changed model settles as well.
+    Also the harm that is left then. `pair` is the worst one, `members` are its contacts, `harm` is its own; `calm` says
+    whether a changed model settles as well.
     """
-    (pair, part, faults), tried = worst, []
-    what = max(faults, key=lambda name: faults[name])
-    for option, value in _options(c.only(part)) if faults[what] > 1 else ():
-        other, state = copy.copy(model), copy.copy(data)
+    c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
+    part, names = np.isin(np.arange(len(scene.number)), members), geom_names(scene.model)
+    for option, value in _options(c.only(part)) if harm[what] > 1 else ():
+        other, state = copy.copy(scene.model), copy.copy(scene.data)
         apply(other, option, value)
         mujoco.mj_fwdPosition(other, state)
-        changed = dataclasses.replace(c, **parameters(other, state, number))
-        harms, (now, then) = harm(changed), (_of(each, part, what) for each in (c, changed))
+        changed = dataclasses.replace(c, **parameters(other, state, scene.number))
+        harms, (now, then) = scene.harm(changed), (_of(each, part, what) for each in (c, changed))
         left = max(float(each.max()) for each in harms.values())
-        geoms = [names[g] for g in np.unique(c.geoms) if _differ(model, other, g)]
-        tried.append((left, harms, Change(option, value, pair, what, now, then, tuple(geoms)), other))
+        softness = [(model.geom_solref, model.geom_solimp) for model in (scene.model, other)]
+        differ = np.any([(old != new).any(1) for old, new in zip(*softness, strict=True)], axis=0)
+        geoms = tuple(names[g] for g in np.unique(c.geoms) if differ[g])
+        tried.append((left, harms, Change(option, value, pair, what, now, then, geoms), other))
     cures = [each for each in tried if each[0] <= 1]
-    helps = [each for each in tried if 1 < each[0] < faults[what] / 1.4]
+    helps = [each for each in tried if 1 < each[0] < harm[what] / 1.4]
     helps.sort(key=lambda each: (each[0], max(1, float(each[1][what].max()))))
     for _, harms, best, other in [*cures, *helps][:CHECKS]:
         if calm(other):
             return best, harms
-    return None, harm(c)
+    return None, scene.harm(c)
 
 
 def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -150,13 +175,6 @@ def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
 
 def _rounded(value: float) -> float:
     return float(f"{value:.2g}")
-
-
-def _differ(model: Any, other: Any, geom: int) -> bool:
-    """Whether a geom's contacts are soft in another way in two models."""
-    return any(
-        (getattr(model, name)[geom] != getattr(other, name)[geom]).any() for name in ("geom_solref", "geom_solimp")
-    )
 
 
 def _of(c: Contacts, part: Array, quantity: str) -> float:

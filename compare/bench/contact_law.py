@@ -384,3 +384,9 @@ def replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[st
             first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
             said = f"{first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): {taken} is taken"
             yield f"{name} of two geoms", said
+
+
+def geom_names(model: Any) -> list[str]:
+    """Of all geoms; one without a name has that of its body, and its number."""
+    bodies = (model.body(body).name for body in model.geom_bodyid)
+    return [model.geom(g).name or f"{body}#{g}" for g, body in enumerate(bodies)]

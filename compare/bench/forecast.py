@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from compare.bench import advice
-from compare.bench.contact_law import LARGEST, Array, Contacts, contacts, replaced
+from compare.bench.contact_law import LARGEST, Array, contacts, geom_names, replaced
 from compare.bench.measured import borne, meet, rebound, slips, watched
 from compare.bench.settled import (
     WINDOW,
@@ -113,36 +113,6 @@ class Forecast:
         return f"what touches still moves: {few(what)}{hint}"
 
 
-@dataclass(frozen=True)
-class _Scene:
-    """The contacts of a settled model, what was measured of them, and what passes for good."""
-
-    model: Any
-    data: Any
-    contacts: Contacts
-    rows: Array
-    """Of the contacts, in the model's own coordinates."""
-    number: Array
-    """By which `data` has them."""
-    radius: Array
-    """Of the smaller body of each, m."""
-    moves: Array
-    found: Mapping[str, Array]
-    creep: float
-    depth: Array
-
-    @np.errstate(over="ignore")
-    def harm(self, c: Contacts) -> dict[str, Array]:
-        """By what may be wrong with each contact: how many times what passes for good."""
-        law = c.law()
-        speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
-        return {
-            "creep": np.where(self.moves, 0, speed / self.creep),
-            "depth": np.where(self.moves, 0, law.depth / self.depth),
-            "largest_step": np.full(len(speed), 0.0 if c.stable(c.timestep) else 2.0),
-        }
-
-
 def forecast(
     model: Any,
     data: Any,
@@ -158,8 +128,7 @@ def forecast(
     """
     scene = _scene(awake(model), data, settled, stepping(control), creep, depth)
     found = _told(scene, settled)
-    first, names = found.pairs[0], geom_names(model)
-    worst = first.name, np.isin(np.arange(len(scene.number)), first.members), first.harm
+    worst = found.pairs[0]
 
     def calm(other: Any) -> bool:
         """Whether a changed model settles as well: contacts may chatter that are stable for small motions."""
@@ -168,7 +137,7 @@ def forecast(
         except UnsettledError:
             return False
 
-    change, left = advice.change(scene.model, scene.data, scene.contacts, scene.number, scene.harm, worst, names, calm)
+    change, left = advice.change(scene, worst.name, worst.members, worst.harm, calm)
     creeps = max(pair.harm["creep"] for pair in found.pairs) > 1 and 1 < left["creep"].max() < math.inf
     return dataclasses.replace(found, change=change, remedy=advice.python(model) if creeps else "")
 
@@ -205,7 +174,7 @@ def _anew(
 
 def _scene(
     model: Any, data: Any, settled: Rest, step: Advance, creep: float = CREEP, depth: float | None = None
-) -> _Scene:
+) -> advice.AtRest:
     """The contacts of a settled model, measured; `data` is left at the end of that."""
     moving = settled.moving
     if moving:
@@ -237,10 +206,10 @@ def _scene(
             found["depth_measured"][part] = mean[1] / max(mean[2], 1e-300)
     good = np.full(len(number), depth) if depth else DEPTH * radius
     own = those.only(np.ones(len(number), bool))
-    return _Scene(model, start, own, those.rows, number, radius, moves, found, creep, good)
+    return advice.AtRest(model, start, own, those.rows, number, radius, moves, found, creep, good)
 
 
-def _told(scene: _Scene, settled: Rest) -> Forecast:
+def _told(scene: advice.AtRest, settled: Rest) -> Forecast:
     """The forecast without advice."""
     those, moves, names = scene.contacts, scene.moves, geom_names(scene.model)
     law, harms, pairs = those.law(), scene.harm(those), []
@@ -290,9 +259,3 @@ def _fall(radius: Array) -> float:
 def _flexible(data: Any) -> int:
     """How many contacts have flexible bodies."""
     return int((data.contact.geom < 0).any(1).sum())
-
-
-def geom_names(model: Any) -> list[str]:
-    """Of all geoms; one without a name has that of its body, and its number."""
-    bodies = (model.body(body).name for body in model.geom_bodyid)
-    return [model.geom(g).name or f"{body}#{g}" for g, body in enumerate(bodies)]

@@ -15,7 +15,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.forecast import Forecast, forecast, geom_names
+from compare.bench.contact_law import geom_names
+from compare.bench.forecast import Forecast, forecast
 from compare.bench.settled import NOISE, UnsettledError, awake, load, settle
 from compare.kit.pages import markdown
 from model import InputError
