@@ -124,9 +124,7 @@ def rigid(spec: Any, scene: Scene, timestep: float) -> None:
         key.qpos, key.qvel = [*key.qpos, 0.0, 0.0], [*key.qvel, 0.0, 0.0]
 
 
-_as_it_comes = Bodies("mujoco-defaults", CORNERS)
-NAME, NOTE, DECLARED = _as_it_comes.NAME, _as_it_comes.NOTE, _as_it_comes.DECLARED
-build, step, state = _as_it_comes.build, _as_it_comes.step, _as_it_comes.state
+defaults = Bodies("mujoco-defaults", CORNERS)
 best = Lawful(
     "mujoco",
     "of second order but for the moment of a landing: what bears the body until then lets go up to a step early",

@@ -57,5 +57,5 @@ class Warp(mujoco_free.Bodies):
         self.data.xfrc_applied.numpy()[0, self.number, :3] = force  # on a processor the engine's own memory
 
 
-defaults = Warp("mujoco-warp-defaults", mujoco_free.DECLARED)
+defaults = Warp("mujoco-warp-defaults", mujoco_free.defaults.DECLARED)
 best = Warp("mujoco-warp", "elliptic cone, contact settings of the study", mujoco_free.studied)

@@ -28,7 +28,7 @@ ENTRIES: dict[str, str] = {
     "time-stepping": "compare.bench.simulators:time_stepping",
     "mujoco": f"{_OWN}.mujoco_free:best",
     "mujoco-plain": "compare.bench.simulators:mujoco_plain",
-    "mujoco-defaults": f"{_OWN}.mujoco_free",
+    "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
     **{
         f"{name}{suffix}": f"{_OWN}.{name}:{which}"
         for name in ("siconos", "pybullet", "drake", "dart", "rapier", "sapien")

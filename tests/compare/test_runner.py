@@ -83,7 +83,7 @@ def test_errors_order_creep_and_cost():
     assert found.cost >= 0
     assert run(BY_NAME["growing-pull"], Exact()).skipped == "no forces"
     # Steps between which samples lie.
-    assert run(BY_NAME["sphere-rolls-down"], "compare.adapters.mujoco_free", [3e-3]).passed
+    assert run(BY_NAME["sphere-rolls-down"], "compare.adapters.mujoco_free:defaults", [3e-3]).passed
 
 
 @pytest.mark.parametrize(
