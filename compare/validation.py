@@ -21,8 +21,8 @@ from compare.kit.drawing import Material
 from compare.kit.engines import WITNESSES, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.progress import Show, Whole, nowhere
-from compare.kit.record import Missing, Records, Testimony
+from compare.kit.progress import Show, ValidationProgress, nowhere
+from compare.kit.record import Missing, Records, RecordsByEngine
 from compare.kit.workers import JUDGING, Spread, Workers, at_most, processes, threads
 from compare.report import results
 from compare.report.results import Summary
@@ -89,22 +89,22 @@ def validate(
             if claim.id not in judged and not waiting.keys() & needed:
                 heard = {name: dict(steps) for name, steps in testimony.items()}
                 judged[claim.id] = bench.submit(_announced, claim, heard, dict(broken), announce)
-                judged[claim.id].add_done_callback(lambda _: whole.judged())
+                judged[claim.id].add_done_callback(lambda _: far.judged())
 
-    whole = Whole(progress, {}, len(chosen))
+    far = ValidationProgress(progress, {}, len(chosen))
     with (
         threads(1) as bench,  # judges while the next protocols' runs are on their way
-        Campaign(output / results.RUNS, workers, limit=limit, report=whole.measuring, passing=True) as campaign,
+        Campaign(output / results.RUNS, workers, limit=limit, report=far.measuring, passing=True) as campaign,
     ):
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
         jobs = [(protocol, lab) for lab in labs for protocol in todo if protocol.measures(lab)]
-        whole.costs = {programme.called(protocol.name, lab): programme.cost((protocol, lab)) for protocol, lab in jobs}
+        far.costs = {programme.called(protocol.name, lab): programme.cost((protocol, lab)) for protocol, lab in jobs}
         judge_what_is_there()
         for job, found in programme.run(tuple(jobs), sets, output):
             protocol, lab = job
             jobs.remove(job)
             name = programme.called(protocol.name, lab)
-            whole.measured(name)
+            far.measured(name)
             if isinstance(found, Records):
                 testimony[lab.engine.name][lab.refine] += found
             elif lab.engine is engines[0]:  # a protocol that breaks down takes its own claims with it, and no others
@@ -121,7 +121,7 @@ def validate(
     }
     count = workers if isinstance(workers, int) else workers.count
     with processes(min(count, os.cpu_count() or 1)) as work:
-        draw = whole.drawing(work.map) if report else None
+        draw = far.drawing(work.map) if report else None
         _write(output, level, files, results.testimony(files), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
 
@@ -157,7 +157,7 @@ def _judged(directory: Path, number: int) -> dict[str, Any]:
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
 
-def _in_time(claim: Claim, testimony: Testimony) -> Verdict:
+def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     """The verdict on what is stored, or that it took too long."""
     try:
         with at_most(JUDGING):
@@ -167,12 +167,12 @@ def _in_time(claim: Claim, testimony: Testimony) -> Verdict:
 
 
 @cache
-def stored(directory: Path) -> Testimony:
+def stored(directory: Path) -> RecordsByEngine:
     """The measurements of the last validation in a directory, read once in a process."""
     return results.testimony(results.load(directory).files(directory))
 
 
-def material(directory: Path, verdicts: Sequence[Verdict], testimony: Testimony) -> Material:
+def material(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Material:
     """What figures of a results directory are made of: of engines beside the one on trial at half the usual step."""
     checks = {v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts}
     first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [Records()]
@@ -191,7 +191,7 @@ def _write(
     directory: Path,
     level: Level,
     files: results.Files,
-    testimony: Testimony,
+    testimony: RecordsByEngine,
     known: Mapping[str, Verdict],
     over: Spread | None,
 ) -> list[Verdict]:
@@ -210,7 +210,7 @@ def _write(
     return verdicts
 
 
-def _announced(claim: Claim, testimony: Testimony, broken: Mapping[str, str], announce: Announce) -> Verdict:
+def _announced(claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str], announce: Announce) -> Verdict:
     """The verdict, or that one of the protocols of its claim broke down."""
     judged = hear(claim, testimony)
     if errors := [why for name, why in broken.items() if name in claim.protocols]:

@@ -30,7 +30,7 @@ from compare.judge import checks_of, lacking, outcome, rows, verdict
 from compare.kit.engines import Engine, engine
 from compare.kit.lab import coarse_step, time_unit
 from compare.kit.quantities import quantity
-from compare.kit.record import Check, Measurement, Missing, Records, Relation, Testimony
+from compare.kit.record import Check, Measurement, Missing, Records, RecordsByEngine, Relation
 from compare.kit.statistics import COVERAGE, Measured
 from model.arrays import Array
 from model.kinematics import VARIABLES, state_units
@@ -66,7 +66,7 @@ Step = tuple[int, Check]
 """A check, and the time steps in one that its protocol asks for."""
 
 
-def hear(claim: Claim, testimony: Testimony) -> Verdict:
+def hear(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
     (name, steps), *others = testimony.items()
     measured = steps[max(steps)]

@@ -46,7 +46,7 @@ class Change:
 
     @property
     def written(self) -> str:
-        """As in MJCF."""
+        """The option and its value as an attribute in MJCF."""
         return f'{self.option}="{"elliptic" if self.option == "cone" else " ".join(f"{v:g}" for v in self.value)}"'
 
     @property
@@ -59,8 +59,8 @@ class Change:
         return "\n".join([*lines, *([f"<!-- and {more} more geoms -->"] if more > 0 else [])])
 
 
-def python(model: Any) -> str:
-    """What to write for a model whose contacts no option holds."""
+def remedy_code(model: Any) -> str:
+    """Lines of Python that hold the contacts of a model which no option holds."""
     integrator = mujoco.mjtIntegrator
     two_halves = model.opt.integrator not in (integrator.mjINT_RK4, integrator.mjINT_DISCRETE)
     other = "" if two_halves else "model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST\n"
@@ -68,9 +68,9 @@ def python(model: Any) -> str:
 
 
 def remedied(model: Any, data: Any) -> tuple[Any, Any, Callable[[Any, Any, int], None]]:
-    """A copy of a model and its data, and how to step them with the remedy."""
+    """A copy of a model and its data, and a function that steps them as `remedy_code` does."""
     twin = copy.copy(model)
-    if "integrator" in python(model):
+    if "integrator" in remedy_code(model):
         twin.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     twin.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     state = mujoco.MjData(twin)
@@ -120,7 +120,7 @@ class AtRest:
         }
 
 
-def change(
+def best_change(
     scene: AtRest, pair: str, members: Sequence[int], harm: Mapping[str, float], calm: Callable[[Any], bool]
 ) -> tuple[Change | None, dict[str, Array]]:
     """The first option, in its mildest value, that makes all contacts good, or else the one that helps most.
@@ -135,7 +135,7 @@ def change(
         apply(other, option, value)
         mujoco.mj_fwdPosition(other, state)
         changed = dataclasses.replace(c, **parameters(other, state, scene.number))
-        harms, (now, then) = scene.harm(changed), (_of(each, part, what) for each in (c, changed))
+        harms, (now, then) = scene.harm(changed), (_worst(each, part, what) for each in (c, changed))
         left = max(float(each.max()) for each in harms.values())
         softness = [(model.geom_solref, model.geom_solimp) for model in (scene.model, other)]
         differ = np.any([(old != new).any(1) for old, new in zip(*softness, strict=True)], axis=0)
@@ -177,6 +177,6 @@ def _rounded(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def _of(c: Contacts, part: Array, quantity: str) -> float:
-    """Creep, depth, or largest step of some contacts."""
+def _worst(c: Contacts, part: Array, quantity: str) -> float:
+    """The worst creep or depth, or the largest stable step, of some contacts."""
     return c.only(part).largest_step() if quantity == "largest_step" else float(getattr(c.law(), quantity)[part].max())

@@ -121,7 +121,7 @@ class Case(Scene):
         return np.array([[letter in letters for letter in sample] for sample in self.contacts])
 
     def to_mapping(self) -> dict[str, Any]:
-        """All of it but the MJCF as JSON-able data; scales that are infinite are None."""
+        """The case without its MJCF as JSON-able data; scales that are infinite are None."""
         data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": TIME_STEPS, "tolerance": TOLERANCE}
         data |= {"turned": self.round, "wrong": {name: self.error(states) for name, states in self.wrong.items()}}
         del data["motion"]
@@ -129,7 +129,7 @@ class Case(Scene):
 
 
 def reach(body: Body, normal: Array) -> Array:
-    """How far a body reaches from its centre against normals (n, 3), m; all but a sphere as they stood at the start."""
+    """How far a body reaches from its centre against normals (n, 3), m, with the orientation of its start."""
     if body.shape == "disc":
         along = np.abs(into(body.orientation, normal)[..., 2])
         return np.asarray(body.size[0] * np.sqrt(np.maximum(1 - along**2, 0.0)) + body.size[1] * along)

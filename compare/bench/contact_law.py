@@ -97,7 +97,7 @@ class Contacts:
         return np.where((self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1)
 
     def reference(self, solref: Array) -> tuple[Array, Array]:
-        """`reference` of rows of these contacts."""
+        """Stiffness and damping of rows of these contacts, see the function `reference`."""
         return reference(solref, self.solimp, self.timestep, self.discrete, self.refsafe)
 
     @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
@@ -172,7 +172,7 @@ class Contacts:
         )
 
     def only(self, which: Array) -> Contacts:
-        """Some of the contacts, in the coordinates that they move."""
+        """Some of the contacts, with their Jacobian in the coordinates that they move."""
         n = len(self.dim)
         chosen = {
             f.name: v[which] for f in dataclasses.fields(self) if np.ndim(v := getattr(self, f.name)) and len(v) == n
@@ -183,7 +183,7 @@ class Contacts:
         return dataclasses.replace(self, **chosen)
 
     def matrices(self) -> tuple[Array, Array, Array]:
-        """Of ``mass a + damping v + stiffness x = 0``, small motions about the settled state."""
+        """Mass, damping and stiffness (n, n) of small motions about the settled state, m a + d v + k x = 0."""
         law, flat = self.law(), self.rows.reshape(6 * len(self.dim), self.rows.shape[2])
         weight = law.weight * (np.arange(6) < self.dim[:, None])
 
@@ -274,7 +274,7 @@ class Law:
 
 
 def impedance(solimp: Array, depth: Array) -> Array:
-    """d at a depth below the margin, of contacts with these `solimp` (n, 5)."""
+    """The impedance d at a depth below the margin, of contacts with these `solimp` (n, 5)."""
     low, high, middle = np.clip(solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
     width, power = np.maximum(solimp[:, 2], 1e-15), np.maximum(solimp[:, 4], 1)
     x = np.minimum(depth / width, 1)
@@ -339,7 +339,7 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
 
 
 def weights(model: Any) -> Array:
-    """Of each body that moves by joints of its own, with all that is welded to it, N; of others inf, or 0 without g."""
+    """The weight of each body with all that is welded to it, N; inf if no joint of its own moves it, 0 without g."""
     mass = np.bincount(model.body_weldid, model.body_mass, model.nbody)[model.body_weldid]
     moved = model.body_dofnum[model.body_weldid] > 0
     weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
@@ -348,7 +348,7 @@ def weights(model: Any) -> Array:
 
 
 def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
-    """Of contacts with these numbers: all that options of the model decide, by the names in `Contacts`."""
+    """What options of a model decide for the contacts of these numbers, by the names in `Contacts`."""
     option = model.opt
     return {
         "timestep": option.timestep,
@@ -387,6 +387,6 @@ def replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[st
 
 
 def geom_names(model: Any) -> list[str]:
-    """Of all geoms; one without a name has that of its body, and its number."""
+    """The names of all geoms; one without a name has that of its body, and its number."""
     bodies = (model.body(body).name for body in model.geom_bodyid)
     return [model.geom(g).name or f"{body}#{g}" for g, body in enumerate(bodies)]

@@ -38,12 +38,12 @@ BOUND = 1e-10
 
 @cache
 def cases() -> tuple[Case, ...]:
-    """All of them: those of version 1 first, of these those with one contact."""
+    """All exact cases: those of version 1 first, of these those with one contact."""
     return (*one_contact.cases(), *_grooves(), *_vessel(), *mechanisms.cases())
 
 
 def write(directory: Path) -> None:
-    """JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises `StorageError`."""
+    """Write JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises `StorageError`."""
     make_directory(directory)
     check_ours(directory / "README.md", beside=directory / "cases.h5")
     said = {"version": VERSION, "tolerance": TOLERANCE, "dualball": current_versions()["dualball"]}
@@ -66,7 +66,7 @@ def write(directory: Path) -> None:
 
 
 def _grooves() -> list[Case]:
-    """In a right-angled groove down a slope each plane carries m g cos/sqrt(2)."""
+    """A sphere and a cube in a right-angled groove down a slope, each plane of which carries m g cos/sqrt(2)."""
     half = math.sqrt(0.5)
 
     def planes(angle: float, mu: float) -> tuple[Surface, Surface]:

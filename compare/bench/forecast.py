@@ -19,7 +19,7 @@ import numpy as np
 
 from compare.bench import advice
 from compare.bench.contact_law import LARGEST, Array, contacts, geom_names, replaced
-from compare.bench.measured import borne, meet, rebound, slips, watched
+from compare.bench.measured import loads, measured_slip, noting_loads, rebound, step_to_most_contacts
 from compare.bench.settled import (
     WINDOW,
     Advance,
@@ -30,7 +30,7 @@ from compare.bench.settled import (
     few,
     radii,
     settle,
-    stepping,
+    with_control,
 )
 from model import InputError
 
@@ -126,8 +126,8 @@ def forecast(
     `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for good; `control` is run
     before each step. Raises `InputError` if nothing touches, `UnsettledError` if the model diverges.
     """
-    scene = _scene(awake(model), data, settled, stepping(control), creep, depth)
-    found = _told(scene, settled)
+    scene = _measured(awake(model), data, settled, with_control(control), creep, depth)
+    found = _without_advice(scene, settled)
     worst = found.pairs[0]
 
     def calm(other: Any) -> bool:
@@ -137,48 +137,48 @@ def forecast(
         except UnsettledError:
             return False
 
-    change, left = advice.change(scene, worst.name, worst.members, worst.harm, calm)
+    change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm)
     creeps = max(pair.harm["creep"] for pair in found.pairs) > 1 and 1 < left["creep"].max() < math.inf
-    return dataclasses.replace(found, change=change, remedy=advice.python(model) if creeps else "")
+    return dataclasses.replace(found, change=change, remedy=advice.remedy_code(model) if creeps else "")
 
 
 def tried(
     model: Any, data: Any, before: Forecast, limit: float, control: Control | None = None, **good: Any
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
-    """The forecast with what was found after the advised change; that of the changed model, settled anew within `limit`
-    s; and that with the remedy on top.
+    """Follow the advice: the forecast with what was found after it, that after the change, and that with the remedy on
+    top, of models that are settled anew within `limit` s.
 
     What isn't advised isn't tried: None. The change is made in `model`. Raises as `forecast` does.
     """
     after = held = None
     if change := before.change:
         advice.apply(model, change.option, change.value)
-        after = _anew(model, data, mujoco.mj_step, limit, control, good)
+        after = _settled_anew(model, data, mujoco.mj_step, limit, control, good)
         quantity = f"{change.quantity}_measured" if change.quantity in ("creep", "depth") else change.quantity
         found = [getattr(pair, quantity) for pair in after.pairs if pair.name == change.pair]
         before = dataclasses.replace(before, change=dataclasses.replace(change, found=max(found, default=math.nan)))
     if before.remedy:
-        held = _anew(*advice.remedied(model, data), limit, control, good)
+        held = _settled_anew(*advice.remedied(model, data), limit, control, good)
         nothing = [dataclasses.replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs]
         held = dataclasses.replace(held, pairs=tuple(nothing))
     return before, after, held
 
 
-def _anew(
+def _settled_anew(
     model: Any, data: Any, law: Advance, limit: float, control: Control | None, good: Mapping[str, Any]
 ) -> Forecast:
     """A forecast without advice, of a model that is settled anew under another law of stepping."""
     settled = settle(model, data, limit, control, law)
-    return _told(_scene(awake(model), data, settled, stepping(control, law), **good), settled)
+    return _without_advice(_measured(awake(model), data, settled, with_control(control, law), **good), settled)
 
 
-def _scene(
+def _measured(
     model: Any, data: Any, settled: Rest, step: Advance, creep: float = CREEP, depth: float | None = None
 ) -> advice.AtRest:
-    """The contacts of a settled model, measured; `data` is left at the end of that."""
+    """The contacts of a settled model, and what was measured of them; `data` is left at the end of that."""
     moving = settled.moving
     if moving:
-        meet(model, data, step)
+        step_to_most_contacts(model, data, step)
     those, number = contacts(model, data)
     if not len(number):
         flexible = _flexible(data)
@@ -191,8 +191,8 @@ def _scene(
     radius = radii(model)[bodies].min(1)
     history: list[dict[tuple[int, int], Array]] = []
     time = WINDOW if settled.steady and not moving else SECOND
-    found = slips(model, data, those, number, bodies, watched(step, history), time)
-    now = borne(model, start)
+    found = measured_slip(model, data, those, number, bodies, noting_loads(step, history), time)
+    now = loads(model, start)
     for pair in np.unique(those.geoms, axis=0):
         part, key = (those.geoms == pair).all(1), tuple(pair.tolist())
         series = np.array([each.get(key, np.zeros(6)) for each in history])
@@ -209,8 +209,8 @@ def _scene(
     return advice.AtRest(model, start, own, those.rows, number, radius, moves, found, creep, good)
 
 
-def _told(scene: advice.AtRest, settled: Rest) -> Forecast:
-    """The forecast without advice."""
+def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
+    """The forecast for a settled model without advice."""
     those, moves, names = scene.contacts, scene.moves, geom_names(scene.model)
     law, harms, pairs = those.law(), scene.harm(those), []
     told = {name: np.where(moves, np.nan, getattr(law, name)) for name in ("depth", "creep", "turning")}
@@ -229,7 +229,7 @@ def _told(scene: advice.AtRest, settled: Rest) -> Forecast:
                 load=float(own.force[:, 0].sum()),
                 slides=bool((law.slides & ~moves)[part].any()),
                 hover=float(law.hover[part].min()),
-                rebound=own.rebound(_fall(scene.radius[part])),
+                rebound=own.rebound(_fall_speed(scene.radius[part])),
                 rebound_measured=math.nan,
                 decay=own.decay(),
                 largest_step=largest,
@@ -243,7 +243,7 @@ def _told(scene: advice.AtRest, settled: Rest) -> Forecast:
     for k, pair in enumerate(pairs[:SHOWN]):
         part = np.array(pair.members)
         own = dataclasses.replace(those.only(part), rows=scene.rows[part])
-        again = rebound(scene.model, scene.data, own, scene.number[part], _fall(scene.radius[part]))
+        again = rebound(scene.model, scene.data, own, scene.number[part], _fall_speed(scene.radius[part]))
         pairs[k] = dataclasses.replace(pair, rebound_measured=again)
     alone = min(pair.largest_step for pair in pairs)
     largest = min(alone, those.largest_step(min(alone, LARGEST)))
@@ -251,11 +251,11 @@ def _told(scene: advice.AtRest, settled: Rest) -> Forecast:
     return Forecast(tuple(pairs), step, largest, settled, _flexible(scene.data), None, "")
 
 
-def _fall(radius: Array) -> float:
+def _fall_speed(radius: Array) -> float:
     """Speed after a fall as far as the smallest radius, m/s."""
     return math.sqrt(2 * G * min(radius.min(), 1))
 
 
 def _flexible(data: Any) -> int:
-    """How many contacts have flexible bodies."""
+    """How many contacts there are of flexible bodies."""
     return int((data.contact.geom < 0).any(1).sum())

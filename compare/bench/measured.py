@@ -10,23 +10,23 @@ import mujoco
 import numpy as np
 
 from compare.bench.contact_law import MEETING, Array, Contacts
-from compare.bench.settled import WINDOW_STEPS, Advance, advance
+from compare.bench.settled import WINDOW_STEPS, Advance, mean_velocities
 
 
-def meet(model: Any, data: Any, step: Advance) -> None:
+def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
     """Advance to the moment of a window at which most pairs of geoms bear a load: what rattles comes and goes."""
     most = 0
     for _ in range(WINDOW_STEPS):
         step(model, data, 1)
         mujoco.mj_forward(model, data)
-        if len(borne(model, data)) > most:
-            most, best = len(borne(model, data)), copy.copy(data)
+        if len(loads(model, data)) > most:
+            most, best = len(loads(model, data)), copy.copy(data)
     if most:
         mujoco.mj_copyData(data, model, best)
 
 
-def borne(model: Any, data: Any) -> dict[tuple[int, int], Array]:
-    """Of each pair of geoms, summed over its contacts under load: load, N, depth, m, one, and friction, N (3)."""
+def loads(model: Any, data: Any) -> dict[tuple[int, int], Array]:
+    """What each pair of geoms bears, summed over its contacts: load, N, depth, m, number, and friction (3), N."""
     found: dict[tuple[int, int], Array] = {}
     force = np.zeros(6)
     for k, (geoms, depth) in enumerate(zip(data.contact.geom.tolist(), -data.contact.dist, strict=True)):
@@ -37,25 +37,25 @@ def borne(model: Any, data: Any) -> dict[tuple[int, int], Array]:
     return found
 
 
-def watched(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
-    """Steps that note what pairs of geoms bear."""
+def noting_loads(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
+    """A law of stepping that notes what pairs of geoms bear in each step."""
 
     def one_by_one(model: Any, data: Any, nstep: int) -> None:
         for _ in range(nstep):
             step(model, data, 1)
-            history.append(borne(model, data))
+            history.append(loads(model, data))
 
     return one_by_one
 
 
-def slips(
+def measured_slip(
     model: Any, data: Any, c: Contacts, number: Array, bodies: Array, step: Advance, time: float
 ) -> dict[str, Array]:
     """How deep each contact is, and how fast its two bodies slip past each other and turn, in the mean of a window."""
     found = data.contact
     depth, drift, frames = -found.dist[number], found.surfacevel[number, :2], found.frame[number].reshape(-1, 3, 3)
     lever = found.pos[number][:, None] - data.xipos[bodies]
-    velocity = advance(model, data, step, time)[bodies]
+    velocity = mean_velocities(model, data, step, time)[bodies]
     (first, second), turning = np.moveaxis(velocity, 1, 0)[..., :3], np.diff(velocity[..., 3:], axis=1)[:, 0]
     arms = np.cross(velocity[..., 3:], lever)
     slip = np.einsum("nij,nj->ni", frames[:, 1:], second + arms[:, 1] - first - arms[:, 0]) + drift

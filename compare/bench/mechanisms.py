@@ -23,7 +23,7 @@ _Motion = tuple[Array, ...]
 
 
 def cases() -> tuple[Case, ...]:
-    """All of them, in the order of their worth."""
+    """The cases that version 2 added."""
     return (_tripod(), *_stacks(), _belt(), _joint(), _rocking(), _bounce(), _disc())
 
 
@@ -34,7 +34,7 @@ def _tripod() -> Case:
     angles = math.tau / 3 * np.arange(3)
 
     def courses(t: Array, mu: float = mu, height: float = foot + down, share: float = 1.0) -> _Motion:
-        """Rates of (x, y, turn, v_x, v_y, spin): each foot bears what keeps the tripod from tilting.
+        """Position, velocity and spin of a tripod each foot of which bears what keeps it from tilting.
 
         The loads N of three feet at p follow from sum N = m g and the two moments of weight and friction about the
         centre, at `height`; `share` 0 gives each a third of the weight.

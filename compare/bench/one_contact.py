@@ -31,7 +31,7 @@ Course = Callable[..., tuple[Array, ...]]
 
 
 def cases() -> tuple[Case, ...]:
-    """All of them."""
+    """The cases with one contact."""
     return (*_blocks(), *_spheres(), _turntable(), _cylinder())
 
 

@@ -92,12 +92,12 @@ class Result:
 
     @property
     def error(self) -> float:
-        """At the shortest step."""
+        """The error at the shortest step, in units of the case's scales."""
         return self.errors[-1] if self.errors else math.nan
 
     @property
     def cost(self) -> float:
-        """At the shortest step."""
+        """Processor time divided by simulated time, at the shortest step."""
         return self.costs[-1] if self.costs else math.nan
 
     @property
@@ -172,13 +172,13 @@ class EngineProcess:
             return f"crashed (exit code {self._process.wait()})"
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         with self._process:
             self._process.kill()
         self._pipe.close()
 
     def result(self, case: Case, steps: Sequence[float] | None = None) -> Result:
-        """Of all steps; later ones are not tried where one hangs."""
+        """The engine on a case at all steps; shorter ones are not tried where one hangs."""
         about, found = self.about, Result(case.name, self.about)
         if about.missing:
             return replace(found, skipped=about.missing)
@@ -247,7 +247,7 @@ def _load(given: Any) -> tuple[Any, About]:
 
 
 def _version(given: Any, engine: Any) -> str:
-    """Of an engine's package, and the one with which it is known to work if that is another."""
+    """The version of an engine's package, and the one with which it is known to work if that is another."""
     _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
     listed = (adapters.KNOWN.get(own) or adapters.KNOWN.get(own.partition(":")[0], "")) if ours else ""
     package, _, known = getattr(engine, "KNOWN", listed).partition(" ")

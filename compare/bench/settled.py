@@ -75,7 +75,7 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     return model, data
 
 
-def drive(model: Any, data: Any, values: Sequence[str]) -> None:
+def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
     """Set controls: a number for each actuator, or NAME=NUMBER for some.
 
     Raises `InputError` for a name or a number that the model does not allow.
@@ -94,8 +94,8 @@ def drive(model: Any, data: Any, values: Sequence[str]) -> None:
         data.ctrl[k] = parse_number(f"--ctrl: {name}", text, "1", allowed)
 
 
-def stepping(control: Control | None, step: Advance = mujoco.mj_step) -> Advance:
-    """Steps with a controller before each."""
+def with_control(control: Control | None, step: Advance = mujoco.mj_step) -> Advance:
+    """A law of stepping that runs a controller before each step."""
     if control is None:
         return step
 
@@ -121,7 +121,7 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
 
     `law` steps in the place of `mj_step`. Raises `UnsettledError` if the model diverges.
     """
-    sleepy, model, step = model, awake(model), stepping(control, law)
+    sleepy, model, step = model, awake(model), with_control(control, law)
     mujoco.mj_forward(model, data)
     first, radius = copy.copy(data), radii(model)
     scale = np.where(np.isfinite(radius), radius, 0)[:, None] ** [0, 0, 0, 1, 1, 1]
@@ -129,7 +129,7 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
     begin, calm, restless = data.time, 0, np.zeros(model.nbody, bool)
     speed, change = np.zeros((2, model.nbody))
     while data.time < begin + limit and calm < 2:
-        start, velocity = data.time, advance(model, data, step)
+        start, velocity = data.time, mean_velocities(model, data, step)
         speed, change = np.hypot.reduce(velocity * scale, 1), np.hypot.reduce((velocity - last) * scale, 1)
         turned, last = np.hypot.reduce(velocity[:, 3:], 1) * (data.time - start), velocity
         restless = (change > np.minimum(RESTLESS * speed, JOLT) + NOISE) | (turned > TURNING)
@@ -141,7 +141,7 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
 
 
 def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
-    """Trees of bodies that sank while joints turned which an actuator drives."""
+    """Robots that sank while joints turned which an actuator drives, in words."""
     turned, gravity = np.zeros(model.nv), np.array(model.opt.gravity)
     mujoco.mj_differentiatePos(model, turned, 1, first.qpos, data.qpos)
     hinges = model.jnt_type[model.dof_jntid] != mujoco.mjtJoint.mjJNT_SLIDE
@@ -159,7 +159,7 @@ def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
 
 
 def _asleep(sleepy: Any, model: Any, data: Any, step: Advance) -> Iterator[str]:
-    """Bodies that fall asleep at once if they may."""
+    """Bodies that MuJoCo puts to sleep at once if it may, in words."""
     if sleepy is not model:
         state = copy.copy(data)
         step(sleepy, state, 2 * mujoco.mjMINAWAKE)
@@ -167,8 +167,8 @@ def _asleep(sleepy: Any, model: Any, data: Any, step: Advance) -> Iterator[str]:
             yield _body(model, int(np.flatnonzero(model.body_treeid == tree)[0]))
 
 
-def advance(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array:
-    """Mean velocities of the bodies in a window, shape (nbody, 6): of the centre of mass, m/s, and turning, rad/s.
+def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array:
+    """Advance by a window; the mean velocities of bodies in it, (nbody, 6): of centres, m/s, and turning, rad/s.
 
     Raises `UnsettledError` if the model diverges.
     """
@@ -189,7 +189,7 @@ def advance(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array
 
 
 def radii(model: Any) -> Array:
-    """Of each body, m: that of its largest geom; infinite where none has a size."""
+    """The radius of each body, m, which is that of its largest geom; infinite where none has a size."""
     radius = np.zeros(model.nbody)
     np.maximum.at(radius, model.geom_bodyid, model.geom_rbound)
     return np.where(radius > 0, radius, np.inf)

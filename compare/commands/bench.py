@@ -98,7 +98,7 @@ def foretold(args: argparse.Namespace) -> int:
     mujoco.set_mju_user_warning(lambda _: None)  # it would write a log here; what it warns of is in the table
     try:
         model, data = settled.load(args.file, args.keyframe)
-        settled.drive(model, data, args.ctrl)
+        settled.set_controls(model, data, args.ctrl)
         found = forecast.forecast(model, data, settled.settle(model, data, args.settle), **good)
         after = held = None
         if args.tries:

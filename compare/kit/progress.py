@@ -79,7 +79,7 @@ def shown(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
 
 
 @dataclass
-class Whole:
+class ValidationProgress:
     """How far a validation is: claims judged, protocols measured, runs of those under way."""
 
     show: Show

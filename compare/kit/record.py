@@ -218,7 +218,7 @@ class Records:
         return Measured(best.value, best.uncertainty) if best else None
 
 
-Testimony = Mapping[str, Mapping[int, Records]]
+RecordsByEngine = Mapping[str, Mapping[int, Records]]
 """What was measured by each engine, by name, the one on trial first; by time steps in one that a protocol asks for."""
 _OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set")
 _PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))

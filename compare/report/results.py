@@ -16,7 +16,7 @@ from typing import Any
 from compare.claim import Verdict
 from compare.kit import record
 from compare.kit.levels import Level
-from compare.kit.record import Records, Testimony
+from compare.kit.record import Records, RecordsByEngine
 from compare.kit.statistics import plain
 from model.errors import StorageError
 from model.files import check_ours, make_directory, reading_json, write_text
@@ -65,7 +65,7 @@ class Summary:
         }
 
 
-def testimony(files: Files) -> Testimony:
+def testimony(files: Files) -> RecordsByEngine:
     """The measurements that were judged, to be judged again; raises `StorageError` for a file that is not whole."""
     return {
         engine: {refine: sum(map(record.load, paths), Records()) for refine, paths in steps.items()}
