@@ -35,7 +35,7 @@ def going_round(
     axes: Axes,
     p: Parameters,
     quantity: Drawn,
-    case: Case,
+    cases: Case | tuple[Case, ...],
     begin: float,
     end: float,
     text: str = "RR",
@@ -43,10 +43,10 @@ def going_round(
     line: style.Line = style.STABLE,
 ) -> None:
     """A branch on which the ball goes round with the fluid, RR, SR, NR or NS, from one flow to another; its name."""
-    flows = np.linspace(begin, end, 200)
+    flows, case = np.linspace(begin, end, 200), cases if isinstance(cases, Case) else cases[0]
     rolls = p.R / p.r * flows
     slip_x = np.asarray(rolls if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)) - rolls
-    style.curve(axes, case, flows, quantity(slip_x, flows), text, place, line)
+    style.curve(axes, cases, flows, quantity(slip_x, flows), text, place, line)
 
 
 def ends(p: Parameters) -> tuple[float, float]:

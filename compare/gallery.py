@@ -31,7 +31,7 @@ Checks = tuple[Check, ...]
 Selected = dict[str, Callable[[], Any]]
 """By name, what gives a figure its data, or raises `GapError`."""
 
-FORMATS = ("svg", "pdf", "png")
+FORMATS = tuple(suffix[1:] for suffix in drawing.SUFFIXES)
 CAPTIONS = "captions.txt"
 FIGURES: Figures = {name: each for part in subjects.parts("figures") for name, each in part.FIGURES.items()}
 """Every figure, in the order of the report."""

@@ -44,8 +44,10 @@ ENTRIES: dict[str, str] = {
 """Where each engine is; NAME is in its best known settings, NAME-defaults as it comes."""
 KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
-LEAST = 1e-11
+LEAST = 1e-8
 """Smaller errors are drawn here."""
+FEW = 3
+"""So many engines have room for their errors beside their marks."""
 ENTRY_MARKS, ENTRY_COLOURS = (
     "osv^DPX*<>phd",
     ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
@@ -86,10 +88,8 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
     """A row for each engine that was tried: how many cases it passes, the median error of each kind, order and cost."""
     kinds = {case.name: case.kind for case in cases()}
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
-    for name, results in league.items():
+    for name, results in tried(league).items():
         own = [result for result in results if not result.skipped]
-        if not own:
-            continue
         medians = [_median(r.error if math.isfinite(r.error) else math.inf for r in own if kinds[r.case] == each)
                    for each in KINDS]  # fmt: skip
         order, cost = (_median(v for v in values if math.isfinite(v)) for values in
@@ -116,8 +116,14 @@ def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
 
 
 def tried(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
-    """Engines that were tried in some case."""
-    return {name: results for name, results in league.items() if not all(result.skipped for result in results)}
+    """Engines that were tried in some case; those that pass the largest share first, as they come behind all others."""
+
+    def place(name: str) -> tuple[bool, float]:
+        own = [result.passed for result in league[name] if not result.skipped]
+        return name.endswith("-defaults"), -statistics.mean(own)
+
+    there = [name for name, results in league.items() if not all(result.skipped for result in results)]
+    return {name: league[name] for name in sorted(there, key=place)}
 
 
 def cell(result: Result) -> str:
@@ -185,14 +191,16 @@ def _median(values: Iterator[float]) -> float:
 
 def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
     """A panel for each kind of case: the median of an engine's errors over that of its costs, its steps joined."""
-    from compare.kit import style  # here, because drawing takes a second to load
+    from matplotlib.ticker import NullFormatter  # here, because drawing takes a second to load
+
+    from compare.kit import style
 
     kinds = {case.name: case.kind for case in cases()}
-    figure, panels = style.panels(7.6, 8.8, 2, 2, sharex=True, sharey=True)
-    tried = {name: [r for r in results if r.errors] for name, results in league.items()}
-    families = list(dict.fromkeys(name.removesuffix("-defaults") for name, own in tried.items() if own))
+    shown = {name: [r for r in results if r.errors] for name, results in tried(league).items()}
+    families = list(dict.fromkeys(name.removesuffix("-defaults") for name in shown))
+    figure, panels = style.panels(9.0, 4.4 + 0.19 * len(shown), 2, 2, sharex=True, sharey=True)
     for axes, each in zip(panels.ravel(), KINDS, strict=True):
-        for name, results in tried.items():
+        for name, results in shown.items():
             own = np.array([[r.costs, r.errors] for r in results if kinds[r.case] == each])
             if not len(own):
                 continue
@@ -202,17 +210,25 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             look = {
                 "marker": ENTRY_MARKS[number % len(ENTRY_MARKS)],
                 "color": ENTRY_COLOURS[number % len(ENTRY_COLOURS)],
-                "ms": 6,
+                "ms": 5.5,
                 "lw": 1,
             }
             look |= {"mfc": "white", "ls": ":"} if name.endswith("-defaults") else {}
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
+            for at in zip(cost, error, strict=True) if len(shown) <= FEW else ():
+                place = at[0], max(at[1], LEAST)
+                axes.annotate(f"{at[1]:.0e}", place, xytext=(6, 3), textcoords="offset points", fontsize=8)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)
+    shared = panels[0, 0]
+    for axis, limit in ((shared.xaxis, shared.set_xlim), (shared.yaxis, shared.set_ylim)):
+        low, high = np.log10(axis.get_view_interval())
+        limit(10 ** np.floor(low), 10 ** np.ceil(high))  # whole decades, each with its number
+        axis.set_minor_formatter(NullFormatter())
     for axes in panels[:, 0]:
         axes.set_ylabel("error, in units of the case's scales")
     for axes in panels[1]:
         axes.set_xlabel("processor time divided by simulated time")
-    style.legend(figure, loc="outside lower center", ncols=3)
+    style.legend(figure, loc="outside lower center", ncols=4)
     return figure

@@ -52,7 +52,7 @@ def add(commands: options.Commands) -> None:
 
 def ranked(args: argparse.Namespace) -> int:
     """Measure, show the table, write JSON and page."""
-    from compare.report.pictures import address, svg  # here, because drawing takes a second to load
+    from compare.kit.pictures import embedded, svg  # here, because drawing takes a second to load
 
     usual = [name for name in league.ENTRIES if not args.settings or re.match(r"mujoco(-plain|-defaults)?$", name)]
     chosen: dict[str, Any] = {name: league.ENTRIES.get(name, name) for name in args.engine or usual}
@@ -76,8 +76,10 @@ def ranked(args: argparse.Namespace) -> int:
         "about": league.about(found),
         "notes": list(league.notes(found)),
         "caption": league.CAPTION,
-        "picture": address(svg(league.draw(found))),
+        "least": f"{league.LEAST:g}",
     }
+    pictures, shown["letters"] = embedded({"": svg(league.draw(found))})
+    shown["picture"] = pictures[""]
     write_text(args.output / LEAGUE_PAGE, pages.render("compare.bench", "league.html", **shown))
     for what, why in league.notes(found):
         if what.endswith("all cases"):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from compare.kit.record import Check, Measurement, Records
 from model import Parameters, StorageError, Trajectory, storage
-from model.files import write_bytes
+from model.files import write_bytes, write_text
 
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
     from matplotlib.figure import Figure
@@ -77,17 +77,25 @@ class Drawing:
     """The claims beside which it stands."""
 
 
+SUFFIXES = (".svg", ".pdf", ".png")
+"""Of the files that figures are written to."""
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure to a file, in the format that its name says; equal figures make equal files.
 
     Raises `StorageError` if it can't be written or the name says no format.
     """
     suffix = path.suffix.lower()
-    date = {".svg": "Date", ".pdf": "CreationDate"}.get(suffix)
-    if suffix[1:] not in figure.canvas.get_supported_filetypes():
+    if suffix not in SUFFIXES:
         raise StorageError(f"cannot write {path}: a figure is a .png, .svg or .pdf")
+    if suffix == ".svg":
+        from compare.kit.pictures import svg  # here, because drawing takes a second to load
+
+        return write_text(path, svg(figure))
     out = io.BytesIO()
-    figure.savefig(out, format=suffix[1:], dpi=200, metadata={date: None} if date else {})
+    metadata = {"CreationDate": None} if suffix == ".pdf" else {}
+    figure.savefig(out, format=suffix[1:], dpi=200, metadata=metadata)
     write_bytes(path, out.getvalue())
 
 

@@ -10,7 +10,9 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from compare.kit.engines import ENGINES
 from compare.kit.lab import coarse_step
@@ -33,11 +35,15 @@ COLOURS = {
     Case.NN: "#000000",
 }
 """Okabe and Ito's colours, told apart by colour-blind readers; names beside the curves tell them apart in print."""
+HOPPING = "#7B3294"
+"""Of a ball that hops for ever, a motion of several cases."""
 FORCE, SLIP, BALL, INK = "#b3261e", "#6a3d9a", "#f5cc6b", "#1c2430"
 """Of pictures and films: arrows of force and slip, the ball, text."""
 Line = str | tuple[object, ...]
 """A line style of matplotlib."""
 STABLE, UNSTABLE = "-", (0, (5, 2.5))
+_TURN = 4.0
+"""How long each colour of a line of several cases is, in widths of the line."""
 Place = tuple[float, tuple[float, float]]
 """Where the name of a curve stands: at a share of its length, with an offset in points."""
 GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
@@ -47,7 +53,14 @@ POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none
 HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.85}
 """Background of a name that stands on lines."""
 SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
-THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+THRESHOLD_LINES: dict[str, tuple[str, Line]] = {
+    "omega_01": (COLOURS[Case.RR], "-"),
+    "omega_02": (COLOURS[Case.NR], "--"),
+    "omega_03": (COLOURS[Case.SR], "-."),
+    "omega_04": (COLOURS[Case.SS], (0, (1, 1))),
+}
+"""Each threshold in the colour of the case that ends or begins there."""
+THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in THRESHOLD_LINES}
 FREE_0, FREE_C = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "$\\Omega_c = \\omega_c\\sqrt{R/g}$"
 FREE_X = "$\\omega_x^0\\sqrt{R/g}$"
 LONGEST_BAR = 0.1
@@ -120,9 +133,15 @@ def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
         axes.secondary_yaxis("right", functions=scale).set_ylabel(y)
 
 
+def tint(*cases: Case) -> str:
+    """The pale ground of a region in which balls end in these cases."""
+    colours = [to_rgb(COLOURS[case]) for case in cases]
+    return to_hex(0.86 + 0.14 * np.mean(colours, axis=0))
+
+
 def curve(
     axes: Axes,
-    case: Case,
+    cases: Case | tuple[Case, ...],
     x: npt.ArrayLike,
     y: npt.ArrayLike,
     text: str = "",
@@ -130,15 +149,22 @@ def curve(
     line: Line = STABLE,
     width: float = 2,
 ) -> None:
-    """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place."""
-    axes.plot(x, y, color=COLOURS[case], ls=line, lw=width)
+    """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place.
+
+    Of several cases that lie on it the colours take turns.
+    """
+    cases = cases if isinstance(cases, tuple) else (cases,)
+    label = f"_{text or ', '.join(case.name for case in cases)}"
+    for k, case in enumerate(cases):
+        turns = (_TURN * k, (_TURN, _TURN * (len(cases) - 1))) if len(cases) > 1 else line
+        axes.plot(x, y, color=COLOURS[case], ls=turns, lw=width, label=label)
     if place:
         points, (at, offset) = np.transpose([x, y]), place
         steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
         way = steps.cumsum()
         k = int(np.searchsorted(way, at * way[-1]))
         here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (points[k + 1] - points[k])
-        name(axes, here_x, here_y, text, offset, COLOURS[case])
+        name(axes, here_x, here_y, text, offset, COLOURS[cases[-1]]).set_label(label)
 
 
 def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float]) -> None:
@@ -147,13 +173,13 @@ def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float])
     name(axes, x, y, text, offset)
 
 
-def name(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> None:
+def name(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> Text:
     """A name beside a point or a curve, `offset` in points; one that is far off has a line to it."""
     leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1} if math.hypot(*offset) > 16 else None
     ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
     va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
     look: dict[str, Any] = {"color": colour, "arrowprops": leader, "zorder": 6, "ha": ha, "va": va, "fontsize": 9}
-    axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", bbox=HALO, **look)
+    return axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", bbox=HALO, **look)
 
 
 def guides(axes: Axes, values: dict[str, float]) -> None:
@@ -208,7 +234,9 @@ def points(
         for pale in (False, True):
             shown = [m for m in own if (COVERAGE * unit * m.uncertainty > longest) == pale]
             bars = [math.nan if pale else COVERAGE * unit * m.uncertainty for m in shown]
-            faint: dict[str, Any] = {"alpha": 0.4} | ({"label": ""} if len(shown) < len(own) else {}) if pale else {}
+            faint: dict[str, Any] = (
+                {"alpha": 0.4} | ({"label": f"_{engine}{way}"} if len(shown) < len(own) else {}) if pale else {}
+            )
             places = [x(m) for m in shown], [unit * y(m) for m in shown]
             if shown:
                 axes.errorbar(*places, bars, **mark_of(engine) | usual | faint | look)

@@ -186,8 +186,8 @@ def described(made: Design) -> dict[str, Any]:
 
 def page(made: Design) -> str:
     """All of it as a page that needs nothing but itself."""
-    from compare.report import pictures
-    from compare.subjects.flowmeter import meter as figures  # here, because drawing takes a second to load
+    from compare.kit.pictures import embedded, svg  # here, because drawing takes a second to load
+    from compare.subjects.flowmeter import meter as figures
 
     r, bounds = made.request, made.request.bounds[made.material]
     response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""
@@ -198,9 +198,9 @@ def page(made: Design) -> str:
         "bounds": ", ".join(f"{_named(name)} {span}" for name, span in spans.items()),
         "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
-    drawn = [(pictures.svg(draw(made)), caption) for draw, caption in figures.FIGURES]
+    drawn, letters = embedded({caption: svg(draw(made)) for draw, caption in figures.FIGURES})
     texts = {"doubts": doubts(made.model_error), "sentences": sentences(made), "tables": rows(made).items()}
-    return pages.render("compare.report", "meter.html", made=made, **texts, asked=asked, figures=drawn)
+    return pages.render("compare.report", "meter.html", made=made, **texts, asked=asked, figures=drawn, letters=letters)
 
 
 def _values(values: Mapping[str, Any]) -> str:

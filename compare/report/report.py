@@ -20,6 +20,7 @@ from compare.gallery import FIGURES, figures_of
 from compare.kit import pages
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
+from compare.kit.pictures import embedded
 from compare.kit.record import Check, Measurement, Records
 from compare.kit.workers import Spread
 from compare.report import pictures, results, wording
@@ -56,7 +57,8 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
     drawings = dict(free)
     for own in beside.values():
         drawings |= own
-    figures, shown = _figures(material, drawings, spread), dict[str, str]()
+    figures, letters = _figures(material, drawings, spread)
+    shown: dict[str, str] = {}
     sections: dict[str, list[dict[str, Any]]] = {}
     for verdict in ran:
         claim, own = verdict.claim, beside.get(verdict.claim.id, {})
@@ -94,6 +96,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
     return pages.render(
         "compare.report",
         "report.html",
+        letters=letters,
         title=f"{len(ran)} claims: {', '.join(map(' '.join, wording.kinds(ran)))}",
         headline=wording.headline(ran),
         missing=wording.missing(ran),
@@ -175,8 +178,10 @@ def packed(of: Mapping[str, Sequence[Any]]) -> str:
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
 
 
-def _figures(material: Material, drawings: Mapping[str, Drawing], spread: Spread) -> dict[str, dict[str, str]]:
-    """What the page shows of every figure: a picture with its caption, or why there is none."""
+def _figures(
+    material: Material, drawings: Mapping[str, Drawing], spread: Spread
+) -> tuple[dict[str, dict[str, str]], str]:
+    """What the page shows of every figure: a picture with its caption, or why there is none; and all letters."""
     figures, new = {}, []
     for name, drawing in drawings.items():
         path = material.directory / results.FIGURES / f"{name}.svg"
@@ -193,4 +198,7 @@ def _figures(material: Material, drawings: Mapping[str, Drawing], spread: Spread
     new.reverse()  # the last ones take longest
     for (path, *_), drawn in zip(new, spread(pictures.drawn, new), strict=True):
         figures[path.stem] |= drawn
-    return figures
+    made, letters = embedded({name: each["picture"] for name, each in figures.items() if not each["gap"]})
+    for name, picture in made.items():
+        figures[name]["picture"] = picture
+    return figures, letters

@@ -12,8 +12,9 @@ from matplotlib.patches import Patch
 
 from compare.kit import style
 from compare.subjects.attractors.basins import FATES, Basins
+from model import Case
 
-_COLOURS = ("#F0E442", "#0072B2", "#D55E00", "#009E73", "#000000")
+_COLOURS = (style.HOPPING, *(style.COLOURS[case] for case in (Case.RR, Case.SS, Case.NR, Case.NN)))
 """Of `FATES`."""
 _VARIABLES = {
     "omega_c": style.OMEGA_C,

@@ -52,7 +52,7 @@ def test_design_as_json_and_as_a_page(tmp_path: Path, capsys: pytest.CaptureFixt
     assert text.index("hold for this fluid") < text.index("ω₀₂")
     for shown in (f"{worst['omega_0']:.3g}", f"{values['eta']:.4g}", f"{2 * math.pi / 3:.4g}"):
         assert shown in text
-    assert text.count("<svg") == 3
+    assert text.count('<figure class="plot"') == 3
     assert "cork can't be used" in text
 
 

@@ -119,7 +119,7 @@ def test_the_league_of_theory_alone(tmp_path, capsys):
     assert len(tried) == sum(case.motion is not None for case in cases())
     assert all(result["errors"][0] < 1e-8 and result["passed"] for result in tried)
     page = (tmp_path / "league.html").read_text("utf-8")
-    assert "data:image/svg+xml,<" in page
+    assert '<figure class="plot"' in page
     assert "only for a ball in a vessel" in page
     assert cli.main(["league", "--engine", "no.such", "-o", str(tmp_path), "--quiet"]) == 2
     assert "nothing to compare: no.such can't be used: ModuleNotFoundError: No module" in capsys.readouterr().err

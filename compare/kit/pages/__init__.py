@@ -54,10 +54,12 @@ def typeset(text: str) -> str:
 def render(package: str, template: str, **values: Any) -> str:
     """A template of a package, filled in; what is not marked safe is escaped, a value that is missing is an error."""
     import jinja2  # here, because the terminal has no pages
+    import markupsafe
 
     loader = jinja2.ChoiceLoader([jinja2.PackageLoader(package), jinja2.PackageLoader("compare.kit.pages")])
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters["typeset"] = typeset
+    environment.globals["source"] = lambda name: markupsafe.Markup(loader.get_source(environment, name)[0])
     return environment.get_template(template).render(**values)
 
 

@@ -25,7 +25,6 @@ from model.files import reading_json
 SET = Parameters.named("hopping")
 LOWEST_FLOW, HIGHEST_FLOW = 0.9, 1.4
 """Flows shown, in units of omega_02."""
-COLOUR = "#7B3294"
 
 
 def select(material: Material, quantity: str) -> Diagram:
@@ -63,15 +62,15 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             end = analytic.solution(fast, Case.SS, stable=stable).state
             height = float(quantity(end.slip_x, end.omega_c))
             style.name(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
-        going_round(axes, p, quantity, Case.NR, edge, HIGHEST_FLOW * edge, "SR, NR", (0.6, rides))
+        going_round(axes, p, quantity, (Case.SR, Case.NR), edge, HIGHEST_FLOW * edge, "SR, NR", (0.6, rides))
         going_round(axes, p, quantity, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge, "NS", (0.5, (-3, 9)))
         cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
         mean = quantity(means.slip_x, means.omega_c)
         low, high = [c.min() for c in cycles], [c.max() for c in cycles]
-        axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
+        axes.fill_between(branch.values, low, high, color=style.HOPPING, alpha=0.25, lw=0)
         for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
-            axes.plot(branch.values, np.where(part, mean, np.nan), color=COLOUR, ls=line, lw=2)
-        style.name(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, COLOUR)
+            axes.plot(branch.values, np.where(part, mean, np.nan), color=style.HOPPING, ls=line, lw=2)
+        style.name(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, style.HOPPING)
         for special in branch.places:
             if special.kind is orbit_branch.Bifurcation.BIRTH:
                 born = State(*special.orbit.mean)
@@ -146,7 +145,7 @@ def draw_walls(of: Diagram) -> tuple[Figure, str]:
     shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
     for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
         for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
-            axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
+            axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=style.HOPPING, ls=line, lw=2)
         named = {"torus": ("torus", (0, -20)), "fold": ("fold", (8, 4)), "nonsmooth birth": ("birth", (-8, 5))}
         for place in places:
             x, y = place["value"], unit * place["orbit"][quantity]

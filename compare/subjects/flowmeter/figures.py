@@ -66,9 +66,9 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
     states = [m for curve in curves for m in curve.states]
     return figure, (
         f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
-        "dashed where unstable; SR and NR lie on one line. Settled states were measured from rest, going round "
-        f"with the fluid, and high up on the wall. Below: relative deviation from the nearest attracting "
-        f"solution; what is below 1e-16 is drawn there.{style.marks(states)}"
+        "dashed where unstable; of cases that lie on one line the colours take turns. Settled states were measured "
+        "from rest, going round with the fluid, and high up on the wall. Below: relative deviation from the nearest "
+        f"attracting solution; what is below 1e-16 is drawn there.{style.marks(states)}"
     )
 
 
@@ -90,7 +90,7 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     if p.eta < p.j:
         said = (
             "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
-            "(arrows)."
+            "(arrows). Dashed: unstable."
         )
         t = theory(axes, p, top)
         slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
@@ -103,27 +103,17 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
         style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
     else:
         said = (
-            "The curves of RR, SR and NR lie on one line: the widest is NR, the narrowest RR. "
+            "RR, SR and NR lie on one line, in which their colours take turns; between ω₀₂ and ω₀₃ SR is on it, too, "
+            "and unstable. "
             "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
         )
-        t = bifurcation.thresholds(p)
-        for case, span, width, line, at in (
-            (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (9, -9))),
-            (Case.SR, (t.omega_03, top), 5, style.STABLE, (0.4, (-12, 12))),
-            (Case.SR, (t.omega_02, t.omega_03), 5, (0, (1.5, 0.8)), (0.1, (-30, 20))),
-            (Case.RR, (0.0, t.omega_03), 2, style.STABLE, (0.45, (-5, 5))),
-        ):
-            text = case.name if line == style.STABLE else f"{case.name}, unstable"
-            style.curve(axes, case, span, span, text, at, line, width)
+        t = theory(axes, p, top)
         axes.plot([t.omega_02], [t.omega_02], **style.POINT)
         style.points(axes, [m for m in of.states if m.conditions["case"] in ("RR", "SR", "NR")], ms=4)
-        style.guides(axes, {"omega_02": t.omega_02, "omega_03": t.omega_03})
     axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
-    return figure, style.caption(
-        p, "Characteristic curve of the flowmeter.", said, "Dashed: unstable.", states=of.states
-    )
+    return figure, style.caption(p, "Characteristic curve of the flowmeter.", said, states=of.states)
 
 
 def top_flow(p: Parameters) -> float:
@@ -136,12 +126,18 @@ def top_flow(p: Parameters) -> float:
 
 
 def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
-    """All solutions up to the fastest flow, and the thresholds; for eta > j RR, SR and NR are one line."""
+    """All solutions up to the fastest flow, but for unstable SR; the thresholds. For eta > j all are on one line."""
     t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, ends(p)
-    for case, span, text, at in ((Case.RR, (0.0, rolls), "RR", 0.45), (Case.SR, (rides, fastest), "SR, NR", 0.7)):
-        style.curve(axes, case, span, span, text, (at, (-5, 5)))
+    spans: list[tuple[tuple[Case, ...], tuple[float, float], float]] = [
+        ((Case.RR,), (0.0, rolls if folds else t.omega_02), 0.45),
+        ((Case.SR, Case.NR), (rides, fastest), 0.7),
+    ]
     if folds:
         slipping(axes, p, lambda _, omega_c: omega_c, (0.5, (0, -7)), (0.5, (38, -14)))
+    else:
+        spans.append(((Case.RR, Case.NR), (t.omega_02, rolls), 0.5))
+    for cases, span, at in spans:
+        style.curve(axes, cases, span, span, ", ".join(case.name for case in cases), (at, (-5, 5)))
     axes.set_xlim(0, fastest)
     style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))})
     return t

@@ -14,8 +14,6 @@ from compare.kit import style
 from model import Case
 
 _LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f")} | {"gravity": "gravity"}
-_LINES = {"omega_01": Case.SS, "omega_02": Case.NR, "omega_03": Case.SR, "omega_04": Case.NS}
-"""Each threshold by the colour of the case that begins there."""
 _FINE = 51
 """Points of the plane of friction along each axis."""
 
@@ -46,7 +44,11 @@ def sensitivities(made: Design) -> Figure:
     for k, key in enumerate(there):
         values = [made.sensitivities[key][name].value for name in names]
         places = np.arange(len(names)) + (k - (len(there) - 1) / 2) * width
-        look: dict[str, Any] = {"color": style.COLOURS[_LINES[key]], "hatch": ("", "//", "..", "xx")[k], "ec": "white"}
+        look: dict[str, Any] = {
+            "color": style.THRESHOLD_LINES[key][0],
+            "hatch": ("", "//", "..", "xx")[k],
+            "ec": "white",
+        }
         axes.bar(places, values, width, label=style.THRESHOLD_LABELS[key], **look)
     axes.axhline(0, color="black", lw=0.8)
     axes.set_xticks(range(len(names)), [_LABELS.get(name, f"${name}$") for name in names])

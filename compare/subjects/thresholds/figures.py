@@ -34,21 +34,15 @@ _LEAST, _WIDEST = 0.01, 0.8
 """Frictions of the wall shown, and the least at which thresholds that meet set the scale."""
 _SECTIONS = {0.2: "Figs. 9, 10", 0.6: "Figs. 9, 11"}
 """The two typical sections of Fig. 7, by wall friction."""
-_LINES = {
-    "omega_01": ("#0072B2", "-"),
-    "omega_02": ("#009E73", "--"),
-    "omega_03": ("#E69F00", "-."),
-    "omega_04": ("#D55E00", (0, (1, 1))),
-}
 _BISTABLE = Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR
 TINTS = {
-    Exists.RR | Exists.NS: "#e8f1f8",
-    Exists.SS | Exists.NS: "#fbe6dc",
-    _BISTABLE: "#f4e6ef",
-    Exists.RR | Exists.SR | Exists.NR: "#fdf3df",
-    Exists.SR | Exists.NR: "#e3f3ec",
+    Exists.RR | Exists.NS: style.tint(Case.RR),
+    Exists.SS | Exists.NS: style.tint(Case.SS),
+    _BISTABLE: style.tint(Case.SS, Case.NR),
+    Exists.RR | Exists.SR | Exists.NR: style.tint(Case.RR, Case.NR),
+    Exists.SR | Exists.NR: style.tint(Case.NR),
 }
-"""Pale grounds of the regions; lines and names tell them apart without colour."""
+"""Pale grounds of the regions, by what attracts; lines and names tell them apart without colour."""
 
 
 @dataclass(frozen=True)
@@ -115,8 +109,8 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
         hatched.set(edgecolor="0.75", linewidth=0)
     unit = np.sqrt(p.g / p.R)
     for name, curve in bifurcation.threshold_curves(p, mu, eta).items():
-        if name in _LINES:
-            colour, line = _LINES[name]
+        if name in style.THRESHOLD_LINES:
+            colour, line = style.THRESHOLD_LINES[name]
             # omega_03 ends rolling for eta > j only.
             shown = np.where((eta < p.j) & (name == "omega_03"), np.nan, curve * unit)
             axes.plot(eta, shown, color=colour, ls=line, lw=1.8, label=style.THRESHOLD_LABELS[name])

@@ -1,0 +1,163 @@
+"""Figures as SVG that a page can play with: series switched on and off, values under the pointer, zoom.
+
+matplotlib draws the figure, once. What bears a label is written as a series of that name, and axes say how a place in
+the picture becomes a value; `templates/figure.js` reads both. Where no script runs, the picture is there all the same.
+A label that begins with an underscore names a series that no legend lists, as is matplotlib's rule.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.container import Container
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedFormatter
+
+from compare.kit.pages import typeset
+
+_SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
+_UNNAMED = re.compile(r"_child\d+|_nolegend_|")
+_TEX = {r"\omega": "ω", r"\Omega": "Ω", r"\eta": "η", r"\mu": "μ", r"\rho": "ρ", r"\nu": "ν"}
+_TEX |= {r"\Delta": "Δ", r"\sqrt{R/g}": "√(R/g)", r"^0": "⁰"}
+for _prefix, _uri in (("", _SVG), ("xlink", _XLINK)):
+    ElementTree.register_namespace(_prefix, _uri[1:-1])
+
+
+def svg(figure: Figure) -> str:
+    """A figure as SVG; equal figures give equal text."""
+    parts = {f"part-{k}": part for k, part in enumerate(_named(figure))}
+    for gid, (artist, _) in parts.items():
+        artist.set_gid(gid)
+    out = io.BytesIO()
+    if any(axes.child_axes for axes in figure.axes):  # second scales know their limits only once they were drawn
+        figure.draw_without_rendering()
+    canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
+    canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    root = ElementTree.fromstring(re.sub(rb">\s+<", b"><", out.getvalue()))
+    for group in root.iter(f"{_SVG}g"):
+        if part := parts.get(group.attrib.pop("id", "")):
+            artist, name = part
+            if isinstance(artist, Axes):
+                group.set("data-axes", json.dumps(_scales(figure, artist), ensure_ascii=False))
+            else:
+                group.set("data-series", name)
+        _join_styles(group)
+    _renumber(root)
+    return _rounded(ElementTree.tostring(root, encoding="unicode"))
+
+
+def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
+    """SVG pictures by name as parts of one page, and the letters that they share, which is to stand before them."""
+    letters: dict[str, str] = {}
+    made = {}
+    for k, (name, picture) in enumerate(pictures.items()):
+
+        def letter(found: re.Match[str]) -> str:
+            letters[found[1]] = found[0]
+            return ""
+
+        text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', letter, picture).replace("<defs></defs>", "")
+        text = re.sub(r"<style.*?</style>", "", text)  # for all lines of a picture: pages have it, too
+        text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace("xlink:href", "href")
+        made[name] = re.sub(r'^<svg[^>]*?(viewBox="[^"]*")[^>]*>', r'<svg \1 role="img">', text)
+    return made, f'<svg width="0" height="0" style="position:absolute"><defs>{"".join(letters.values())}</defs></svg>'
+
+
+def plain(label: str) -> str:
+    """A label of matplotlib without TeX: "$\\omega_c$ (rad/s)" is "ω_c (rad/s)"."""
+    for tex, text in _TEX.items():
+        label = label.replace(tex, text)
+    label = re.sub(r"\\tilde(?:\{(\w)\}| ?(\w))", lambda found: f"{found[1] or found[2]}\u0303", label)
+    return re.sub(r"[${}]|\\", "", label).replace("\n", " ")
+
+
+def _named(figure: Figure) -> Iterator[tuple[Artist, str]]:
+    """All axes, and what bears a label in each, with its name in HTML."""
+    for axes in figure.axes:
+        yield axes, ""
+        boxes = ((part, box.get_label()) for box in axes.containers if isinstance(box, Container)
+                 for part in _flat(box.get_children()))  # fmt: skip
+        for artist, label in (*boxes, *((each, each.get_label()) for each in axes.get_children())):
+            if isinstance(label, str) and not _UNNAMED.fullmatch(label):
+                yield artist, typeset(plain(label.removeprefix("_")))
+
+
+def _flat(artists: Any) -> Iterator[Artist]:
+    for each in artists:
+        yield from [each] if isinstance(each, Artist) else _flat(each)
+
+
+def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
+    """Of axes their box, and what each axis says: panels in a row or column share one label."""
+    width, height = 72 * figure.get_size_inches()
+    box = axes.get_position()
+    x, y = (box.x0 * width, box.x1 * width), (height * (1 - box.y0), height * (1 - box.y1))
+    columns, rows = axes.get_shared_x_axes().get_siblings(axes), axes.get_shared_y_axes().get_siblings(axes)
+    return {
+        "box": [round(float(v), 2) for v in (*x, *reversed(y))],
+        "x": _scale("x", axes.xaxis, axes.get_xlim(), x, [axes, *columns]),
+        "y": _scale("y", axes.yaxis, axes.get_ylim(), y, [axes, *rows]),
+    }
+
+
+def _scale(
+    name: str, axis: Axis, limits: tuple[float, float], places: tuple[float, float], alike: list[Axes]
+) -> dict[str, Any]:
+    """Of an axis its label, its kind, and (a, b): a + b times the place is the value, or its logarithm."""
+    label = next(filter(None, (getattr(each, f"get_{name}label")() for each in alike)), name)
+    about: dict[str, Any] = {"label": str(typeset(plain(label))), "kind": axis.get_scale()}
+    low, high = np.log10(limits) if about["kind"] == "log" else limits
+    slope = (high - low) / (places[1] - places[0])
+    about |= {"a": float(f"{low - slope * places[0]:.8g}"), "b": float(f"{slope:.8g}")}
+    if isinstance(formatter := axis.get_major_formatter(), FixedFormatter):
+        names = zip(axis.get_majorticklocs().tolist(), formatter.seq, strict=False)
+        about["names"] = [[at, str(typeset(plain(name)))] for at, name in names]
+    return about
+
+
+def _join_styles(group: ElementTree.Element) -> None:
+    """Give a group the style that all of its marks have."""
+    styles = {child.get("style") for child in group}
+    if len(group) > 1 and {child.tag for child in group} == {f"{_SVG}use"} and len(styles) == 1:
+        for child in group:
+            child.attrib.pop("style", None)
+        if style := styles.pop():
+            group.set("style", style)
+
+
+def _renumber(root: ElementTree.Element) -> None:
+    """Name what is referred to, but letters, in order, and nothing else: matplotlib's names are drawn by lot."""
+    names: dict[str, str] = {}
+
+    def named(found: re.Match[str]) -> str:
+        return found[1] + (found[2] if "-" in found[2] else names.setdefault(found[2], f"n{len(names)}"))
+
+    for each in root.iter():
+        for attribute in (f"{_XLINK}href", "clip-path", "style", "mask", "fill"):
+            if "#" in (text := each.get(attribute, "")):
+                each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", named, text))
+    for each in root.iter():
+        if "id" in each.attrib and "-" not in each.attrib["id"]:
+            name = each.attrib.pop("id")
+            if name in names:
+                each.set("id", names[name])
+
+
+def _rounded(text: str) -> str:
+    """Places to hundredths of a point, which are fine enough, and half as long; no spaces that say nothing."""
+
+    def rounded(found: re.Match[str]) -> str:
+        return re.sub(r" +(?=[ \"])", "", re.sub(r"(\.\d\d)\d+", r"\1", found[0]))
+
+    text = re.sub(r' (?:d|x|y)="[^"]*"|translate\([^)]*\)', rounded, text)
+    return re.sub(r' style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)

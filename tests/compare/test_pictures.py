@@ -1,0 +1,113 @@
+"""Pictures that pages can play with: what is in them, and what a browser makes of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from matplotlib.figure import Figure
+
+from compare.commands import cli
+from compare.commands.bench import LEAGUE_PAGE
+from compare.kit import pages
+from compare.kit.pictures import embedded, plain, svg
+from tests.compare.test_report import BROWSER
+
+
+def made() -> Figure:
+    figure = Figure(figsize=(4, 3))
+    axes = figure.add_subplot()
+    axes.plot([1.0, 10.0], [0.0, 4.0], label="_a line")
+    axes.errorbar([1.0, 10.0], [1.0, 3.0], [0.1, 0.2], ls="none", marker="o", label="marks")
+    axes.set(xscale="log", xlabel="$\\omega_0$ (rad/s)", ylabel="height", xlim=(0.5, 20), ylim=(-1, 5))
+    return figure
+
+
+def test_series_and_scales_are_in_the_picture() -> None:
+    text = svg(made())
+    assert text == svg(made())  # equal figures give equal text
+    series = re.findall('data-series="([^"]*)"', text)
+    assert series.count("a line") == 1
+    assert series.count("marks") == 2  # and bars
+    (axes,) = re.findall('data-axes="([^"]*)"', text)
+    assert "&lt;i&gt;ω&lt;/i&gt;&lt;sub&gt;0&lt;/sub&gt; (rad/s)" in axes
+    ElementTree.fromstring(text)
+
+
+def test_pictures_of_a_page_share_letters_and_nothing_else() -> None:
+    pictures, letters = embedded({"a": svg(made()), "b": svg(made())})
+    of = {name: set(re.findall('id="([^"]*)"', text)) for name, text in pictures.items()}
+    there = set(re.findall('id="([^"]*)"', letters))
+    assert of["a"]
+    assert there
+    assert not of["a"] & of["b"]
+    for name, text in pictures.items():
+        assert set(re.findall(r'(?:url\(|href=")#([\w-]+)', text)) <= of[name] | there
+
+
+@pytest.mark.parametrize(
+    ("label", "read"),
+    [
+        ("$\\omega_c$ (rad/s)", "ω_c (rad/s)"),
+        ("$\\tilde{ω}_{x}$", "ω̃_x"),
+        ("$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "Ω_0 = ω_0√(R/g)"),
+        ("plain", "plain"),
+    ],
+)
+def test_labels_are_read_without_tex(label: str, read: str) -> None:
+    assert plain(label) == read
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api")
+    if BROWSER is None:
+        pytest.skip("there is no browser")
+    with playwright.sync_playwright() as p:
+        chromium = p.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
+        yield chromium
+        chromium.close()
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_the_league_page_answers(browser: Any, tmp_path: Path) -> None:
+    """Values under the pointer, a series switched off, zoom; without scripts the picture; and no network."""
+    words = ["league", "--quick", "--engine", "event", "--engine", "time-stepping", "--workers", "1", "--quiet"]
+    assert cli.main([*words, "-o", str(tmp_path)]) == 0
+    page = browser.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: pytest.fail(str(error)))
+    page.goto((tmp_path / LEAGUE_PAGE).as_uri())
+    figure = page.locator("figure.plot")
+    figure.scroll_into_view_if_needed()
+    names = figure.locator(".series label").all_inner_texts()
+    assert names == ["event", "time-stepping"]
+    mark = figure.locator('[data-series="time-stepping"] use').first
+    place = mark.bounding_box()
+    page.mouse.move(place["x"] + place["width"] / 2, place["y"] + place["height"] / 2)
+    assert figure.locator("output").inner_text().startswith("time-stepping")
+    figure.get_by_label("time-stepping").uncheck()
+    assert not mark.is_visible()
+    figure.get_by_label("closer").click()
+    page.wait_for_timeout(300)
+    assert "scale(1" in figure.locator("svg").evaluate("picture => picture.style.transform")
+    assert len(asked) == 1  # the file
+    page.close()
+    dumb = browser.new_context(java_script_enabled=False).new_page()
+    dumb.goto((tmp_path / LEAGUE_PAGE).as_uri())
+    assert dumb.locator("figure.plot svg").bounding_box()["height"] > 100
+    dumb.context.close()
+
+
+def test_scripts_are_whole() -> None:
+    """Nothing in them ends the element that they stand in, and the library says whose it is."""
+    empty = {key: [["a"]] for key in ("summary", "rows", "about")} | {"failed": [], "notes": []}
+    texts = {"caption": "", "least": "", "letters": "", "picture": "<svg/>"}
+    shown = pages.render("compare.bench", "league.html", **empty, **texts)
+    assert shown.count("<script") == shown.count("</script>") == 2
+    assert "Copyright Timmy Willison" in shown
