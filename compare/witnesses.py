@@ -17,10 +17,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import or_
 from statistics import median
+from typing import Self
 
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
@@ -77,19 +78,54 @@ def hear(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     ends = {(m.set, m.value) for m in thresholds}
     if len(steps) == 1 and not engine(name).allowance:
         said = verdict(claim, measured)
-        first = Witness(
-            engine=name,
-            outcome=Outcome.NOT_ASKED if said.outcome is Outcome.NOT_RUN else said.outcome,
-            reason=said.error,
-            checks=said.checks,
-            deviations=_deviations(said.checks),
-            left_out=said.left_out,
-        )
+        first = _on_trial(name, said)
     else:
         first = _heard(claim, engine(name), steps, ends)
         said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
     beside = (_heard(claim, engine(other), own, ends, first.checks) for other, own in others)
     return replace(said, witnesses=(first, *beside))
+
+
+def _on_trial(name: str, said: Verdict) -> Witness:
+    """What the engine on trial says, whose numbers are judged as they are."""
+    return Witness(
+        engine=name,
+        outcome=Outcome.NOT_ASKED if said.outcome is Outcome.NOT_RUN else said.outcome,
+        reason=said.error,
+        checks=said.checks,
+        deviations=_deviations(said.checks),
+        left_out=said.left_out,
+    )
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the protocols of a claim yielded, with the time steps in one that they asked for, the fewest first."""
+
+    rows: tuple[tuple[int, Measurement | Missing], ...]
+
+    @classmethod
+    def of(cls, claim: Claim, steps: Mapping[int, Records]) -> Self:
+        """What an engine was asked for a claim."""
+        rows = ((n, row) for n, own in sorted(steps.items()) for row in own.rows)
+        return cls(tuple((n, row) for n, row in rows if row.protocol in claim.protocols))
+
+    @property
+    def finest(self) -> dict[str, int]:
+        """The finest step of each protocol."""
+        return {row.protocol: n for n, row in self.rows}
+
+    @property
+    def missing(self) -> list[Missing]:
+        """What was left out with the finest step of its protocol."""
+        finest = self.finest
+        return [row for n, row in self.rows if isinstance(row, Missing) and finest[row.protocol] == n]
+
+    def shared(self, trial: Iterable[Check]) -> set[tuple[int, str]]:
+        """Bearings and sets of the checks of the engine on trial of which this one was asked, too."""
+        places = {(row.protocol, row.set) for _, row in self.rows}
+        checks = (c for c in trial if (c.measurement.protocol, c.measurement.set) in places)
+        return {(c.bearing, c.measurement.set) for c in checks}
 
 
 def _heard(
@@ -99,36 +135,44 @@ def _heard(
 
     Of a bearing it should have as many numbers as with any of its steps, and where the engine on trial has some, one,
     or one for each set that was asked of both.
+
+    Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves the claim undecided
+    where too few of its numbers can tell, those without a limit among them: see `_limit`.
     """
-    asked = [(each, n) for n, own in sorted(steps.items()) for each in own.rows if each.protocol in claim.protocols]
-    finest = {each.protocol: n for each, n in asked}
-    missing = [each for each, n in asked if isinstance(each, Missing) and finest[each.protocol] == n]
+    asked = Asked.of(claim, steps)
     try:
         found = {n: checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
         return Witness(engine=by.name, outcome=Outcome.ERROR, reason=f"{type(error).__name__}: {error}")
-    places = {(each.protocol, each.set) for each, _ in asked}
-    shared = {(c.bearing, c.measurement.set) for c in trial if (c.measurement.protocol, c.measurement.set) in places}
+    shared, missing = asked.shared(trial), asked.missing
     if not shared and not any(found.values()):
         reasons = ["at this level nothing that bears on the claim was asked of it", *map(str, missing[:3])]
         return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason="; ".join(reasons))
     if by.allowance:
-        limits = [(_allowed(check, by.allowance), math.nan) for check in found[max(found)]]
+        checks, order = [_allowed(check, by.allowance) for check in found[max(found)]], math.nan
     else:
-        limits = [limit for row in _aligned(found, finest) if (limit := _limit(row, ends))]
+        checks, order = _limits(found, asked.finest, ends)
     most = reduce(or_, map(rows, found.values()))
-    wanted = most | Counter(n for n, _ in shared) | Counter({check.bearing for check in trial})
-    checks, orders = tuple(check for check, _ in limits), [order for _, order in limits if math.isfinite(order)]
-    measured = [(c, coarse_step(c.measurement.parameters) / n) for n, own in found.items() for c in own]
+    wanted = most | Counter(bearing for bearing, _ in shared) | Counter({check.bearing for check in trial})
+    usual = ((c, coarse_step(c.measurement.parameters) / n) for n, own in found.items() for c in own)
     return Witness(
         engine=by.name,
         outcome=outcome(claim, checks, wanted),
         reason=_too_few(claim, checks, wanted, missing),
-        checks=checks,
-        order=median(orders) if orders else math.nan,
-        deviations=_deviations(c for c, step in measured if by.allowance or step == USUAL_STEP),
+        checks=tuple(checks),
+        order=order,
+        deviations=_deviations(c for c, step in usual if by.allowance or step == USUAL_STEP),
         left_out=sum(each.rows for each in missing) + most.total() - len(checks),
     )
+
+
+def _limits(
+    found: Mapping[int, Sequence[Check]], finest: Mapping[str, int], ends: Set[tuple[str, float]]
+) -> tuple[list[Check], float]:
+    """The checks that have a limit of no step, and the median of the orders found."""
+    limits = [limit for row in _aligned(found, finest) if (limit := _limit(row, ends))]
+    orders = [order for _, order in limits if math.isfinite(order)]
+    return [check for check, _ in limits], median(orders) if orders else math.nan
 
 
 def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]) -> str:
@@ -156,40 +200,58 @@ def _allowed(check: Check, share: float) -> Check:
     return check if exact else replace(check, tolerance=share * check.scale, ceiling=2 * share)
 
 
+@dataclass(frozen=True)
+class Kind:
+    """What checks of the same thing with different steps have in common, but for the numbers among their conditions."""
+
+    protocol: str
+    bearing: int
+    set: str
+    texts: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(cls, check: Check) -> Self:
+        """That of a check."""
+        m = check.measurement
+        texts = sorted((name, value) for name, value in m.conditions.items() if isinstance(value, str))
+        return cls(m.protocol, check.bearing, m.set, tuple(texts))
+
+
+def _place(m: Measurement) -> dict[str, float]:
+    """The numbers among the conditions of a measurement, and those of its parameters that protocols choose."""
+    numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
+    return numbers | {name: getattr(m.parameters, name) for name in ("omega_0", "c", "mu", "eta")}
+
+
 def _aligned(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) -> Iterator[list[Step]]:
     """The checks with the finest step of their protocol, each after those of the same with coarser ones."""
-
-    def kind(check: Check) -> tuple[object, ...]:
-        m = check.measurement
-        texts = sorted((k, v) for k, v in m.conditions.items() if isinstance(v, str))
-        return m.protocol, check.bearing, m.set, *texts
-
-    def place(m: Measurement) -> dict[str, float]:
-        numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
-        p = m.parameters
-        return numbers | {"omega_0": p.omega_0, "c": p.c, "mu": p.mu, "eta": p.eta}
-
-    groups: dict[int, dict[tuple[object, ...], list[Check]]] = {n: {} for n in sorted(found)}
+    groups: dict[int, dict[Kind, list[Check]]] = {n: {} for n in sorted(found)}
     for n, group in groups.items():
         for check in found[n]:
-            group.setdefault(kind(check), []).append(check)
-    for n, key, last in [(n, key, own) for n, group in groups.items() for key, own in group.items()]:
-        p, names = last[0].measurement.parameters, sorted(place(last[0].measurement))
-        if n != finest[last[0].measurement.protocol]:
-            continue
-        natural = dict(zip(VARIABLES, state_units(p), strict=True))
-        natural |= dict.fromkeys(("frequency", "decay_rate"), 1 / time_unit(p))
-        here = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in last])
-        steps: list[list[Step]] = [[] for _ in last]
-        for coarser, others in [(m, group[key]) for m, group in groups.items() if m < n and key in group]:
-            there = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in others])
-            largest = np.maximum(np.abs(here).max(axis=0), np.abs(there).max(axis=0))
-            size = np.maximum(largest, [natural.get(name, 1e-300) for name in names])
-            apart = np.abs((here[:, None] - there[None]) / size).max(axis=2)
-            for i, k in zip(*linear_sum_assignment(apart), strict=True):
-                if apart[i, k] <= NEAR:
+            group.setdefault(Kind.of(check), []).append(check)
+    for n, kind, last in [(n, kind, own) for n, group in groups.items() for kind, own in group.items()]:
+        if n == finest[kind.protocol]:
+            steps: list[list[Step]] = [[] for _ in last]
+            for coarser, others in [(m, group[kind]) for m, group in groups.items() if m < n and kind in group]:
+                for i, k in _same(last, others):
                     steps[i].append((coarser, others[k]))
-        yield from ([*row, (n, check)] for row, check in zip(steps, last, strict=True))
+            yield from ([*row, (n, check)] for row, check in zip(steps, last, strict=True))
+
+
+def _same(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tuple[int, int]]:
+    """Which of ones and of others, of one kind, were measured at the same place, or nearly so."""
+    p, names = ones[0].measurement.parameters, sorted(_place(ones[0].measurement))
+    natural = dict(zip(VARIABLES, state_units(p), strict=True))
+    natural |= dict.fromkeys(("frequency", "decay_rate"), 1 / time_unit(p))
+    here, there = (
+        np.array([[_place(c.measurement).get(name, 0.0) for name in names] for c in checks])
+        for checks in (ones, others)
+    )
+    largest = np.maximum(np.abs(here).max(axis=0), np.abs(there).max(axis=0))
+    size = np.maximum(largest, [natural.get(name, 1e-300) for name in names])
+    apart = np.abs((here[:, None] - there[None]) / size).max(axis=2)
+    pairs = zip(*(index.tolist() for index in linear_sum_assignment(apart)), strict=True)
+    yield from ((i, k) for i, k in pairs if apart[i, k] <= NEAR)
 
 
 def _limit(there: Sequence[Step], ends: Set[tuple[str, float]] = frozenset()) -> tuple[Check, float] | None:

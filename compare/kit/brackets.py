@@ -78,7 +78,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     uncertain as the bracket before it was wide, see `Bracket.shift`.
     """
     failures: dict[Search, str] = {}
-    sections = lab.effort("brackets.sections")
+    sections = lab.effort.sections
 
     def ask(questions: Sequence[Question], care: Care = USUAL) -> Asked:
         tasks, runs = [search.task(value, bracket, care) for search, value, bracket in questions], []
@@ -112,7 +112,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)
             before[k], brackets[k] = brackets[k], new
         todo = [k for k in todo if brackets[k].high - brackets[k].low < 0.51 * (before[k].high - before[k].low)]
-    granted = [(k, end) for k, b in enumerate(brackets) for end in (0, 1) if not (b.runs[end] or lab.beside)]
+    granted = [(k, end) for k, b in enumerate(brackets) for end in (0, 1) if not (b.runs[end] or lab.effort.granted)]
     _, runs, answers = ask([(searches[k], (brackets[k].low, brackets[k].high)[end], brackets[k]) for k, end in granted])
     for (k, end), shows, holds in zip(granted, runs, answers, strict=True):
         if holds is (end == 0):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from enum import Enum, auto
 from functools import cache, cached_property, partial
 from typing import Any
 
@@ -22,6 +23,17 @@ from model import Flow, InputError, Parameters, SimulationError, State, Trajecto
 from model.arrays import Array
 from model.errors import suggestion
 from model.versions import version
+
+
+class Role(Enum):
+    """How an engine is heard of a claim, and which sets it measures, see `compare.kit.sets.COVERAGE`."""
+
+    ON_TRIAL = auto()
+    IN_THE_LIMIT = auto()
+    """Of no time step, beside the one on trial."""
+    AS_IT_COMES = auto()
+    """With its own settings and step, beside the one on trial."""
+
 
 AnySettings = ContactSettings | analytic.Settings | vessel.Settings
 """Numerical settings of any engine."""
@@ -61,6 +73,7 @@ class Engine:
     """What it is, in a few words."""
     about: str = ""
     """What makes it so, as the report's first screen says it."""
+    role: Role = Role.ON_TRIAL
     refine: tuple[int, ...] = (1,)
     """Time steps in one that a protocol asks for; with several, claims are judged in the limit of no step."""
     allowance: float = 0.0
@@ -188,6 +201,7 @@ PLAIN = replace(
     stream=_unwarned,
     title="MuJoCo without corrections, in the limit of no time step",
     about="the same joints and contact settings, nothing between the steps but drag and the wall's tangent plane",
+    role=Role.IN_THE_LIMIT,
     refine=(1, 2, 3, 4),
     mark="P",
 )
@@ -196,6 +210,7 @@ NEWCOMER = replace(
     name="mujoco-defaults",
     title="MuJoCo as it comes",
     about="a free ball in flat facets, MuJoCo's own parameters, 2 ms; confirmed is what is off by no more than 5 %",
+    role=Role.AS_IT_COMES,
     refine=(2,),
     allowance=0.05,
     configure=lambda given, p: as_it_comes(given.get("timestep", 2e-3)),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from compare.kit import levels
 from compare.kit.campaign import Campaign
 from compare.kit.engines import Engine
-from compare.kit.levels import Level
+from compare.kit.levels import Effort, Level
 from compare.kit.tasks import Task
 from model import Flow, Parameters, Trajectory
 from model.drag import STOKES
@@ -29,19 +28,15 @@ class Lab:
     refine: int = 1
     """Time steps in one that a protocol asks for, see `Engine.refine`."""
 
-    def effort(self, name: str) -> Any:
-        """How much of something is measured at this level, see `compare.kit.levels`."""
-        return levels.effort(name, self.level, beside=self.beside)
+    @property
+    def effort(self) -> Effort:
+        """How much is measured at this level by this engine."""
+        return levels.effort(self.level, self.beside)
 
     @property
     def beside(self) -> bool:
         """Whether the engine is heard beside the one on trial, or in its place, with time steps of its own."""
         return self.engine.refine != (1,)
-
-    @property
-    def halves(self) -> tuple[int, int]:
-        """What the time step of a pair of runs is divided by; the same run twice where several steps have a limit."""
-        return (2, 2) if self.beside else (1, 2)
 
     def task(
         self,
@@ -74,7 +69,7 @@ class Lab:
 
         The same run twice by an engine with several time steps.
         """
-        return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in self.halves]
+        return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in self.effort.halves]
 
     def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
         """The trajectories of each group, or why one failed: carried out together, not held in memory together."""

@@ -1,9 +1,13 @@
-"""How much each level measures: step counts, durations and grids of every protocol, a row a number."""
+"""How much each level measures: step counts, durations and grids of every protocol; and what other engines change.
+
+An engine other than the one on trial, with time steps of its own, measures as much as the quick level at every level,
+but for what `BESIDE` says, and looks where the one on trial found something.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any
 
 
 class Level(IntEnum):
@@ -21,113 +25,170 @@ _FLOWS = (
 _FEW = (0.62, 1.4, 1.7, 2.5, 4.2)
 """Chosen with results in sight, so that on the sets of quick they bracket every threshold."""
 _STARTS = "rest", "with the fluid", "on the wall"
-EFFORT: dict[str, tuple[Any, Any, Any]] = {
-    # quick, default, full
+Flows = tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is measured: a number a line, with its value at the quick level, by protocol."""
+
+    halves: tuple[int, int] = (1, 2)  # what the time step of a pair of runs is divided by
+    sections: int = 1  # flows inside a bracket in each round, by which it shrinks to a half or an eighth
+    granted: bool = False  # whether the ends between which something is looked for are taken for granted
+    slow: bool = True  # whether that is measured that takes long: sinking next to the least flow that holds, folds
+
     # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are longer, because a ball on
     # the wall that goes on from its mean swings again, if less, and that has to die out, too.
-    "settling.rounds": ((1.0, 2.0, 2.0),) * 3,
-    "settling.steps": (2048,) * 3,  # a round is a multiple of so many coarse time steps
-    # settled: flows omega_0 sqrt(R/g) for every kind of start, and the share of the drift limit down to which a state
-    # goes on, and the multiple of it up to which it counts.
-    "settled.starts": (dict.fromkeys(_STARTS, _FEW), dict.fromkeys(_STARTS, _FLOWS), dict.fromkeys(_STARTS, _FLOWS)),
-    "settled.sharp": (1.0, 0.1, 0.1),
-    "settled.loose": (1.0, 1.0, 1.0),
-    # flows inside a bracket in each round, by which it shrinks to a half or an eighth
-    "brackets.sections": (1, 7, 7),
-    # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
-    "thresholds.width": (5e-5, 1e-6, 5e-7),
-    "thresholds.fold": (1.2e-3, 3e-4, 1.5e-4),
-    "thresholds.loose": (10.0, 1.0, 1.0),
-    "thresholds.rounds": ((1.0, 2.0, 2.0),) * 3,
-    # edge: parts of the way from omega_02 to omega_04, lines for each edge, time of a run in units of 1/c
-    "edge.flows": ((0.3,), (0.1, 0.17, 0.26, 0.38, 0.6), (0.1, 0.17, 0.26, 0.38, 0.45, 0.6, 0.8)),
-    "edge.lines": (3, 4, 6),
-    "edge.time": (20.0, 60.0, 60.0),
-    # plane: points spread evenly over each plane, and added in each round
-    "plane.spread": (8, 160, 600),
-    "plane.rounds": ((1.0, 2.0, 2.0),) * 3,  # as settling.rounds, in units of half of it
-    "plane.added": ((4,), (60, 60, 60), (200,) * 5),
-    # hysteresis: how long each level of the loop is held in units of 1/c, parts of a gap in which a case changes
-    "hysteresis.hold": (40.0, 60.0, 100.0),
-    "hysteresis.parts": (2, 4, 8),
-    # slope: slipping states of a set at which it is measured, at most
-    "slope.slipping": (2, 20, 20),
-    # unsteady: time after a jump in units of 1/c, and its time steps in a coarse one; rates of the ramps, in units of c
-    # times the range of flows in which the ball slips
-    "unsteady.lasts": (48.0,) * 3,
-    "unsteady.refine": ((2, 4),) * 3,
-    "unsteady.rates": ((1e-2,), (2.5e-3, 5e-3, 1e-2), (1.25e-3, 2.5e-3, 5e-3, 1e-2)),
-    # pulsation
-    "pulsation.octaves": ((3, 6), (0, 1, 3, 4, 6, 7), tuple(range(8))),  # of the frequencies, above c/(4 pi)
-    "pulsation.steps": (512, 1024, 2048),  # least number of time steps in a period
-    "pulsation.samples": (256, 256, 256),  # in a period
-    "pulsation.width": (1e-3, 2.5e-4, 1.2e-4),  # relative width to which the onset of slip is bracketed
-    # unloading
-    "unloading.refine": ((16, 32), (32, 64), (64, 128)),  # time steps in a coarse one where the ball lands
-    # recurrent: flows of the staircase in units of that of the set
-    "recurrent.flows": (
-        (1.0,),
-        (1.0, 0.95, 0.91, 0.87, 0.83, 0.80),
-        (1.0, 0.97, 0.94, 0.91, 0.88, 0.85, 0.82, 0.80),
-    ),
-    # choice: sets; the contacts of the second hover for long
-    "choice.sets": (1, 2, 2),
-    # bounds: parts of a step of `short.REFINED`. Contacts with much friction answer more slowly: with whole steps the
-    # slope of gamma was too coarse on 11 of the 24 sets of the default level.
-    "bounds.refined": (1, 4, 4),
-    # field, growth, steepest, rates, laws, motions
-    "field.starts": (4, 4, 12),  # random starts for every case and set
-    "field.kept": (4, 6, 24),  # most states measured for every case and set
-    "growth.more": (1, 2, 6),  # multiples of the numbers of directions in growth.PUSHES
-    "steepest.states": (1, 3, 12),  # random states of every set out of which slip is pushed all round
-    "rates.refined": ((8, 16), (16, 32), (32, 64)),  # the two time steps, in parts of the coarse step
-    "rates.leaning": ((8, 16),) * 3,  # in SR: with shorter steps an almost unloaded floor lets go under larger loads
-    "rates.more": (1, 2, 5),  # multiples of the numbers of states in rates.STATES
-    "laws.refined": ((4, 8), (8, 16), (16, 32)),  # the two time steps, in parts of the coarse step
-    "motions.pieces": (6, 20, 32),  # pieces of a motion
-}
+    settling_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)
+    settling_steps: int = 2048  # a round is a multiple of so many coarse time steps
+
+    # settled: flows omega_0 sqrt(R/g) for every kind of start, the first one that which comes to slip
+    settled_starts: tuple[tuple[str, Flows], ...] = tuple((how, _FEW) for how in _STARTS)
+    settled_sharp: float = 1.0  # share of the drift limit down to which a state goes on
+    settled_loose: float = 1.0  # and the multiple of it up to which it counts
+    settled_refine: int = 2  # parts of the time step with which a state is measured once more; 1: it isn't
+
+    thresholds_width: float = 5e-5  # relative width of the last brackets
+    thresholds_fold: float = 1.2e-3  # and of those about a fold
+    thresholds_loose: float = 10.0  # factor on the settling tolerance
+    thresholds_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)
+
+    edge_flows: Flows = (0.3,)  # parts of the way from omega_02 to omega_04
+    edge_lines: int = 3  # for each edge
+    edge_time: float = 20.0  # of a run in units of 1/c
+    plane_spread: int = 8  # points spread evenly over each plane
+    plane_added: tuple[int, ...] = (4,)  # and in each round
+    plane_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)  # as settling_rounds, in units of half of it
+    hysteresis_hold: float = 40.0  # how long each level of the loop is held, in units of 1/c
+    hysteresis_parts: int = 2  # of a gap in which a case changes
+    slope_slipping: int = 2  # slipping states of a set at which it is measured, at most
+
+    unsteady_lasts: float = 48.0  # time after a jump in units of 1/c
+    unsteady_refine: tuple[int, int] = (2, 4)  # its time steps in a coarse one
+    unsteady_ramps: tuple[int, int] = (1, 2)  # those of ramps
+    unsteady_rates: tuple[float, ...] = (1e-2,)  # of ramps, in c times the range of flows in which the ball slips
+    pulsation_octaves: tuple[int, ...] = (3, 6)  # of the frequencies, above c/(4 pi)
+    pulsation_steps: int = 512  # least number of time steps in a period
+    pulsation_samples: int = 256  # in a period
+    pulsation_refine: int = 2  # parts of the time step in the last of successive runs
+    pulsation_reach: float = 1.1  # largest amplitude tried, in units of what would end rolling in a slow pulsation
+    pulsation_width: float = 1e-3  # relative width to which the onset of slip is bracketed
+    unloading_refine: tuple[int, int] = (16, 32)  # time steps in a coarse one where the ball lands
+
+    recurrent_flows: Flows = (1.0,)  # of the staircase in units of that of the set
+    choice_sets: int = 1  # the contacts of the second hover for long
+
+    # Parts of a step of `short.REFINED`. Contacts with much friction answer more slowly: with whole steps the slope of
+    # gamma was too coarse on 11 of the 24 sets of the default level.
+    bounds_refined: int = 1
+    growth_more: int = 1  # multiples of the numbers of directions in growth.PUSHES
+    steepest_states: int = 1  # random states of every set out of which slip is pushed all round
+    field_starts: int = 4  # random starts for every case and set
+    field_kept: int = 4  # most states measured for every case and set
+    rates_refined: tuple[int, int] = (8, 16)  # the two time steps, in parts of the coarse step
+    rates_leaning: tuple[int, int] = (8, 16)  # in SR: with shorter ones an almost unloaded floor carries more or none
+    rates_more: float = 1  # multiples of the numbers of states in rates.STATES
+    laws_refined: tuple[int, int] = (4, 8)  # the two time steps, in parts of the coarse step
+    motions_pieces: int = 6  # of a motion
 
 
-BESIDE: dict[str, Any] = {
-    # engines beside the one on trial measure as much as the quick level at every level, but for this
-    "settled.starts": {"with the fluid": (0.62, 1.7, 4.2), "on the wall": (1.7, 4.2)},
-    "settled.loose": 100.0,
-    "settling.rounds": (0.45, 1.0, 1.0),
-    "settling.steps": 512,
-    "brackets.sections": 1,
-    "thresholds.width": 5e-4,
-    "thresholds.loose": 1e4,
-    "thresholds.rounds": (0.4, 1.0),
-    "plane.rounds": (1.0, 2.0),
-    "hysteresis.hold": 15.0,
-    "hysteresis.parts": 1,
-    "unsteady.lasts": 16.0,
-    "unsteady.refine": (2, 2),
-    "unsteady.rates": (4e-2,),
-    "pulsation.octaves": (3,),
-    "pulsation.steps": 256,
-    "pulsation.samples": 512,
-    "pulsation.width": 2e-3,
-    "rates.refined": (16, 16),
-    "rates.leaning": (16, 16),
-    "rates.more": 0.5,
-    "laws.refined": (4, 4),
-    "field.starts": 2,
-    "field.kept": 2,
-}
+QUICK = Effort()
+DEFAULT = replace(
+    QUICK,
+    sections=7,
+    settled_starts=tuple((how, _FLOWS) for how in _STARTS),
+    settled_sharp=0.1,
+    thresholds_width=1e-6,
+    thresholds_fold=3e-4,
+    thresholds_loose=1.0,
+    edge_flows=(0.1, 0.17, 0.26, 0.38, 0.6),
+    edge_lines=4,
+    edge_time=60.0,
+    plane_spread=160,
+    plane_added=(60, 60, 60),
+    hysteresis_hold=60.0,
+    hysteresis_parts=4,
+    slope_slipping=20,
+    unsteady_rates=(2.5e-3, 5e-3, 1e-2),
+    pulsation_octaves=(0, 1, 3, 4, 6, 7),
+    pulsation_steps=1024,
+    pulsation_width=2.5e-4,
+    unloading_refine=(32, 64),
+    recurrent_flows=(1.0, 0.95, 0.91, 0.87, 0.83, 0.80),
+    choice_sets=2,
+    bounds_refined=4,
+    growth_more=2,
+    steepest_states=3,
+    field_kept=6,
+    rates_refined=(16, 32),
+    rates_more=2,
+    laws_refined=(8, 16),
+    motions_pieces=20,
+)
+FULL = replace(
+    DEFAULT,
+    thresholds_width=5e-7,
+    thresholds_fold=1.5e-4,
+    edge_flows=(0.1, 0.17, 0.26, 0.38, 0.45, 0.6, 0.8),
+    edge_lines=6,
+    plane_spread=600,
+    plane_added=(200,) * 5,
+    hysteresis_hold=100.0,
+    hysteresis_parts=8,
+    unsteady_rates=(1.25e-3, 2.5e-3, 5e-3, 1e-2),
+    pulsation_octaves=tuple(range(8)),
+    pulsation_steps=2048,
+    pulsation_width=1.2e-4,
+    unloading_refine=(64, 128),
+    recurrent_flows=(1.0, 0.97, 0.94, 0.91, 0.88, 0.85, 0.82, 0.80),
+    growth_more=6,
+    steepest_states=12,
+    field_starts=12,
+    field_kept=24,
+    rates_refined=(32, 64),
+    rates_more=5,
+    laws_refined=(16, 32),
+    motions_pieces=32,
+)
+BESIDE = replace(
+    QUICK,
+    halves=(2, 2),  # the same run twice: all numbers are extrapolated to no step from several steps
+    granted=True,
+    slow=False,
+    settling_rounds=(0.45, 1.0, 1.0),
+    settling_steps=512,
+    settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))),
+    settled_loose=100.0,
+    settled_refine=1,
+    thresholds_width=5e-4,
+    thresholds_loose=1e4,
+    thresholds_rounds=(0.4, 1.0),
+    plane_rounds=(1.0, 2.0),
+    hysteresis_hold=15.0,
+    hysteresis_parts=1,
+    unsteady_lasts=16.0,
+    unsteady_refine=(2, 2),
+    unsteady_ramps=(1, 1),
+    unsteady_rates=(4e-2,),
+    pulsation_octaves=(3,),
+    pulsation_steps=256,
+    pulsation_samples=512,
+    pulsation_refine=1,
+    pulsation_reach=1.5,  # where friction creeps, slip counts as such later
+    pulsation_width=2e-3,
+    rates_refined=(16, 16),
+    rates_leaning=(16, 16),
+    rates_more=0.5,
+    laws_refined=(4, 4),
+    field_starts=2,
+    field_kept=2,
+)
+BESIDE_LONGER = replace(BESIDE, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0)
+"""At the levels above quick, on whose rarer sets motions die out more slowly."""
 
 
-BESIDE_LONGER: dict[str, Any] = {
-    # and at the levels above quick, on whose rarer sets motions die out more slowly
-    "thresholds.loose": 1e3,
-    "thresholds.rounds": (1.0, 2.0),
-    "unsteady.lasts": 48.0,
-}
-
-
-def effort(name: str, level: Level, beside: bool = False) -> Any:
-    """The entry of `EFFORT` for a level, or of an engine beside the one on trial."""
-    if not beside:
-        return EFFORT[name][level]
-    more = BESIDE_LONGER if level > Level.QUICK else {}
-    return (BESIDE | more).get(name, EFFORT[name][Level.QUICK])
+def effort(level: Level, beside: bool = False) -> Effort:
+    """How much is measured at a level; by an engine beside the one on trial if `beside`."""
+    if beside:
+        return BESIDE if level is Level.QUICK else BESIDE_LONGER
+    return (QUICK, DEFAULT, FULL)[level]

@@ -16,11 +16,11 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from compare.kit import record
-from compare.kit.engines import COULOMB, NEWCOMER, PLAIN, Engine
+from compare.kit.engines import Engine, Role
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
-from compare.kit.sets import sets
+from compare.kit.sets import COVERAGE, MOST_WITNESSED, Coverage, sets
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
 from model import Parameters, StorageError
@@ -32,21 +32,7 @@ LONGEST_WAIT = 3e4
 """Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or more at a time; and
 contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as
 `omega_c` may be off in a state that counts as settled."""
-TWELVE = 12
-"""Sets, at most, that engines beside the one on trial measure at the default and the full level."""
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
-ONE = ("reference",)
-"""For what one ball shows as well as seven, or the paper draws for one."""
-TWO = ("reference", "high-wall-friction")
-"""One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
-LAWS = ("reference", "wake", "blunt")
-"""One for each law of drag."""
-FOUR = (*TWO, "rough-floor", "wake")
-"""These two, a floor rough enough for balls that slip and balls that ride the wall at one flow, a law of drag."""
-SEVEN = (*TWO, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
-"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride the wall at one flow;
-drag so strong that nothing folds; two other laws of drag; friction of the wall above that of the floor and the inertia.
-On them all wrong theories are noticed that are noticed on all nine sets chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -58,43 +44,38 @@ class Protocol:
     needs: tuple[str, ...] = ()
     """Protocols whose measurements it goes out from."""
     _: KW_ONLY
-    quick: tuple[str, ...] = SEVEN
-    """The sets it measures at the quick level; at the others all of them."""
     cost: float = 1.0
     """Processor time at the quick level, s on some machine: its part of the whole, and the most costly begin first."""
     first: bool = False
     """Whether it is a single long run, which begins first: beside it there is work for the other workers."""
-    level: Level = Level.QUICK
-    """The least level of which it is a part."""
     waits: bool = True
     """Whether it waits for motions to settle."""
     alone: str = ""
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     engine: Engine | None = None
     """Who measures, where it isn't the engine on trial."""
-    plain: tuple[str, ...] = ()
-    """The sets that plain MuJoCo measures at the quick level, in the limit of no time step. At the others it measures
-    twelve of these protocols, and `reference` of the rest."""
-    steps: tuple[int, int] = (3, 3)
-    """With how many of its time steps plain MuJoCo measures, the coarsest first: at the quick level, and above."""
     follows: bool = False
     """Whether an engine beside the one on trial looks where that one found something."""
-    defaults: tuple[str, ...] = ()
-    """The sets that MuJoCo as it comes measures."""
     drawn: Callable[[Measurement], bool] = lambda m: False
     """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is stored."""
 
+    @property
+    def coverage(self) -> Coverage:
+        """Who measures it on which sets."""
+        return COVERAGE.get(self.name, Coverage())
+
     def measures(self, lab: Lab) -> dict[str, Parameters]:
         """The sets that it measures at a level with an engine, by name."""
-        limited, known = lab.engine in (PLAIN, COULOMB), sets(lab.level)
-        asked = self.plain if limited else self.defaults if lab.engine is NEWCOMER else self.quick
-        steps = self.steps[lab.level > Level.QUICK]
-        if (lab.beside and self.engine) or (limited and lab.refine not in lab.engine.refine[:steps]):
-            return {}
-        if lab.level > Level.QUICK:
-            asked = self.defaults if lab.engine is NEWCOMER else tuple(known)
-            asked = asked[: 1 if not self.plain else TWELVE] if limited else asked
-        return {name: p for name, p in known.items() if name in asked}
+        known, coverage, above = sets(lab.level), self.coverage, lab.level > Level.QUICK
+        names: Iterable[str] = known if above else coverage.quick
+        if lab.engine.role is Role.AS_IT_COMES:
+            names = coverage.as_it_comes
+        elif lab.engine.role is Role.IN_THE_LIMIT:
+            most = MOST_WITNESSED if coverage.limit else 1
+            names = tuple(known)[:most] if above else coverage.limit
+            if lab.refine not in lab.engine.refine[: coverage.steps[above]]:
+                names = ()
+        return {name: p for name, p in known.items() if name in names and not (lab.beside and self.engine)}
 
 
 Job = tuple[Protocol, Lab]
@@ -130,7 +111,7 @@ def called(protocol: str, lab: Lab) -> str:
 def cost(job: Job) -> float:
     """Processor time at the quick level, about."""
     protocol, lab = job
-    asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.quick), 1)
+    asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.coverage.quick), 1)
     return protocol.cost * asked * lab.refine if lab.beside else protocol.cost
 
 

@@ -1,4 +1,4 @@
-"""The parameter sets that are measured: a few chosen by hand, and a design that fills a box of parameters evenly.
+"""The parameter sets that are measured: a few chosen by hand, and a design that fills a box evenly; and by whom.
 
 Friction is greater on the floor in some, on the wall in others, and the wall's is below and above the inertia j; drag
 is weak in some and strong in others. Two sets have another law of drag, at Reynolds numbers of hundreds. Each protocol
@@ -8,6 +8,7 @@ chooses omega_0 itself: that of a set is not used.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,3 +50,74 @@ def sets(level: Level) -> dict[str, Parameters]:
             c = kappa * math.sqrt(values["g"] / values["R"])
             sets[f"design-{k}"] = Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
     return sets
+
+
+REFERENCE = ("reference",)
+"""For what one ball shows as well as many, or the paper draws for one."""
+ENDS_OF_ROLLING = (*REFERENCE, "high-wall-friction")
+"""One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
+DRAG_LAWS = (*REFERENCE, "wake", "blunt")
+"""One for each law of drag."""
+WITNESSED = (*ENDS_OF_ROLLING, "rough-floor", "wake")
+"""Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at one flow, a law of
+drag."""
+VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
+"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride the wall at one flow;
+drag so strong that nothing folds; two other laws of drag; friction of the wall above that of the floor and the inertia.
+On them all wrong theories are noticed that are noticed on all nine sets chosen by hand."""
+MOST_WITNESSED = 12
+"""Sets, at most, that engines in the limit of no time step measure above the quick level."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Which sets a protocol measures, by which engine."""
+
+    quick: tuple[str, ...] = VARIED
+    """By the engine on trial at the quick level; at the others all of them."""
+    limit: tuple[str, ...] = ()
+    """By engines in the limit of no time step at the quick level. At the others these measure `MOST_WITNESSED`, and
+    `reference` where none is named here."""
+    steps: tuple[int, int] = (3, 3)
+    """With how many of their time steps, the coarsest first: at the quick level, and above."""
+    as_it_comes: tuple[str, ...] = ()
+    """By MuJoCo as it comes."""
+    level: Level = Level.QUICK
+    """The least level of which it is a part."""
+
+
+# fmt: off
+COVERAGE: dict[str, Coverage] = {
+    # protocol            on trial         in the limit     steps   as it comes
+    "settled":    Coverage(VARIED,          WITNESSED,       (4, 4), REFERENCE),
+    "mirrored":   Coverage(REFERENCE),
+    "plane":      Coverage(REFERENCE),
+    "thresholds": Coverage(VARIED,          WITNESSED,       (3, 4)),
+    "edge":       Coverage(("reference", "rough-floor")),
+    "birth":      Coverage(VARIED),
+    "rates":      Coverage((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), REFERENCE),
+    "growth":     Coverage(VARIED,          WITNESSED),
+    "steepest":   Coverage(VARIED,          WITNESSED),
+    "lift":       Coverage(VARIED,          ENDS_OF_ROLLING, (4, 4)),
+    "bounds":     Coverage(VARIED,          REFERENCE),
+    "laws":       Coverage(VARIED,          REFERENCE),
+    "field":      Coverage(VARIED,          WITNESSED),
+    "motions":    Coverage(REFERENCE,       REFERENCE),
+    "runs":       Coverage(DRAG_LAWS,       REFERENCE),
+    "torque":     Coverage(REFERENCE),
+    "impacts":    Coverage(ENDS_OF_ROLLING, REFERENCE),
+    "hysteresis": Coverage(REFERENCE,       REFERENCE,       (4, 4)),
+    "unloading":  Coverage(ENDS_OF_ROLLING),
+    "slope":      Coverage(VARIED),
+    "pulsation":  Coverage(DRAG_LAWS,       REFERENCE),
+    "unsteady":   Coverage(DRAG_LAWS,       REFERENCE),
+    "recurrent":  Coverage(REFERENCE),
+    "stepped":    Coverage(REFERENCE),
+    "choice":     Coverage(REFERENCE,       REFERENCE,       (4, 4)),
+    "followed":   Coverage(REFERENCE, level=Level.DEFAULT),
+    "rebounding": Coverage(REFERENCE, level=Level.DEFAULT),
+    "swing":      Coverage(REFERENCE, level=Level.DEFAULT),
+    "calm":       Coverage(REFERENCE, level=Level.DEFAULT),
+}
+# fmt: on
+"""Who measures what, by protocol. One that isn't listed has the default."""

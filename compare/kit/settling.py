@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.statistics import COVERAGE, Measured, settled_case, steady_mean, tail
+from compare.kit.statistics import COVERAGE, Measured, steady_mean
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
@@ -60,6 +59,133 @@ class Settled:
     excess: float = math.inf
     """Drift or swing divided by its limit for a comparison with theory."""
     failure: str = ""
+
+
+@dataclass(frozen=True)
+class Patience:
+    """For how long a state is waited for, and how well it must be settled."""
+
+    refine: float = 1
+    """Time steps in one of `coarse_step`."""
+    span: float = SPAN
+    """Length of a round in units of 1/c."""
+    loose: float = 1.0
+    """A settled state may drift and swing up to so many times the limit for values that are compared with theory."""
+    sharp: float = math.inf
+    """As long as there are rounds, one that exceeds so many times that limit goes on."""
+    rounds: Sequence[float] = ()
+    """Lengths of successive rounds in units of `span`; those of the level if none are given."""
+
+
+def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -> list[Settled]:
+    """Run each start until it is settled, in the order given. Of an engine as it comes every state counts, for what it
+    is when time is up.
+
+    What isn't settled goes on from its mean, but at the height from which it started: the motion of a ball on the wall
+    alone does not depend on its height, and one that sinks must not land.
+    """
+    span, loose = patience.span, math.inf if lab.engine.allowance else patience.loose
+    rounds, steps = patience.rounds or lab.effort.settling_rounds, lab.effort.settling_steps
+    left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
+    states: dict[int, Settled] = {}
+    todo = dict(enumerate(starts))
+    while todo:
+        tasks = []
+        for n, start in todo.items():
+            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0), steps)
+            samples = round(t_end / (STEPS_A_SAMPLE * step))
+            tasks.append(lab.task(start.p, start.x0, t_end, step / patience.refine, samples=samples))
+        under_way, todo = list(todo), {}
+        for n, task, run in zip(under_way, tasks, lab.each(tasks), strict=True):
+            start = starts[n]
+            if isinstance(run, str):
+                states[n] = Settled(start, Case.NN, {}, start.x0, task, failure=f"the run {run}")
+                continue
+            state = states[n] = judged(start, task, run, loose)
+            part = task.t_end / duration(start.p, span)
+            if left[n] and state.excess > min(part, 1.0) * min(loose, patience.sharp):
+                # A part of a round may end on the way to where the ball settles: it goes on as it is.
+                x = State.of(run.x[-1] if part < 1 else state.mean)
+                if part >= 1 and state.case.A is Contact.N:
+                    x = x._replace(y=max(State.of(start.x0).y, 0.0))
+                todo[n] = replace(start, x0=x.stacked())
+    return [states[n] for n in range(len(starts))]
+
+
+def settle_groups(
+    lab: Lab,
+    groups: Sequence[Sequence[Start]],
+    patience: Patience = Patience(),
+) -> list[list[Settled]]:
+    """The same for groups of starts, all of them together."""
+    states = iter(settle(lab, [start for group in groups for start in group], patience))
+    return [[next(states) for _ in group] for group in groups]
+
+
+def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
+    """What a run has come to; `loose` as in `Patience`.
+
+    A run is settled once its drift lets each check resolve twice as much as it should, with no quantity swinging by
+    more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows the one that
+    drifts less counts: half of the run for what oscillates, an eighth for what only decays.
+    """
+    p = start.p
+    series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
+    series["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
+    series |= {f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()}
+    rows = np.stack([*series.values(), *run.x.T])
+    solved = SOLVED / (p.c * coarse_step(p))
+    states = []
+    for length in (len(run.time) // 2, len(run.time) // 8):
+        counts = np.bincount(run.case[-length:])
+        case = Case(int(counts.argmax()))
+        means, drifts = steady_mean(rows, length)
+        mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
+        groups = [[q for q in group if q in determined(case)] for group in ERROR_GROUPS]
+        worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
+        values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
+        swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
+        drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
+        solving = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
+        excess, failure = max(drifting, swings / 1e-3), ""
+        if counts.max() < 0.98 * length and loose < math.inf:
+            excess = math.inf
+            failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
+        elif max(excess, solving) > loose:
+            way = "drifts" if max(drifting, solving) > loose else "swings"
+            failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
+        states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
+    return min(states, key=lambda state: state.excess)
+
+
+def reading(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterator[Measurement | Missing]:
+    """Case and omega_c to which the ball settles from each start."""
+    for start, settled in zip(starts, settle(lab, starts), strict=True):
+        if settled.failure:
+            yield Missing(protocol, start.set, settled.failure)
+            continue
+        for name, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
+            yield measurement(lab, protocol, start.set, start.p, name, value, [settled.task])
+
+
+def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
+    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the wall swings.
+
+    A whole multiple of so many coarse time steps, so that sets of about the same drag share a batch.
+    """
+    unit = steps * coarse_step(p)
+    turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
+    return unit * math.ceil(max(span / p.c, turns) / unit)
+
+
+def high(p: Parameters) -> float:
+    """A height in m from which a ball that sinks freely doesn't land within a round."""
+    return 1.25 * dragged_speed(p) * duration(p, LONGEST * SPAN)
+
+
+def lasting(p: Parameters, units: float) -> float:
+    """A time in s of about `units` of 1/c: a power of two, so that sets share batches."""
+    return float(2.0 ** round(math.log2(units / p.c)))
 
 
 def begin(set: str, p: Parameters, how: str) -> Start:
@@ -107,143 +233,3 @@ def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
     """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest first."""
     found = records.select("settled", "case", lambda m: m.set == set and m.conditions["start"] == how)
     return dict(sorted((m.parameters.omega_0, family(Case(int(m.value)))) for m in found))
-
-
-def reading(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterator[Measurement | Missing]:
-    """Case and omega_c to which the ball settles from each start."""
-    for start, settled in zip(starts, settle(lab, starts), strict=True):
-        if settled.failure:
-            yield Missing(protocol, start.set, settled.failure)
-            continue
-        for name, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
-            yield measurement(lab, protocol, start.set, start.p, name, value, [settled.task])
-
-
-def settle(
-    lab: Lab,
-    starts: Sequence[Start],
-    *,
-    refine: float = 1,
-    span: float = SPAN,
-    loose: float = 1.0,
-    sharp: float = math.inf,
-    rounds: Sequence[float] = (),
-) -> list[Settled]:
-    """Run each start until it is settled, in the order given; the step is `coarse_step` divided by `refine`.
-
-    Of an engine as it comes every state counts, for what it is when time is up.
-
-    A settled state may drift and swing up to `loose` times the limit for values that are compared with theory; as long
-    as there are rounds, one that exceeds `sharp` times that limit goes on.
-
-    It goes on from its mean, but at the height from which it started: the motion of a ball on the wall alone does not
-    depend on its height, and one that sinks must not land.
-    """
-    states: dict[int, Settled] = {}
-    if lab.engine.allowance:
-        loose = math.inf
-    rounds = rounds or lab.effort("settling.rounds")
-    todo = dict(enumerate(starts))
-    left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
-    while todo:
-        tasks = {}
-        for n, start in todo.items():
-            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0), lab.effort("settling.steps"))
-            samples = round(t_end / (STEPS_A_SAMPLE * step))
-            tasks[n] = lab.task(start.p, start.x0, t_end, step / refine, samples=samples)
-        todo = {}
-        for (n, task), run in zip(tasks.items(), lab.each(list(tasks.values())), strict=True):
-            start = starts[n]
-            if isinstance(run, str):
-                states[n] = Settled(start, Case.NN, {}, start.x0, task, failure=f"the run {run}")
-                continue
-            state = states[n] = judged(start, task, run, loose)
-            part = task.t_end / duration(start.p, span)
-            if left[n] and state.excess > min(part, 1.0) * min(loose, sharp):
-                # A part of a round may end on the way to where the ball settles: it goes on as it is.
-                x = State.of(run.x[-1] if part < 1 else state.mean)
-                if part >= 1 and state.case.A is Contact.N:
-                    x = x._replace(y=max(State.of(start.x0).y, 0.0))
-                todo[n] = replace(start, x0=x.stacked())
-    return [states[n] for n in range(len(starts))]
-
-
-def settle_groups(lab: Lab, groups: Sequence[Sequence[Start]], **how: Any) -> list[list[Settled]]:
-    """The same for groups of starts, all of them together."""
-    states = iter(settle(lab, [start for group in groups for start in group], **how))
-    return [[next(states) for _ in group] for group in groups]
-
-
-def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
-    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the wall swings.
-
-    A whole multiple of so many coarse time steps, so that sets of about the same drag share a batch.
-    """
-    unit = steps * coarse_step(p)
-    turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
-    return unit * math.ceil(max(span / p.c, turns) / unit)
-
-
-def high(p: Parameters) -> float:
-    """A height in m from which a ball that sinks freely doesn't land within a round."""
-    return 1.25 * dragged_speed(p) * duration(p, LONGEST * SPAN)
-
-
-def lasting(p: Parameters, units: float) -> float:
-    """A time in s of about `units` of 1/c: a power of two, so that sets share batches."""
-    return float(2.0 ** round(math.log2(units / p.c)))
-
-
-def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
-    """What a run has come to; `loose` as in `settle`.
-
-    A run is settled once its drift lets each check resolve twice as much as it should, with no quantity swinging by
-    more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows the one that
-    drifts less counts: half of the run for what oscillates, an eighth for what only decays.
-    """
-    p = start.p
-    series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
-    series["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
-    series |= {f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()}
-    rows = np.stack([*series.values(), *run.x.T])
-    solved = SOLVED / (p.c * coarse_step(p))
-    states = []
-    for length in (len(run.time) // 2, len(run.time) // 8):
-        counts = np.bincount(run.case[-length:])
-        case = Case(int(counts.argmax()))
-        means, drifts = steady_mean(rows, length)
-        mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
-        groups = [[q for q in group if q in determined(case)] for group in ERROR_GROUPS]
-        worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
-        values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
-        swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
-        drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
-        solving = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
-        excess, failure = max(drifting, swings / 1e-3), ""
-        if counts.max() < 0.98 * length and loose < math.inf:
-            excess = math.inf
-            failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
-        elif max(excess, solving) > loose:
-            way = "drifts" if max(drifting, solving) > loose else "swings"
-            failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
-        states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
-    return min(states, key=lambda state: state.excess)
-
-
-def presses(run: Trajectory) -> bool:
-    """Whether the floor carries something all the time in the end."""
-    return bool(np.all(run.force_A[tail(run), 1] > 0))
-
-
-def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
-    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the run is too short.
-
-    In the last tenth its speed must change by less than a share `slowed` of what it does in the tenth before the
-    middle. On the way past a fold that it has missed the change falls at most like 1/time^2, from one to the other to
-    0.22; after that it rises.
-    """
-    if settled_case(run).A is Contact.N or settled_case(run) is Case.SR or not presses(run):
-        return False
-    middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
-    slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
-    return False if slowing > 1 else True if slowing < slowed else None

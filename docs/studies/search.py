@@ -106,7 +106,7 @@ def parameters(point: Array) -> Parameters:
     """The set at a point; R, g and m are those of the reference, and don't matter."""
     p = Parameters.named("reference")
     mu, eta, j, ratio, kappa, Omega_0 = point.tolist()
-    return with_groups(p, mu, eta, j, ratio * p.R, kappa, Omega_0)
+    return with_groups(p, kappa, Omega_0, mu=mu, eta=eta, j=j, r=ratio * p.R)
 
 
 def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:

@@ -6,7 +6,7 @@ from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Text
 from compare.kit.levels import Level
 from compare.kit.programme import needed
-from compare.kit.sets import COUNT, sets
+from compare.kit.sets import COUNT, COVERAGE, sets
 
 
 def test_names_are_unique() -> None:
@@ -17,6 +17,12 @@ def test_names_are_unique() -> None:
 def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols() -> None:
     used = {name for claim in CLAIMS for name in claim.protocols}
     assert used == {protocol.name for protocol in PROTOCOLS}
+
+
+def test_the_table_of_who_measures_what_lists_every_protocol() -> None:
+    assert COVERAGE.keys() == {protocol.name for protocol in PROTOCOLS}
+    asked = {name for each in COVERAGE.values() for name in (*each.quick, *each.limit, *each.as_it_comes)}
+    assert asked <= sets(Level.QUICK).keys()
 
 
 def test_protocols_come_after_what_they_need() -> None:

@@ -16,17 +16,17 @@ from compare.kit.lab import coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
-from compare.kit.settling import PRESSES, begin, lasting, settles
+from compare.kit.settling import PRESSES, begin, lasting
 from compare.kit.statistics import Measured
 from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure import thresholds
 from compare.subjects.thresholds.measure.basins import Edge, ends_slipping
-from compare.subjects.thresholds.measure.thresholds import DISTANCES, TURNS
+from compare.subjects.thresholds.measure.thresholds import DISTANCES, TURNS, settles
 from model import Case, Parameters, State
 from tests.measured import measured
 
 REFERENCE = Parameters.named("reference")
-NUMBERS = SimpleNamespace(each=list, effort=lambda name: 7, beside=False)
+NUMBERS = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
 """Stands for a lab whose tasks are their own runs."""
 
 

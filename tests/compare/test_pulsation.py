@@ -39,7 +39,7 @@ def records(lab) -> Records:
 def test_everything_is_measured_and_theory_and_engine_agree(records: Records, lab) -> None:
     assert not records.missing
     for quantity in ("gain", "phase_lag", "slip_amplitude", "mean_error"):
-        assert len(list(records.select("pulsation", quantity))) == len(lab.effort("pulsation.octaves"))
+        assert len(list(records.select("pulsation", quantity))) == len(lab.effort.pulsation_octaves)
     assert {m.quantity for m in records.select("unsteady")} == {"jump_delay", "jump_peak", "jump_height", "ramp_end"}
     # pulsation-limits is about thresholds, too, of which there are none here
     assert {v.claim.id for v in judge(claims.CLAIMS, records) if v.outcome is Outcome.CONFIRMED} == {

@@ -15,21 +15,20 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from compare.kit.engines import MOREAU
 from compare.kit.lab import Lab, coarse_step, time_unit
-from compare.kit.levels import Level
-from compare.kit.programme import ONE, Protocol
+from compare.kit.programme import Protocol
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import reading
 from compare.kit.short import constrained
 from compare.kit.statistics import Measured, hops, peaks, top
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, carry_out, finer
+from compare.kit.trials import Start, Trial, TrialResult, carry_out, finer
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
@@ -45,10 +44,23 @@ SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
 
 
-def with_groups(p: Parameters, mu: float, eta: float, j: float, r: float, kappa: float, Omega_0: float) -> Parameters:
-    """The set p with r in m, kappa = c sqrt(R/g), Omega_0 = omega_0 sqrt(R/g), and the other dimensionless groups."""
-    unit = time_unit(p)
-    return p.replace(mu=mu, eta=eta, j=j, r=r, c=kappa / unit, omega_0=Omega_0 / unit)
+WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
+"""eta of the walls along which the hop is followed, in units of that of the set. The first steps are short: their
+starts are extrapolated from one or two hops, which attract from nearby only."""
+FOLLOWED, ALONE = 10.0, 60.0
+"""How long a hop is followed at a wall, and then left alone, s."""
+RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
+"""From which coefficient of restitution to the next a rebounding ball is followed."""
+REBOUNDING, REBOUNDS_ALONE = (0.0, 0.2, 0.4, 0.48, 0.6), 20.0
+"""At which of them it is run without further change, and how long, s. (0.6 is among them since results had been seen:
+at 0.56 disturbances grow so slowly that this doesn't show it.)"""
+SWINGING, SWUNG = 24.0, 4.0
+"""How long a ball swings, and the last part of it that is measured, s."""
+
+
+def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
+    """The set p with kappa = c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g), and other parameters."""
+    return p.replace(**others, c=kappa / time_unit(p), omega_0=Omega_0 / time_unit(p))
 
 
 class Hops(NamedTuple):
@@ -72,7 +84,7 @@ class Hops(NamedTuple):
         }
         return {name: Measured(float(mean), float(np.ptp(hops)) / 2) for name, (mean, hops) in values.items()}
 
-    def conditions(self, p: Parameters) -> dict[str, float]:
+    def conditions(self, p: Parameters) -> dict[str, Any]:
         """A state at a top, and the period: near a closed orbit."""
         return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
 
@@ -89,37 +101,38 @@ def hopping(
     With the protocol "stepped" at the flow of the set only, by time stepping, in which slip begins and turns at whole
     steps only.
     """
-    shares = lab.effort("recurrent.flows") if protocol == "recurrent" else (1.0,)
     p = Parameters.named(SET)
-    flows = [share * p.omega_0 for share in shares]
-    lasts = HOLD * len(flows)
-    samples, flow = round(lasts / SAMPLE), Flow.staircase(flows, HOLD)
-    (result,) = carry_out(lab, protocol, [Trial(SET, p, "hops", TOP.stacked(), lasts, refine, samples, flow=flow)])
+    flows = [share * p.omega_0 for share in (lab.effort.recurrent_flows if protocol == "recurrent" else (1.0,))]
+    lasts, flow = HOLD * len(flows), Flow.staircase(flows, HOLD)
+    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / SAMPLE), flow=flow)
+    (result,) = carry_out(lab, protocol, [trial])
     if isinstance(result, Missing):
         yield result
         return
     heights = []
     for k, omega_0 in enumerate(flows):
-        q, begin, end = p.replace(omega_0=omega_0), k * HOLD, (k + 1) * HOLD
+        q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
         coarse, fine = (tops(run, end - LAST, end) for run in (result.coarse, result.fine))
-        at = f"at omega_0 = {omega_0:.4g} rad/s"
         if min(len(coarse.time), len(fine.time)) < 6:
-            yield Missing(protocol, SET, f"{at} the ball does not hop any more")
+            yield Missing(protocol, SET, f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more")
             break
-        known, conditions = coarse.values, fine.conditions(q)
-        heights.append([each["orbit_height"].value for each in (known, fine.values)])
+        row = partial(measurement, lab, protocol, SET, q, tasks=result.tasks, **fine.conditions(q))
         for quantity, value in fine.values.items():
-            sure = finer(known[quantity].value, value)
-            yield measurement(lab, protocol, SET, q, quantity, sure, result.tasks, **conditions)
+            yield row(quantity=quantity, value=finer(coarse.values[quantity].value, value))
         if k:
-            parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
-            slow, fast, later = (hop_map(tops(run, begin + after, end - LAST).x, q)[0] for run, after in parts)
-            factor = finer(slow, Measured(fast, abs(fast - later)))
-            row = measurement(lab, protocol, SET, q, "orbit_multiplier", factor, result.tasks, **conditions)
-            yield if_found(row, f"no disturbance is seen to shrink {at}")
+            factor = row(quantity="orbit_multiplier", value=_multiplier(result, k * HOLD, end - LAST, q))
+            yield if_found(factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s")
+        heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
     if len(heights) >= 3:
         coarse_birth, fine_birth = (birth(flows[: len(heights)], each) for each in zip(*heights, strict=True))
         yield result.row(lab, "orbit_birth", finer(coarse_birth.value, fine_birth))
+
+
+def _multiplier(result: TrialResult, begin: float, end: float, p: Parameters) -> Measured:
+    """By which factor disturbances by a step of the flow shrink between two times; a later part shows how surely."""
+    parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
+    slow, fast, later = (hop_map(tops(run, begin + after, end).x, p)[0] for run, after in parts)
+    return finer(slow, Measured(fast, abs(fast - later)))
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
@@ -159,36 +172,33 @@ def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
 def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The wall beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
     p = Parameters.named(SET)
-    # The first steps are short: their starts are extrapolated from one or two hops, which attract from nearby only.
-    shares = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
-    walls, lasts = [p.replace(eta=share * p.eta) for share in shares], 10.0
+    walls = [p.replace(eta=share * p.eta) for share in WALLS]
     etas = [q.eta for q in walls]
 
     def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
         return lab.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / SAMPLE))
 
     steady = [np.array([TOP.stacked()] * 2)]  # fixed points of the map from hop to hop, with both steps (2, 8)
-    factors, tasks, near = [], [], []
+    factors, tasks = [], []
     for k, q in enumerate(walls):
         ahead = steady[-1]
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
-        pair = [task(q, x, lasts, refined) for x, refined in zip(ahead, MARGINAL, strict=True)]
-        (runs,) = lab.groups([pair])
-        parts = [] if isinstance(runs, str) else [tops(run, LATER, lasts) for run in runs]
+        tasks.append([task(q, x, FOLLOWED, refined) for x, refined in zip(ahead, MARGINAL, strict=True)])
+        (runs,) = lab.groups(tasks[-1:])
+        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, lasts))]
+        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED))]
         factors.append([factor for factor, _ in maps])
         steady.append(np.array([state for _, state in maps[:2]]))
-        tasks.append(pair)
-        near.append(parts[1].conditions(q))
-    place = death(etas[-4:], factors[-4:])  # disturbances begin to grow at one of the last four walls
-    used = [task for pair in tasks[-4:] for task in pair]
-    yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near[-4])
-    again = [task(walls[k], np.array(tasks[k][1].x0), 60.0, MARGINAL[0]) for k in (-4, -1)]
+        if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
+            near = parts[1].conditions(q)
+    place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
+    yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
+    again = [task(walls[k], np.array(tasks[k][1].x0), ALONE, MARGINAL[0]) for k in (-4, -1)]
     yield from _left_alone(lab, "followed", SET, again)
 
 
@@ -196,17 +206,16 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
     """Whether balls that rebound hop on, followed from one coefficient of restitution to the next.
 
     By time stepping: MuJoCo's contacts have no such coefficient. At some, and at the first at which a ball no longer
-    hops, it is run for 20 s without further change. (0.6 is among them since results had been seen: at 0.56
-    disturbances grow so slowly that 20 s don't show it.)
+    hops, it is run without further change.
     """
-    p, x, left = Parameters.named(SET), TOP.stacked(), 20.0
+    p, x = Parameters.named(SET), TOP.stacked()
 
     def task(x: Array, lasts: float, restitution: float) -> Task:
         step = coarse_step(p) / 40
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
         return replace(lab.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings)
 
-    for e in (round(0.04 * k, 2) for k in range(18)):
+    for e in RESTITUTIONS:
         (run,) = lab.campaign.run([task(x, LAST, e)])
         if hops(run):
             last = tops(run, 0.0, LAST)
@@ -214,9 +223,9 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
         elif not e:
             yield Missing("rebounding", SET, "the ball does not hop")
             return
-        if not hops(run) or e in (0.0, 0.2, 0.4, 0.48, 0.6):
-            (run,) = lab.campaign.run([alone := task(x, left, e)])
-            at = last.conditions(p) | {"restitution": e, "duration": left}
+        if not hops(run) or e in REBOUNDING:
+            (run,) = lab.campaign.run([alone := task(x, REBOUNDS_ALONE, e)])
+            at = last.conditions(p) | {"restitution": e, "duration": REBOUNDS_ALONE}
             yield measurement(lab, "rebounding", SET, p, "hops", hops(run), [alone], **at)
             if not hops(run):
                 return
@@ -238,27 +247,31 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     """
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
-    lasts, part = 24.0, 4.0  # how long it swings, and the last part of it that is measured, s
-    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, lasts, (60, 80), 12_000)])
-    end = lasts - part
+    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)])
+    end = SWINGING - SWUNG
     if isinstance(result, Missing):
         yield result
         return
     if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
         yield Missing("swing", "reference", "the ball does not slip at both points for ever")
         return
-    parts = []
-    for run, start in (result.coarse, end), (result.fine, end), (result.fine, end - part):
-        inside = (run.time > start) & (run.time <= start + part)
-        time, omega_c = run.time[inside], run.omega_c[inside]
-        (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
-        at = time[k] + late * (time[1] - time[0])
-        span, turn = at[-1] - at[0], np.diff(np.interp(at[[0, -1]], run.time, run.theta))[0]
-        size = np.mean(top(omega_c, k, late)) - np.mean(top(omega_c, low, lower))
-        parts.append((float(span / (len(at) - 1)), float(turn / span), float(size)))
+    parts = [
+        _swing(run, start) for run, start in ((result.coarse, end), (result.fine, end), (result.fine, end - SWUNG))
+    ]
     conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
     for name, coarse, fine, before in zip(("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True):
         yield result.row(lab, name, finer(coarse, Measured(fine, abs(fine - before))), **conditions)
+
+
+def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
+    """Period, mean and size of the swing of omega_c in the part of a run after a time."""
+    inside = (run.time > start) & (run.time <= start + SWUNG)
+    time, omega_c = run.time[inside], run.omega_c[inside]
+    (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
+    at = time[k] + late * (time[1] - time[0])
+    span, turn = at[-1] - at[0], np.diff(np.interp(at[[0, -1]], run.time, run.theta))[0]
+    size = np.mean(top(omega_c, k, late)) - np.mean(top(omega_c, low, lower))
+    return float(span / (len(at) - 1)), float(turn / span), float(size)
 
 
 def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -266,7 +279,7 @@ def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
     reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
     low, high = np.array([0.05, 0.05, 0.2, 2.0, 0.5]), np.array([1.0, 1.0, 0.6, 8.0, 6.0])
     for mu, eta, j, kappa, Omega_0 in (low + sobol(len(low), 16, 5) * (high - low)).tolist():
-        p = with_groups(reference, mu, eta, j, reference.r, kappa, Omega_0)
+        p = with_groups(reference, kappa, Omega_0, mu=mu, eta=eta, j=j)
         lasts = 60.0 * time_unit(p) / low[3]
         for _ in range(3):
             slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
@@ -289,22 +302,20 @@ def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
     """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
     p = sets["reference"]
     rough = {
-        "rough-floor-1": with_groups(p, 1.7222, 0.0388, 0.482, 0.292 * p.R, 0.1099, 2.635),
-        "rough-floor-2": with_groups(p, 1.2277, 0.1721, 0.611, 0.154 * p.R, 0.1198, 2.099),
+        "rough-floor-1": with_groups(p, 0.1099, 2.635, mu=1.7222, eta=0.0388, j=0.482, r=0.292 * p.R),
+        "rough-floor-2": with_groups(p, 0.1198, 2.099, mu=1.2277, eta=0.1721, j=0.611, r=0.154 * p.R),
     }
     starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
-    yield from reading(lab, "choice", starts[: lab.effort("choice.sets")])
+    yield from reading(lab, "choice", starts[: lab.effort.choice_sets])
 
 
 _HOPS = "hops that last are those of the set hopping"
 PROTOCOLS = (
     Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
     Protocol("stepped", partial(hopping, protocol="stepped", refine=(40, 80)), engine=MOREAU, alone=_HOPS, first=True),
-    Protocol("choice", choice, alone="it is one of balls with mu > 1", plain=ONE, steps=(4, 4), first=True),
-    Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),
-    Protocol("rebounding", rebounding, engine=MOREAU, level=Level.DEFAULT, alone=_HOPS),
-    Protocol(
-        "swing", swing, level=Level.DEFAULT, alone="swings that last are those of reference on a very rough floor"
-    ),
-    Protocol("calm", calm, level=Level.DEFAULT, alone="strong drag is tried on sets of its own"),
+    Protocol("choice", choice, alone="it is one of balls with mu > 1", first=True),
+    Protocol("followed", followed, alone=_HOPS),
+    Protocol("rebounding", rebounding, engine=MOREAU, alone=_HOPS),
+    Protocol("swing", swing, alone="swings that last are those of reference on a very rough floor"),
+    Protocol("calm", calm, alone="strong drag is tried on sets of its own"),
 )

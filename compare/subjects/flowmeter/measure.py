@@ -15,16 +15,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from compare.kit.lab import Lab, coarse_step, time_unit
-from compare.kit.programme import ONE, TWO, Protocol
+from compare.kit.programme import Protocol
 from compare.kit.record import Condition, Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import (
     STEPS_A_SAMPLE,
+    Patience,
     Settled,
     begin,
     duration,
@@ -36,6 +39,7 @@ from compare.kit.settling import (
     settled_cases,
 )
 from compare.kit.statistics import Measured, settled_case
+from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
@@ -52,8 +56,15 @@ ABOVE, BELOW = 1.02, 0.95
 """Flows before and after the unloading, in units of the measured omega_02."""
 PUSH = 1e-2
 """How hard a ball is pushed: speed in units of sqrt(g R), or more spin in units of its spin on the wall."""
-Numbers = dict[tuple[str, str], Measured]
-"""What a run shows, by quantity and event."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """What a trial shows at an event."""
+
+    trial: str
+    quantity: str
+    event: str
 
 
 @dataclass(frozen=True)
@@ -72,12 +83,12 @@ class Curve:
 
 def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there to unloading."""
-    most = lab.effort("slope.slipping")
+    most = lab.effort.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
     for by, sharp in SHARPNESS.items():
         own = [curve for curve in curves if curve.by == by]
         starts = [[Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own]
-        for curve, states in zip(own, settle_groups(lab, starts, span=24.0, sharp=sharp), strict=True):
+        for curve, states in zip(own, settle_groups(lab, starts, Patience(span=24.0, sharp=sharp)), strict=True):
             where = f"{by} at omega_0 = {curve.p.omega_0:.4g} rad/s"
             if failure := next((each.failure for each in states if each.failure), ""):
                 yield Missing("slope", curve.set, f"{where}: {failure}")
@@ -149,41 +160,50 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
 
 def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Case and omega_c at every level of the loop, and the case at the level before."""
-    loops, tasks = {}, []
-    for name, p in sets.items():
-        if rise := _levels(name, records, lab.effort("hysteresis.parts")):
-            loops[name] = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
-            flows = [flow for _, flow in loops[name]]
-            q = p.replace(omega_0=flows[0])
-            hold = duration(q, lab.effort("hysteresis.hold"))
-            samples = round(hold / (STEPS_A_SAMPLE * coarse_step(p))) * len(flows)
-            start, flow = State(omega_c=flows[0]), Flow.staircase(flows, hold)
-            tasks.append(lab.task(q, start, hold * len(flows), coarse_step(p), flow=flow, samples=samples))
-        else:
-            yield Missing("hysteresis", name, "no flow at which slipping on the floor gives way to riding the wall")
-    for (name, levels), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
+    loops = {name: _loop(name, p, records, lab.effort.hysteresis_parts) for name, p in sets.items()}
+    why = "no flow at which slipping on the floor gives way to riding the wall"
+    yield from (Missing("hysteresis", name, why) for name, loop in loops.items() if not loop)
+    loops = {name: loop for name, loop in loops.items() if loop}
+    tasks = [_round(lab, [level.p for level in loop]) for loop in loops.values()]
+    for (name, loop), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
             yield Missing("hysteresis", name, f"the run {run}")
             continue
         # By how much half the step changes omega_c, relative to omega_0: the largest of all settled states.
         settled = [m for m in records.select("settled", "omega_c") if m.set == name and m.parameters.omega_0 > 0]
         certainty = max(m.uncertainty / m.parameters.omega_0 for m in settled)
-        count, before = (len(run.time) - 1) // len(levels), "RR"
-        for k, (side, omega_0) in enumerate(levels):
+        count, before = (len(run.time) - 1) // len(loop), "RR"
+        for k, level in enumerate(loop):
             held = slice(k * count, (k + 1) * count)
-            p = task.parameters.replace(omega_0=omega_0)
             part = replace(run, **{column: getattr(run, column)[held] for column in columns(Trajectory)})
-            ended = judged(Start(name, p, side, part.x[0]), task, part, lab.effort("settled.loose"))
+            ended = judged(replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose)
             if ended.failure:
-                where = f"level {k + 1} ({side}, omega_0 = {omega_0:.4g} rad/s)"
+                where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
                 yield Missing("hysteresis", name, f"{where}: {ended.failure}")
             else:
+                at: dict[str, Any] = {"case": ended.case.name, "side": level.name, "level": k + 1.0, "before": before}
+                row = partial(measurement, lab, "hysteresis", name, level.p, tasks=[task], **at)
                 omega_c = ended.values["omega_c"]
-                sure = Measured(omega_c.value, math.hypot(omega_c.uncertainty, certainty * omega_0))
-                at: dict[str, Condition] = {"case": ended.case.name, "side": side, "level": k + 1.0, "before": before}
-                yield measurement(lab, "hysteresis", name, p, "case", ended.case, [task], **at)
-                yield measurement(lab, "hysteresis", name, p, "omega_c", sure, [task], **at)
+                sure = math.hypot(omega_c.uncertainty, certainty * level.p.omega_0)
+                yield row(quantity="case", value=ended.case)
+                yield row(quantity="omega_c", value=Measured(omega_c.value, sure))
             before = family(ended.case).name
+
+
+def _round(lab: Lab, levels: Sequence[Parameters]) -> Task:
+    """One run through all levels, each held."""
+    p, flows = levels[0], [level.omega_0 for level in levels]
+    hold = duration(p, lab.effort.hysteresis_hold)
+    samples = round(hold / (STEPS_A_SAMPLE * coarse_step(p))) * len(flows)
+    flow = Flow.staircase(flows, hold)
+    return lab.task(p, State(omega_c=flows[0]), hold * len(flows), coarse_step(p), flow=flow, samples=samples)
+
+
+def _loop(name: str, p: Parameters, records: Records, parts: int) -> list[Start]:
+    """The levels of the loop of a set, up and down, see `_levels`."""
+    rise = _levels(name, records, parts)
+    sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
+    return [Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides]
 
 
 def _levels(name: str, records: Records, parts: int) -> list[float]:
@@ -213,34 +233,34 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
         lifts = records.threshold(name, "omega_03") or limit
         flows = ABOVE * limit.value, 1.1 * max(limit.value, lifts.value)
         starts.append([begin(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
-    for states in settle_groups(lab, starts, loose=lab.effort("thresholds.loose")):
+    for states in settle_groups(lab, starts, Patience(loose=lab.effort.thresholds_loose)):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
                 yield Missing("unloading", state.start.set, f"no ball to begin with on the wall: {state.failure}")
             else:
                 trials += [_trial(lab, state, name) for name in names]
-    measured: dict[tuple[str, str, str], list[tuple[TrialResult, Measured, float]]] = {}
+    kinds: dict[Number, list[tuple[TrialResult, Measured, float]]] = {}
     for result in carry_out(lab, "unloading", trials):
         if isinstance(result, Missing):
             yield result
             continue
-        name, (before, coarse), (case, numbers) = result.trial.name, result.coarse, result.fine
+        name, (before, coarse), (case, fine) = result.trial.name, result.coarse, result.fine
         if name != LANDING and before is case:
             yield result.row(lab, "case", case)
         elif name != LANDING:
             yield Missing("unloading", result.trial.set, f"{name}: with half the time step the ball ends up otherwise")
-        if coarse.keys() != numbers.keys() or (name == LANDING and not numbers):
+        if coarse.keys() != fine.keys() or (name == LANDING and not fine):
             yield Missing("unloading", result.trial.set, f"{name}: the ball does not slip and land")
             continue
-        for key, fine in numbers.items():
-            change = abs(coarse[key].value / fine.value - 1)
-            measured.setdefault((name, *key), []).append((result, fine, change))
-    for (name, quantity, event), rows in measured.items():
+        for number, value in fine.items():
+            kinds.setdefault(number, []).append((result, value, abs(coarse[number].value / value.value - 1)))
+    for number, alike in kinds.items():
         # The difference may be small by chance: at least the median of all trials counts.
-        usual = float(np.median([change for *_, change in rows]))
-        for result, fine, change in rows:
+        usual = float(np.median([change for *_, change in alike]))
+        for result, fine, change in alike:
             value = Measured(fine.value, math.hypot(max(change, usual) * fine.value, fine.uncertainty))
-            yield if_found(result.row(lab, quantity, value, event=event), f"{name}: no {quantity}")
+            row = result.row(lab, number.quantity, value, event=number.event)
+            yield if_found(row, f"{number.trial}: no {number.quantity}")
 
 
 def _trial(lab: Lab, state: Settled, name: str) -> Trial:
@@ -253,27 +273,27 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
         x0 = x0._replace(v_y=PUSH * math.sqrt(p.g * p.R))
     else:
         x0 = x0._replace(slip_x=x.slip_x + PUSH * (x.slip_x + p.R / p.r * x.omega_c))
-    refine = tuple(times if name == LANDING else times // 4 for times in lab.effort("unloading.refine"))
+    coarse, fine = (times if name == LANDING else times // 4 for times in lab.effort.unloading_refine)
     # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of many kinds.
     lands = 1.2 + 7 * p.c * time_unit(p)
-    t_end, step = lasting(p, lands if name == LANDING else 6.0), coarse_step(p) / refine[1]
+    t_end, step = lasting(p, lands if name == LANDING else 6.0), coarse_step(p) / fine
 
-    def read(run: Trajectory) -> tuple[Case, Numbers]:
-        numbers: Numbers = {}
+    def read(run: Trajectory) -> tuple[Case, dict[Number, Measured]]:
+        numbers = {}
         if name == LANDING:
             numbers = _landed(run)
         elif name == UPWARDS:  # it falls on the floor soon after
-            numbers = {("lift", "first top"): first_top(run)}
+            numbers = {Number(name, "lift", "first top"): first_top(run)}
         elif name == BY_SPIN:  # it leaves the floor at a whole step, up to one late or early, which changes its height
-            numbers = {("lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
+            numbers = {Number(name, "lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
         return family(settled_case(run)), numbers
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
     samples = None if name == LANDING else 1000
-    return Trial(state.start.set, p, name, x0.stacked(), t_end, refine, samples, read, conditions=known)
+    return Trial(state.start.set, p, name, x0.stacked(), t_end, (coarse, fine), samples, read, conditions=known)
 
 
-def _landed(run: Trajectory) -> Numbers:
+def _landed(run: Trajectory) -> dict[Number, Measured]:
     """Onset of slip, and landing: time, speed and vertical impulse. Empty if the ball doesn't land."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
@@ -288,11 +308,12 @@ def _landed(run: Trajectory) -> Numbers:
     wait = float(run.y[k] / -run.v_y[k])
     v_y = float(run.v_y[k] + (run.v_y[k] - run.v_y[k - 1]) / step * wait)
     rest = run.v_y[k + 5 : k + 12]  # by then it must have come to rest on the floor
+    impulse = Measured(p.m * (float(rest.mean()) - v_y), p.m * float(np.abs(rest).max()))
     return {
-        ("time", "slip at B"): Measured(cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))),
-        ("time", "landing"): Measured(float(run.time[k]) + wait, step / math.sqrt(12)),
-        ("landing_speed", "landing"): Measured(v_y, 0.0),
-        ("landing_impulse", "landing"): Measured(p.m * (float(rest.mean()) - v_y), p.m * float(np.abs(rest).max())),
+        Number(LANDING, "time", "slip at B"): Measured(cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))),
+        Number(LANDING, "time", "landing"): Measured(float(run.time[k]) + wait, step / math.sqrt(12)),
+        Number(LANDING, "landing_speed", "landing"): Measured(v_y, 0.0),
+        Number(LANDING, "landing_impulse", "landing"): impulse,
     }
 
 
@@ -310,14 +331,7 @@ def first_top(run: Trajectory) -> Measured:
 
 
 PROTOCOLS = (
-    Protocol("hysteresis", hysteresis, ("settled",), quick=ONE, plain=ONE, steps=(4, 4)),
-    Protocol(
-        "unloading",
-        unloading,
-        ("thresholds",),
-        quick=TWO,
-        cost=4,
-        drawn=lambda m: m.conditions["start"] == UNLOADED,
-    ),
+    Protocol("hysteresis", hysteresis, ("settled",)),
+    Protocol("unloading", unloading, ("thresholds",), cost=4, drawn=lambda m: m.conditions["start"] == UNLOADED),
     Protocol("slope", slope, ("settled", "thresholds"), cost=6),
 )

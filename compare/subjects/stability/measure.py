@@ -12,7 +12,7 @@ one way and lifts it off the other way: only the first is used.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -24,7 +24,7 @@ import numpy.typing as npt
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.fits import exponents, matched, propagator
 from compare.kit.lab import Lab, coarse_step, time_unit
-from compare.kit.programme import LAWS, ONE, Protocol
+from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
 from compare.kit.settling import SOLVED, SPIN, family, high
@@ -89,8 +89,25 @@ class Pushed:
 
     def steps(self, lab: Lab) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
-        coarse, fine = lab.effort("rates.leaning" if self.case is Case.SR else "rates.refined")
+        coarse, fine = lab.effort.rates_leaning if self.case is Case.SR else lab.effort.rates_refined
         return coarse_step(self.start.p) / coarse, coarse_step(self.start.p) / fine
+
+    @property
+    def fast(self) -> bool:
+        """Whether contacts slip fast enough for a push.
+
+        Neither so slowly that it turns the slip, or friction stops it within four coarse steps, for a faster decay is
+        not resolved; nor at half the speed, divided by what `STUDY_SLIP` allows for the load, at which they hover.
+        """
+        p, x = self.start.p, self.start.x0
+        turned = math.sqrt(p.g * p.R) * max(SLOWEST, 2 * PUSH.get(self.case, 0.0))
+        loads = (p.mu, p.g), (p.eta, p.R * State.of(x).omega_c ** 2)
+        return all(
+            max(turned, 4 * coarse_step(p) * friction * load) < speed
+            and friction * speed < 10 * STUDY_SLIP * load / p.g
+            for contact, speed, (friction, load) in zip(self.case.name, slip_speeds(x, p), loads, strict=True)
+            if contact == "S"
+        )
 
     def tasks(self, lab: Lab) -> list[Task]:
         """Runs for each of the `sizes`: every active variable is pushed, up and down."""
@@ -113,12 +130,11 @@ class Pushed:
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    found = [each for name, p in sets.items() for each in chosen(records, name, p, lab.effort("rates.more"))]
+    found = [each for name, p in sets.items() for each in chosen(records, name, p, lab.effort.rates_more)]
     yield from (each for each in found if isinstance(each, Missing))
     states = [each for each in found if isinstance(each, Pushed)]
     tasks = [state.tasks(lab) for state in states]
     for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
-        _, step = state.steps(lab)
         if isinstance(runs, str):
             yield state.missing(f"a run {runs}")
             continue
@@ -128,48 +144,31 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         # had been seen to be off.)
         if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
             yield state.missing("pushed, the ball doesn't stay in this case")
-        else:
-            values, sure = spectrum(state, answers, step)
-            yield from _rows(lab, state, answers, values, sure, step, own[-count:])
+            continue
+        (_, step), start = state.steps(lab), state.start
+        at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
+        row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
+        values, uncertainty = spectrum(state, answers, step)
+        yield row(quantity="modes", value=len(values))
+        yield from _modes(state, values, uncertainty, step, row)
+        yield from _responses(state, answers, float(uncertainty.max()), row)
 
 
 def chosen(records: Records, name: str, p: Parameters, more: float) -> Iterator[Pushed | Missing]:
     """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
 
     Where there are fewer that can be pushed, the rest is missing.
-
-    One on the wall alone is pushed high up, and where it only just touches the floor. Contacts must slip neither so
-    slowly that a push turns the slip, or friction stops it within four coarse steps, for a faster decay is not
-    resolved; nor at half the speed, divided by what `STUDY_SLIP` allows for the load, at which they hover.
     """
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
     yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
-    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
-    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
-    states = []
-    for (q, case), value in values.items():
-        x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
-        states.append((q, case, x._replace(y=high(q)) if case.A is Contact.N else x))
-        if case is Case.NR:
-            states.append((q, Case.SR, x))
+    states = list(_settled(records, name))
     if p.drag == QUADRATIC:  # no ball settles to going round with the fluid, but one that starts so goes on so
-        states.append((p.replace(omega_0=0.5 / unit), Case.RR, State(omega_c=0.5 / unit)))
+        q, x = p.replace(omega_0=0.5 / unit), State(omega_c=0.5 / unit)
+        states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.RR))
     for case, most in STATES.items():
-        alike, of = [], sorted((s for s in states if s[1] is case), key=lambda s: s[0].omega_0)
-        for q, _, x in of:
-            turned = math.sqrt(q.g * q.R) * max(SLOWEST, 2 * PUSH.get(case, 0.0))
-            contacts = zip(
-                case.name, slip_speeds(x.stacked(), q), (q.mu, q.eta), (q.g, q.R * x.omega_c**2), strict=True
-            )
-            if all(
-                max(turned, 4 * coarse_step(q) * friction * load) < speed
-                and friction * speed < 10 * STUDY_SLIP * load / q.g
-                for contact, speed, friction, load in contacts
-                if contact == "S"
-            ):
-                alike.append(Pushed(Start(name, q, "settled", x.stacked()), case))
+        of = sorted((each for each in states if each.case is case), key=lambda each: each.start.p.omega_0)
+        alike = [state for state in of if state.fast]
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
         count = math.ceil(more * most)
@@ -178,6 +177,19 @@ def chosen(records: Records, name: str, p: Parameters, more: float) -> Iterator[
         if (lacking := min(count, len(of)) - len(places)) > 0 or not of:
             why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a push"
             yield Missing(PROTOCOL, name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
+
+
+def _settled(records: Records, name: str) -> Iterator[Pushed]:
+    """The settled states of a set; one on the wall alone high up, and where it only just touches the floor."""
+    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
+    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
+        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
+    for (p, case), value in values.items():
+        x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
+        raised = x._replace(y=high(p)) if case.A is Contact.N else x
+        yield Pushed(Start(name, p, "settled", raised.stacked()), case)
+        if case is Case.NR:
+            yield Pushed(Start(name, p, "settled", x.stacked()), Case.SR)
 
 
 def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
@@ -251,25 +263,15 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
     return values + correction, np.maximum(uncertainty, alike)
 
 
-def _rows(
-    lab: Lab,
-    state: Pushed,
-    answers: Sequence[Array],
-    exponents: Exponents,
-    uncertainty: Array,
-    step: float,
-    tasks: Sequence[Task],
-) -> Iterator[Measurement | Missing]:
-    """One of each pair of conjugates, in the order of frequency and decay, slowest first; how many there are; and how
-    each active variable follows one of each, in `units`, a third of the record later.
+Row = Callable[..., Measurement]
+"""Makes a measurement of a state from quantity, value and conditions."""
 
-    The latter shows the directions of the motions, not only their rates. It is extrapolated as `spectrum` does, to a
-    vanishing push and step.
-    """
-    start, parts = state.start, []
-    at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
-    row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=tasks, **at)
-    yield row(quantity="modes", value=len(exponents))
+
+def _modes(
+    state: Pushed, exponents: Exponents, uncertainty: Array, step: float, row: Row
+) -> Iterator[Measurement | Missing]:
+    """One of each pair of conjugates, in the order of frequency and decay, slowest first."""
+    p, parts = state.start.p, []
     order = np.lexsort((-exponents.real, exponents.imag))
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):
         if abs(exponents[k]) * step > 0.25:
@@ -277,21 +279,28 @@ def _rows(
             continue
         rate, frequency = -float(exponents[k].real), float(exponents[k].imag)
         for name, value, other in (("decay_rate", rate, frequency), ("frequency", frequency, rate)):
-            parts.append((name, mode, value, natural_size(value, other, start.p), float(uncertainty[k])))
+            parts.append((name, mode, value, natural_size(value, other, p), float(uncertainty[k])))
     # They come from one propagator: where one is too vague for a check, the others aren't to be trusted more.
     vague = max(COVERAGE * sure / size / quantity(name).resolves for name, *_, size, sure in parts)
-    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > REST * start.p.c]
+    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > REST * p.c]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
     for name, mode, value, size, sure in parts:
         least = vague * quantity(name).resolves * size / COVERAGE if vague > 1 else 0.0
         yield row(quantity=name, value=Measured(value, max(sure, least)), mode=mode)
-    names, (lasts, samples) = TRAITS[state.case].active, state.record
-    length = min(map(len, answers))
+
+
+def _responses(state: Pushed, answers: Sequence[Array], turns: float, row: Row) -> Iterator[Measurement]:
+    """How each active variable follows one of each, in `units`, a third of the record later.
+
+    This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum` does, to a
+    vanishing push and step; what the exponents may be off, s-1, turns it.
+    """
+    names, (lasts, samples), length = TRAITS[state.case].active, state.record, min(map(len, answers))
     coarse, large, small = (propagator(answers[k][:length], length // 3) for k in (0, 1, -1))
     bent, late = (small - large) / (2**state.order - 1), (small - coarse) / 3
-    value, time = small + bent + late, length // 3 * lasts * coarse_step(start.p) / samples
-    turned = uncertainty.max() * time * np.abs(value).max()
+    value, time = small + bent + late, length // 3 * lasts * coarse_step(state.start.p) / samples
+    turned = turns * time * np.abs(value).max()
     sure = float(np.linalg.norm([np.abs(bent).max(), np.abs(late).max(), turned]))
     for (i, of), (j, by) in product(enumerate(names), repeat=2):
         yield row(quantity="response", value=Measured(float(value[i, j]), sure), time=time, of=of, pushed=by)
@@ -308,6 +317,4 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     return 1 / time_unit(p)
 
 
-PROTOCOLS = (
-    Protocol("rates", measure, ("settled",), quick=(*LAWS, "high-wall-friction", "thick-fluid"), plain=ONE, cost=7),
-)
+PROTOCOLS = (Protocol("rates", measure, ("settled",), cost=7),)

@@ -17,18 +17,19 @@ import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.lab import Lab, coarse_step
-from compare.kit.programme import LAWS, ONE, Protocol
+from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import lasting, settle
 from compare.kit.statistics import COVERAGE, Measured, peaks, top
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, carry_out, finer, known_flow
+from compare.kit.trials import Start, Trial, TrialResult, carry_out, finer, known_flow
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -41,9 +42,24 @@ LASTING = 5
 """Samples for which slip must last to count: friction may be full for a moment before."""
 PHASES = 8
 """Phases of a period at which the motion is started anew from its state."""
+ROLLING, SLIPPING, RAMP = 0.85, 0.3, (0.75, 1.35)
+"""Flows of rolling, in units of that at which it ends; of slipping, as parts of the way from there to where the wall
+carries the ball; and ends of a ramp, as parts of the way to where slipping ends in a jump."""
 JUMP = 1e-3
 """Size of a jump from rolling divided by the flow, and from slipping by a third of the range of flows in which it is:
 the response to a small jump is wanted, and near the ends of that range it is far from linear."""
+
+
+class Course(NamedTuple):
+    """How a run in a pulsation is done."""
+
+    periods: float
+    samples: int
+    """In a period."""
+    refine: int
+    """By what the longest time step is divided."""
+    phase: float = 0.0
+    """Of the flow at the beginning, rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,23 +96,14 @@ class Pulsation:
         """The same with this omega_c as a period begins."""
         return replace(self, begin=(omega_c - self.p.omega_0) / self.amplitude)
 
-    def task(
-        self,
-        lab: Lab,
-        amplitude: float,
-        x: Array,
-        periods: float,
-        refine: int,
-        samples: int,
-        phase: float = 0.0,
-        largest: float = 0.0,
-    ) -> Task:
+    def task(self, lab: Lab, amplitude: float, x: Array, course: Course, largest: float = 0.0) -> Task:
         """A run from a state, with as many steps in a period, a power of two, as the `largest` amplitude needs."""
         fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
-        least = max(lab.effort("pulsation.steps"), 1 / (self.frequency * coarse_step(self.p)), fastest)
-        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * refine)
-        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, phase)
-        return lab.task(self.p, x, periods / self.frequency, step, flow=flow, samples=round(samples * periods))
+        least = max(lab.effort.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest)
+        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * course.refine)
+        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, course.phase)
+        samples = round(course.samples * course.periods)
+        return lab.task(self.p, x, course.periods / self.frequency, step, flow=flow, samples=samples)
 
     def row(self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float) -> Measurement:
         """A measurement in this pulsation."""
@@ -105,70 +112,81 @@ class Pulsation:
 
 def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
-    small = []
-    for name, p in sets.items():
-        if (end := known_flow(records, name, "omega_01")) is None:
-            yield Missing("pulsation", name, "no flow was measured at which two-point rolling ends by slipping")
-            continue
-        q = p.replace(omega_0=0.85 * end)
-        # Where friction creeps, slip counts as such later.
-        room, reach, lowest = (
-            end - q.omega_0,
-            1.5 if lab.beside else 1.1,
-            2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi))),
-        )
-        octaves = lab.effort("pulsation.octaves")
-        small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach * room) for n in octaves]
+    ends = {name: known_flow(records, name, "omega_01") for name in sets}
+    why = "no flow was measured at which two-point rolling ends by slipping"
+    yield from (Missing("pulsation", name, why) for name, end in ends.items() if end is None)
+    small = [each for name, end in ends.items() if end is not None for each in _small(lab, name, sets[name], end)]
     followed = _followed(lab, small)
     for each in followed:
-        if each.failure:
-            yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
-            continue
-        gain, lag = abs(each.ratio), -cmath.phase(each.ratio)
-        own = {"gain": Measured(gain, each.uncertainty), "phase_lag": Measured(lag, each.uncertainty / gain)}
-        for quantity, value in own.items():
-            yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
+        yield from _response(lab, each)
     rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
-    samples = lab.effort("pulsation.samples")
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
-        at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
-        # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-        unseen = (math.pi * LASTING / samples) ** 2 / 2 * place.value
-        onset = Measured(place.value, math.hypot(place.uncertainty, unseen))
-        if low is None or high is None:
-            yield Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
+        onset = _onset(lab, each, bracket)
+        yield onset
+        if isinstance(onset, Missing):
             continue
-        alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
-        if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
-            yield Missing("pulsation", each.set, f"in {at} one contact slips before both do, too little to tell when")
-            continue
-        measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
         # The predicted amplitude may be a tenth smaller than the measured one.
-        yield measured
         if COVERAGE * onset.uncertainty <= QUANTITIES["slip_amplitude"].resolves * 0.9 * onset.value:
             slipping.append((each, 1.5 * onset.value))
         else:
+            at = f"a pulsation at {each.frequency:g} Hz"
             yield Missing("pulsation", each.set, f"slip in {at} begins at no definite amplitude: no mean reading there")
     yield from mean_errors(lab, slipping)
 
 
+def _small(lab: Lab, name: str, p: Parameters, end: float) -> list[Pulsation]:
+    """Small pulsations of a set about a part of the flow at which rolling ends."""
+    q = p.replace(omega_0=ROLLING * end)
+    room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
+    octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach
+    return [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach * room) for n in octaves]
+
+
+def _response(lab: Lab, each: Pulsation) -> Iterator[Measurement | Missing]:
+    """Gain and phase with which a ball follows."""
+    if each.failure:
+        yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
+        return
+    gain, lag = abs(each.ratio), -cmath.phase(each.ratio)
+    own = {"gain": Measured(gain, each.uncertainty), "phase_lag": Measured(lag, each.uncertainty / gain)}
+    for quantity, value in own.items():
+        yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
+
+
+def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
+    """The amplitude at which slip begins."""
+    at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
+    if low is None or high is None:
+        return Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
+    alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
+    if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
+        return Missing("pulsation", each.set, f"in {at} one contact slips before both do, too little to tell when")
+    # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
+    unseen = (math.pi * LASTING / lab.effort.pulsation_samples) ** 2 / 2 * place.value
+    return each.row(lab, "slip_amplitude", Measured(place.value, math.hypot(place.uncertainty, unseen)), bracket.tasks)
+
+
+class Round(NamedTuple):
+    """A run in a pulsation, and the limit of omega_c as its periods begin, from which the next one starts."""
+
+    task: Task
+    run: Trajectory
+    omega_c: float
+
+
 def _rounds(
     lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
-) -> list[list[tuple[Task, Trajectory, float]] | str]:
+) -> list[list[Round] | str]:
     """Runs in pulsations of these amplitudes until they are settled: the last two of each, the last with half the step,
     or why one broke down.
 
-    Each run comes with its task and the limit of omega_c as its periods begin, from which the next one starts; a ball
-    that slips goes on with the rest of its last state.
+    A ball that slips goes on with the rest of its last state.
     """
-    states, seen = (
-        [each.start(a) for each, a in driven],
-        list[list[tuple[Task, Trajectory, float]] | str]([[]] * len(driven)),
-    )
+    states, seen = [each.start(a) for each, a in driven], list[list[Round] | str]([[]] * len(driven))
     for n in range(ROUNDS):
-        times = refine * (2 if n == ROUNDS - 1 and not lab.beside else 1)
+        course = Course(PERIODS, samples, refine * (lab.effort.pulsation_refine if n == ROUNDS - 1 else 1))
         todo = [(k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)]
-        tasks = [each.task(lab, a, states[k], PERIODS, times, samples) for k, each, a, _ in todo]
+        tasks = [each.task(lab, a, states[k], course) for k, each, a, _ in todo]
         for (k, each, a, before), task, run in zip(todo, tasks, lab.each(tasks), strict=True):
             if isinstance(run, str):
                 seen[k] = f"the run {run}"
@@ -176,26 +194,25 @@ def _rounds(
             omega_c = limit(run.omega_c[samples::samples])
             slid = State.of(run.x[-1])._replace(omega_c=omega_c).stacked()
             states[k] = slid if slips else each.begun(omega_c).start(a)
-            seen[k] = [*before[-1:], (task, run, omega_c)]
+            seen[k] = [*before[-1:], Round(task, run, omega_c)]
     return seen
 
 
 def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """How balls follow pulsations of their own amplitudes."""
-    followed, samples = [], lab.effort("pulsation.samples")
+    followed, samples = [], lab.effort.pulsation_samples
     last = slice(-2 * samples, None)
     rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False)
     for each, seen in zip(pulsations, rounds, strict=True):
         if isinstance(seen, str):
             followed.append(replace(each, failure=seen))
             continue
-        (earlier, before, _), (later, run, omega_c) = seen
         first, ratio = (
             complex(2j * np.mean(x[last] * np.exp(-2j * math.pi * each.frequency * t[last])) / each.amplitude)
-            for t, x in ((before.time, before.omega_c), (run.time, run.omega_c))
+            for t, x in ((run.time, run.omega_c) for _, run, _ in seen)
         )
-        failure = "" if rolls_on(run) else "a ball slips in a pulsation half as large as in a slow one"
-        new, change, tasks = each.begun(omega_c), abs(ratio - first), (earlier, later)
+        failure = "" if rolls_on(seen[-1].run) else "a ball slips in a pulsation half as large as in a slow one"
+        new, change, tasks = each.begun(seen[-1].omega_c), abs(ratio - first), tuple(task for task, *_ in seen)
         followed.append(replace(new, ratio=ratio, uncertainty=change, failure=failure, tasks=tasks))
     return followed
 
@@ -219,8 +236,8 @@ def _search(lab: Lab, each: Pulsation) -> Search:
     """For the amplitude at which slip begins, in runs of one period and a half of which the first sixth is left out."""
 
     def task(amplitude: float, bracket: Bracket, care: Care) -> Task:
-        x, samples = each.start(amplitude), lab.effort("pulsation.samples")
-        return each.task(lab, amplitude, x, 1.5 * care.time, 2 * care.refine, samples, largest=begin.high)
+        course = Course(1.5 * care.time, lab.effort.pulsation_samples, 2 * care.refine)
+        return each.task(lab, amplitude, each.start(amplitude), course, largest=begin.high)
 
     if each.p.drag == STOKES:
         # Slip may begin from about half the largest amplitude on: the width is taken relative to that.
@@ -228,7 +245,7 @@ def _search(lab: Lab, each: Pulsation) -> Search:
         begin, size = Bracket(0.0, largest), largest / 2
     else:
         begin, size = Bracket(0.99 * each.amplitude, RAISE * each.amplitude), each.amplitude
-    return Search(begin, task, rolls_on, lab.effort("pulsation.width") * size)
+    return Search(begin, task, rolls_on, lab.effort.pulsation_width * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
@@ -247,10 +264,10 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
     samples = 8 * PHASES
     rounds = _rounds(lab, slipping, 1, samples, slips=True)
     anew = [
-        each.task(lab, a, x, 1, 1, samples, phase=2 * math.pi * k / PHASES)
+        each.task(lab, a, x, Course(1, samples, 1, phase=2 * math.pi * k / PHASES))
         for (each, a), seen in zip(slipping, rounds, strict=True)
         if not isinstance(seen, str)
-        for k, x in enumerate(seen[0][1].x[-1 - samples : -1 : samples // PHASES])
+        for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // PHASES])
     ]
     begun = lab.groups([anew[k : k + PHASES] for k in range(0, len(anew), PHASES)])
     for (each, amplitude), seen in zip(slipping, rounds, strict=True):
@@ -279,66 +296,70 @@ def limit(values: Array) -> float:
 
 def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at which a ramp ends it."""
-    trials: list[Trial] = []
-    starts: list[tuple[float, float, Start]] = []  # with the size of a jump, or the range and the end of a ramp
-
-    def jump(set: str, p: Parameters, case: Case, x0: State, size: float) -> None:
-        sides, known = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1)), {"case": case.name}
-        t_end = lasting(p, lab.effort("unsteady.lasts"))
-        samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
-        refine = lab.effort("unsteady.refine")
-        motion = Trial(set, p, case.name, x0.stacked(), t_end, refine, samples, _jumped, None, sides, known)
-        trials.append(motion)
-
+    flows: dict[str, tuple[float, float, float]] = {}  # where slipping begins, the wall carries the ball, a jump ends
+    trials, starts = list[Trial](), list[Start]()  # from rest, to settle slipping before a jump or a ramp
     for name, p in sets.items():
         begins, holds, ends = (known_flow(records, name, f"omega_0{n}") for n in (1, 2, 4))
         if begins is None or holds is None:
             yield Missing("unsteady", name, "no flows were measured between which the ball slips at both points")
             continue
+        flows[name] = begins, holds, ends or math.nan
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
-            q = p.replace(omega_0=0.85 * begins)
-            jump(name, q, Case.RR, State(omega_c=q.omega_0), JUMP * q.omega_0)
-        begun = Start(name, p.replace(omega_0=begins + 0.3 * (holds - begins)), "jump", np.zeros(8))
-        starts.append((JUMP / 3 * (holds - begins), 0.0, begun))
+            q = p.replace(omega_0=ROLLING * begins)
+            trials.append(_jump(lab, Start(name, q, "RR", State(omega_c=q.omega_0).stacked()), JUMP * q.omega_0))
+        starts.append(Start(name, p.replace(omega_0=begins + SLIPPING * (holds - begins)), "jump", np.zeros(8)))
         if ends is None:
             yield Missing("unsteady", name, "no flow was measured at which slipping at both points ends in a jump")
         else:
-            span = ends - begins
-            first = p.replace(omega_0=begins + 0.75 * span)
-            starts.append((span, begins + 1.35 * span, Start(name, first, "ramp", np.zeros(8))))
-    for (span, end, start), state in zip(starts, settle(lab, [start for *_, start in starts]), strict=True):
+            starts.append(Start(name, p.replace(omega_0=begins + RAMP[0] * (ends - begins)), "ramp", np.zeros(8)))
+    for start, state in zip(starts, settle(lab, starts), strict=True):
         if state.failure or state.case is not Case.SS:
             why = state.failure or state.case.name
             yield Missing("unsteady", start.set, f"no settled slipping to start from: {why}")
             continue
-        x0 = State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0)  # at both walls to the last digit
-        if not end:
-            jump(start.set, start.p, Case.SS, x0, span)
+        begins, holds, ends = flows[start.set]
+        # At both walls to the last digit.
+        begun = replace(start, x0=State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked())
+        if start.name == "jump":
+            trials.append(_jump(lab, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
         else:
-            p, x = start.p, x0.stacked()
-            for rate in lab.effort("unsteady.rates"):
-                rise = rate * p.c * span
-                t_end, known = (end - p.omega_0) / rise, {"rate": rise, **state_of(x[:6])}
-                flow = Flow.ramp(p.omega_0, end, t_end)
-                trials.append(
-                    Trial(
-                        start.set, p, "ramp", x, t_end, (1, 1 if lab.beside else 2), 16000, caught_up, flow, (), known
-                    )
-                )
+            trials += _ramps(lab, begun, begins, ends)
     for result in carry_out(lab, "unsteady", trials):
-        if isinstance(result, Missing):
-            yield result
-            continue
-        trial = result.trial
-        if trial.flow is None:
-            for quantity in ("jump_delay",) if trial.name == Case.RR.name else ("jump_peak", "jump_height"):
-                row = result.row(lab, quantity, finer(result.coarse[quantity].value, result.fine[quantity]))
-                yield if_found(row, f"{quantity} in {trial.name}: no peak")
-        elif math.isfinite(result.coarse) and math.isfinite(result.fine):
-            yield result.row(lab, "ramp_end", finer(result.coarse, Measured(result.fine, 0.0)))
-        else:
-            why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
-            yield Missing("unsteady", trial.set, why)
+        yield from [result] if isinstance(result, Missing) else _changed(lab, result)
+
+
+def _jump(lab: Lab, start: Start, size: float) -> Trial:
+    """Jumps up and down of the flow, rad s-1, from a state in the case that the start is named by."""
+    p, t_end = start.p, lasting(start.p, lab.effort.unsteady_lasts)
+    sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
+    samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
+    refine, at = lab.effort.unsteady_refine, {"case": start.name}
+    return Trial(start.set, p, start.name, start.x0, t_end, refine, samples, _jumped, None, sides, at)
+
+
+def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial]:
+    """Ramps from settled slipping, which is between two flows in rad s-1, at several rates."""
+    p, span = start.p, ends - begins
+    last = begins + RAMP[1] * span
+    for rate in lab.effort.unsteady_rates:
+        rise = rate * p.c * span
+        t_end, at = (last - p.omega_0) / rise, {"rate": rise, **state_of(start.x0[:6])}
+        flow, refine = Flow.ramp(p.omega_0, last, t_end), lab.effort.unsteady_ramps
+        yield Trial(start.set, p, "ramp", start.x0, t_end, refine, 16000, caught_up, flow, (), at)
+
+
+def _changed(lab: Lab, result: TrialResult) -> Iterator[Measurement | Missing]:
+    """What a jump or a ramp shows."""
+    trial, coarse, fine = result.trial, result.coarse, result.fine
+    if trial.flow is None:
+        for quantity in ("jump_delay",) if trial.name == "RR" else ("jump_peak", "jump_height"):
+            row = result.row(lab, quantity, finer(coarse[quantity].value, fine[quantity]))
+            yield if_found(row, f"{quantity} in {trial.name}: no peak")
+    elif math.isfinite(coarse) and math.isfinite(fine):
+        yield result.row(lab, "ramp_end", finer(coarse, Measured(fine, 0.0)))
+    else:
+        why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
+        yield Missing("unsteady", trial.set, why)
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:
@@ -373,8 +394,6 @@ def caught_up(run: Trajectory) -> float:
 
 
 PROTOCOLS = (
-    Protocol("pulsation", pulsation, ("thresholds",), quick=LAWS, plain=ONE, cost=7),
-    Protocol(
-        "unsteady", jumps, ("thresholds",), quick=LAWS, plain=ONE, drawn=lambda m: m.quantity == "jump_height", cost=5
-    ),
+    Protocol("pulsation", pulsation, ("thresholds",), cost=7),
+    Protocol("unsteady", jumps, ("thresholds",), drawn=lambda m: m.quantity == "jump_height", cost=5),
 )

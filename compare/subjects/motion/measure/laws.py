@@ -34,7 +34,7 @@ FLUIDS: Mapping[str, Mapping[str, float]] = {
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """How far the laws are off, the ratio of friction to normal force, and the speed at which balls sink in a fluid."""
-    refined = lab.effort("laws.refined")
+    refined = lab.effort.laws_refined
     balls = {name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2) for name, fluid in FLUIDS.items()}
     tasks = []
     for p in sets.values():

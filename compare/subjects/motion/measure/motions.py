@@ -35,7 +35,7 @@ from compare.kit.short import (
 )
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, carry_out
+from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -102,15 +102,15 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             results.append(result)
     kept = Counter[tuple[str, float, Case]]()
     for centre, result in product(CENTRES, results):
-        set, p, case = result.trial.set, result.trial.p, Case(int(result.coarse.case[centre * lab.halves[0]]))
-        if kept[set, p.nu_f, case] < lab.effort("field.kept"):
+        set, p, case = result.trial.set, result.trial.p, Case(int(result.coarse.case[centre * lab.effort.halves[0]]))
+        if kept[set, p.nu_f, case] < lab.effort.field_kept:
             window = _window(lab, case, result.coarse, result.fine, centre)
             if window is not None:
                 kept[set, p.nu_f, case] += 1
                 for what, value in _values(case, window, p).items():
                     yield result.row(lab, what, value, case=case.name, **state_of(window[0, STATE_PART]))
     for name, case in product(sets, Case):
-        if lacking := lab.effort("field.kept") - kept[name, sets[name].nu_f, case]:
+        if lacking := lab.effort.field_kept - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
             rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
             yield Missing("field", name, why, lacking * rows)
@@ -121,14 +121,14 @@ def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
     through it at Reynolds numbers as balls in water have them, so that drag shows.
     """
     rng = np.random.default_rng([SEED, *name.encode()])
-    for case, k in product(Case, range(lab.effort("field.starts"))):
+    for case, k in product(Case, range(lab.effort.field_starts)):
         x = random_state(case, p, rng)
         # Friction at two rolling contacts can balance only a slight lag.
         rolls = case is Case.RR
         omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
         q = p.replace(omega_0=omega_0)
         t_end = (CENTRES[-1] + HALF_WINDOW + BEFORE_AND_AFTER) * coarse_step(q) / REFINED
-        refine = REFINED * lab.halves[0], REFINED * lab.halves[1]
+        refine = REFINED * lab.effort.halves[0], REFINED * lab.effort.halves[1]
         trial = Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0)
         yield trial
         if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2:
@@ -142,7 +142,7 @@ def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: 
     with the lower degree. None if another case is in or near the window, or `turns_or_hovers`.
     """
     read = []
-    for run, times in zip((coarse, fine), lab.halves, strict=True):
+    for run, times in zip((coarse, fine), lab.effort.halves, strict=True):
         near, half, middle = ((HALF_WINDOW + BEFORE_AND_AFTER) * times, HALF_WINDOW * times, centre * times)
         window = slice(middle - half, middle + half + 1)
         if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(case, run, window):
@@ -211,7 +211,8 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         step = coarse_step(start.p) / REFINED
         steps = round(6.0 * time_unit(start.p) / step)
         tasks.append(lab.task(start.p, start.x0, steps * step, step, samples=steps))
-    seen, count = set[tuple[str, Case]](), lab.effort("motions.pieces")
+    seen: dict[str, set[Case]] = {name: set() for name in sets}
+    count = lab.effort.motions_pieces
     for start, task, run in zip(starts, tasks, lab.each(tasks), strict=True):
         name, p = start.set, start.p
         if isinstance(run, str):
@@ -221,16 +222,14 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if lacking := count - len(chosen):
             why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips by a trace"
             yield Missing("motions", name, why, lacking)
-        for first in chosen:
-            last = first + LENGTH
+        for first, last in ((first, first + LENGTH) for first in chosen):
             case = Case(int(run.case[last]))
-            seen.add((name, case))
+            seen[name].add(case)
             at = state_of(constrained(Case(int(run.case[first])), run.x[first], p))
             time = float(run.time[last] - run.time[first])
             yield measurement(lab, "motions", name, p, "case", case, [task], case=case.name, time=time, **at)
-    for name in sets:
-        unseen = [case.name for case in Case if (name, case) not in seen]
-        if unseen:
+    for name, cases in seen.items():
+        if unseen := [case.name for case in Case if case not in cases]:
             yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
@@ -280,39 +279,50 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts are 4 to 5 times that
     high, and of a plastic landing nothing is left but the fall within a step.
     """
-    trials = []
-    for name, p in sets.items():
-        for how, x in LANDINGS.items():
-            start = _start(name, p, 0.8, x, how)
-            step = coarse_step(start.p) / REFINED
-            conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
-            t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
-            trials.append(Trial(name, start.p, how, start.x0, t_end, refine, conditions=conditions, rows=len(LANDED)))
+    trials = [_landing(name, p, how) for name, p in sets.items() for how in LANDINGS]
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
-    changed = [VARIABLES.index(name) for name in LANDED]
     for landing in carry_out(lab, "impacts", trials):
         if isinstance(landing, Missing):
             yield landing
             continue
-        trial, coarse, fine = landing.trial, landing.coarse, landing.fine
-        p, units, on_floor = trial.p, state_units(trial.p), trial.name.startswith("floor")
-        tasks[trial.set] += landing.tasks
-        for run in (coarse, fine):
-            gap = run.y if on_floor else run.h
-            low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
-            rebounds[trial.set] += bool(gap[low:].max() > gap[low] + 1e-2 * p.R)
-        contact = [case.A if on_floor else case.B for case in coarse.cases]
-        at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
-        if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-            why = f"{trial.name}: the contact did not close for good within 0.4 sqrt(R/g)"
-            yield Missing("impacts", trial.set, why, len(LANDED))
-            continue
-        change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
-        # The contact closes at a whole step, up to one late; until then weight and friction differ.
-        late = coarse_step(p) / REFINED / time_unit(p) / 2
-        for quantity, k in zip(LANDED, changed, strict=True):
-            value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
-            yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))
+        tasks[landing.trial.set] += landing.tasks
+        rebounds[landing.trial.set] += sum(_rebounds(run, landing.trial) for run in (landing.coarse, landing.fine))
+        yield from _landed(lab, landing)
     for name, count in rebounds.items():
         p = next(trial.p for trial in trials if trial.set == name)
         yield measurement(lab, "impacts", name, p, "rebounds", count, tasks[name])
+
+
+def _landing(name: str, p: Parameters, how: str) -> Trial:
+    """A motion in which a ball lands."""
+    start = _start(name, p, 0.8, LANDINGS[how], how)
+    step = coarse_step(start.p) / REFINED
+    conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
+    t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
+    return Trial(**vars(start), t_end=t_end, refine=refine, conditions=conditions, rows=len(LANDED))
+
+
+def _rebounds(run: Trajectory, trial: Trial) -> bool:
+    """Whether the contact at which a ball lands opens again."""
+    gap = run.y if trial.name.startswith("floor") else run.h
+    low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
+    return bool(gap[low:].max() > gap[low] + 1e-2 * trial.p.R)
+
+
+def _landed(lab: Lab, landing: TrialResult) -> Iterator[Measurement | Missing]:
+    """The state six coarse steps after a landing."""
+    trial, coarse, fine = landing.trial, landing.coarse, landing.fine
+    p, units = trial.p, state_units(trial.p)
+    contact = [case.A if trial.name.startswith("floor") else case.B for case in coarse.cases]
+    at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
+    if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
+        why = f"{trial.name}: the contact did not close for good within 0.4 sqrt(R/g)"
+        yield Missing("impacts", trial.set, why, len(LANDED))
+        return
+    changed = [VARIABLES.index(name) for name in LANDED]
+    change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
+    # The contact closes at a whole step, up to one late; until then weight and friction differ.
+    late = coarse_step(p) / REFINED / time_unit(p) / 2
+    for quantity, k in zip(LANDED, changed, strict=True):
+        value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
+        yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))

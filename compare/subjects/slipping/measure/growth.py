@@ -133,7 +133,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     """gamma out of random states, along every arrow; where one contact may slip to either side, their shares (69)."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
     yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
-    sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort("growth.more"))]
+    sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort.growth_more)]
     tasks = [push.tasks(lab) for pushes in sides for push in pushes]
     runs = zip(tasks, lab.groups(tasks), strict=True)
     left = Counter[tuple[str, Case, Case]]()
@@ -238,7 +238,7 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     fans = []  # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
     for name, p in rough.items():
         rng = np.random.default_rng([58, *name.encode()])
-        for _ in range(lab.effort("steepest.states")):
+        for _ in range(lab.effort.steepest_states):
             x = random_state(Case.NR, p, rng)
             # The fluid pulls along the orbit, by half the weight to three times it: that turns the direction.
             pull = rng.choice([-1, 1]) * rng.uniform(0.5, 3.0)

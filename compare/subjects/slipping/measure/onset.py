@@ -96,86 +96,99 @@ class Crossing:
         return tuple(pushes)
 
 
+@dataclass(frozen=True, eq=False)
+class Growths:
+    """gamma at some flows of a line, for a vanishing step and size of slip."""
+
+    points: Array
+    """Flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2; gamma is nan where a slip didn't last."""
+    tasks: list[Task]
+    strays: list[Measurement | Missing]
+    """What became of slips that didn't last, and of runs that broke down."""
+
+
 def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Zero and slope of gamma along every line."""
+    """Zero and slope of gamma along every line: from two flows, then from two more around the zero that these show."""
     yield from (Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta))
     sets = {name: p for name, p in sets.items() if p.mu and p.eta}
-    lines = [line for name, p in sets.items() for line in _rolling(name, p)]
+    hanging = _hanging(lab, sets, records)
+    for name in (name for name in sets if name not in hanging):
+        yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
+    lines = [*(line for name, p in sets.items() for line in _rolling(name, p)), *hanging.values()]
+    first = _growths(lab, [line.pushes[:2] for line in lines])
+    around = _growths(lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)])
+    for line, seen, more in zip(lines, first, around, strict=True):
+        yield from _zero_and_slope(lab, line, seen, more)
+
+
+def _hanging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[str, Crossing]:
+    """For each set the line out of rolling on the wall alone, from settled states; none where one is no such state."""
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
     starts = [
         [begin(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in HANGING]
         for name, end in ends.items()
     ]
-    hanging = dict(zip(ends, settle_groups(lab, starts), strict=True))
-    for name, p in sets.items():
-        states = hanging.get(name, [])
-        if not states or any(state.failure or state.case is not Case.NR for state in states):
-            yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
-            continue
-        rides = [(state.start.p, np.array([p.R, 0, *state.mean[2:4], 0, 0, 0, 0])) for state in states]
-        pushes = (Push(Start(name, q, "stationary", x), Case.NR, Case.NS, np.array([0, 0, 1])) for q, x in rides)
-        lines.append(Crossing(tuple(pushes)))
-    first = list(_points(lab, [line.pushes[:2] for line in lines]))
-    around = _points(lab, [line.around(points[1]) for line, (points, *_) in zip(lines, first, strict=True)])
-    for line, (points, tasks, strays), (more, others, _) in zip(lines, first, around, strict=True):
-        push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*tasks, *others]
-        name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
-        if np.isnan(points[1]).any():
-            yield from strays
-            if not strays:
-                yield Missing("bounds", name, f"slips {slips} pass through several cases", 2)
-            continue
-        least = points[2].max()  # what the step changes may be little by chance at one of the flows
-        points = np.concatenate([points, more], axis=1)
-        flows, gamma, noise = points[:, ~np.isnan(points[1])]
-        q, noise = flows**line.power, np.maximum(noise, least)
-        if line.bent:
-            zero, slope = zero_and_slope(q, gamma, noise)
-        else:
-            # The points share causes of error: more of them don't reduce the uncertainty.
-            zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
-        growth = f"growth of slip {slips}, {push.start.name},"
-        if abs(zero.value) <= BEYOND * np.abs(q).max():
-            yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
-        else:
-            yield Missing(
-                "bounds", name, f"{growth} is zero only far beyond the flows at which the ball stays in this case"
-            )
-        yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
+    lines = {}
+    for name, states in zip(ends, settle_groups(lab, starts), strict=True):
+        if not any(state.failure or state.case is not Case.NR for state in states):
+            rides = [(state.start.p, np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0])) for state in states]
+            begun = (Start(name, p, "stationary", x) for p, x in rides)
+            lines[name] = Crossing(tuple(Push(start, Case.NR, Case.NS, np.array([0, 0, 1])) for start in begun))
+    return lines
 
 
-def _points(
-    lab: Lab, rows: Sequence[Sequence[Push]]
-) -> Iterator[tuple[Array, list[Task], list[Measurement | Missing]]]:
-    """Flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2, of every row of pushes, the runs, and the strays.
+def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
+    """gamma for every row of pushes, from two sizes of slip with the shorter step, and one with the longer one.
 
-    gamma is for a vanishing step and size of slip, from two sizes with the shorter step, and one with the longer one;
-    it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another or a run
-    broke down, which the strays say.
+    It is uncertain by what the step and the degree of the polynomials change.
     """
-    tasks, refine = [], lab.effort("bounds.refined")
+    tasks, refine = [], lab.effort.bounds_refined
     for push in (push for pushes in rows for push in pushes):
-        large_size, small_size = MEDIUM if push.inner is Case.NR else push.sizes
-        tasks.append([*push.pair(lab, large_size, refine), push.pair(lab, small_size, refine)[1]])
-    runs, todo = lab.groups(tasks), iter(tasks)
+        large, small = push.sizes if push.inner is not Case.NR else MEDIUM
+        tasks.append([*push.pair(lab, large, refine), push.pair(lab, small, refine)[1]])
+    results, found = zip(tasks, lab.groups(tasks), strict=True), []
     for pushes in rows:
-        points, own = [], [next(todo) for _ in pushes]
-        strays: list[Measurement | Missing] = []
-        for push, pair in zip(pushes, own, strict=True):
-            p, records = push.start.p, next(runs)
-            if isinstance(records, str):
-                strays.append(Missing("bounds", push.start.set, f"from {push.inner.name}: the run {records}", 2))
+        points, used, strays = [], list[Task](), list[Measurement | Missing]()
+        for push in pushes:
+            p, (own, runs) = push.start.p, next(results)
+            used += own
+            if isinstance(runs, str):
+                strays.append(Missing("bounds", push.start.set, f"from {push.inner.name}: the run {runs}", 2))
                 points.append((p.omega_0, math.nan, math.nan))
                 continue
-            size = MEDIUM[0] if push.inner is Case.NR else push.sizes[0]
-            if stray := push.stray(lab, "bounds", size, pair[:2], records[:2]):
+            size = push.sizes[0] if push.inner is not Case.NR else MEDIUM[0]
+            if stray := push.stray(lab, "bounds", size, own[:2], runs[:2]):
                 strays.append(stray)
-            coarse, large, small = (push.rates(run) for run in records)
-            best, change = without_size(np.array([large, small])), (large - coarse)[0]
+            coarse, fine, half = (push.rates(run) for run in runs)
+            best, change = without_size(np.array([fine, half])), (fine - coarse)[0]
             noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p, refine) * slip_unit(p))
             points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
-        tasks_of_row = [task for each in own for task in each]
-        yield np.reshape(points, (-1, 3)).T, tasks_of_row, strays
+        found.append(Growths(np.reshape(points, (-1, 3)).T, used, strays))
+    return found
+
+
+def _zero_and_slope(lab: Lab, line: Crossing, seen: Growths, more: Growths) -> Iterator[Measurement | Missing]:
+    """What gamma at the first flows of a line and at those around its zero show."""
+    push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*seen.tasks, *more.tasks]
+    name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
+    if np.isnan(seen.points[1]).any():
+        yield from seen.strays or [Missing("bounds", name, f"slips {slips} pass through several cases", 2)]
+        return
+    points = np.concatenate([seen.points, more.points], axis=1)
+    flows, gamma, noise = points[:, ~np.isnan(points[1])]
+    # What the step changes may be little by chance at one of the flows.
+    q, noise = flows**line.power, np.maximum(noise, seen.points[2].max())
+    if line.bent:
+        zero, slope = zero_and_slope(q, gamma, noise)
+    else:  # the points share causes of error: more of them don't reduce the uncertainty
+        zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
+    growth = f"growth of slip {slips}, {push.start.name},"
+    if abs(zero.value) <= BEYOND * np.abs(q).max():
+        yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
+    else:
+        why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
+        yield Missing("bounds", name, why)
+    yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
 
 
 def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
@@ -224,6 +237,24 @@ class Arrow:
         step = coarse_step(self.p) / (2 * REFINED * times)
         return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
 
+    def kept(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
+        """The first orbits that stay in the cases at the ends of the arrow, up to one that passes into another."""
+        strays = [not np.isin(run.case[SKIPPED:], [self.inner, self.outer]).all() for run in runs]
+        first = [*strays, False].index(False)
+        return runs[first : [*strays, True].index(True, first)]
+
+    def nearer(self, kept: Sequence[Trajectory]) -> list[Task]:
+        """Runs below the orbit at which the ball leaves, if it does: there the line over omega_c^2 through the forces
+        at the last two orbits before vanishes.
+        """
+        pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
+        if not 2 <= len(pressed) < len(kept):
+            return []
+        (a, high), (b, low) = pressed[-2:]
+        where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
+        orbits = [where * (1 - part) for part in LATER_ORBITS if where]
+        return [self.task(orbit, times) for orbit in orbits for times in self.lab.effort.halves]
+
     def row(self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]) -> Measurement:
         """What was measured along it, with the state at one orbit."""
         p, x0 = self.start(omega_c)
@@ -234,39 +265,26 @@ class Arrow:
 def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
     arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
-    first = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
-    seen: list[list[Trajectory]] = []
-    near: list[list[Task]] = []
-    why_not: list[str] = []
-    for arrow, got in zip(arrows, lab.groups(first), strict=True):
-        runs = [] if isinstance(got, str) else got
-        why_not.append(f"the run {got}" if isinstance(got, str) else "the ball doesn't stay in it at any orbit")
-        # The runs up to the first in which the ball passes into a case that is neither end of the arrow.
-        strays = [not np.isin(run.case[SKIPPED:], [arrow.inner, arrow.outer]).all() for run in runs]
-        begin = [*strays, False].index(False)
-        seen.append(runs[begin : [*strays, True].index(True, begin)])
-        # Where the line over omega_c^2 through the forces at the last two orbits before the ball leaves vanishes.
-        near.append([])
-        pressed = [(run.omega_c[0] ** 2, force.value) for run in seen[-1] if (force := _force(run))]
-        if 2 <= len(pressed) < len(seen[-1]):
-            (a, high), (b, low) = pressed[-2:]
-            where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
-            near[-1] = [arrow.task(where * (1 - part), times) for part in LATER_ORBITS for times in lab.halves if where]
-    rows = zip(arrows, first, seen, why_not, near, lab.groups(near), strict=True)
-    for arrow, orbits, begun, why, tasks, got in rows:
-        lifted = next((run for run in begun if _force(run) is None), None)
-        if not begun:
+    orbits = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
+    first = list(lab.groups(orbits))
+    kept = [[] if isinstance(got, str) else arrow.kept(got) for arrow, got in zip(arrows, first, strict=True)]
+    nearer = [arrow.nearer(runs) for arrow, runs in zip(arrows, kept, strict=True)]
+    rows = zip(arrows, orbits, first, kept, nearer, lab.groups(nearer), strict=True)
+    for arrow, tasks, got, runs, later, near in rows:
+        leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
+        if not runs:
+            why = f"the run {got}" if isinstance(got, str) else "the ball doesn't stay in it at any orbit"
             yield Missing("lift", arrow.set, f"out of {arrow.inner.name}: {why}")
-        elif lifted is None:
-            yield arrow.row("lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
-        elif (to := Case(int(lifted.case[-1]))) is not arrow.outer:
-            why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {to.name}"
+        elif leaves is None:
+            yield arrow.row("lifts", float(runs[-1].omega_c[0]), 0.0, tasks)
+        elif leaves is not arrow.outer:
+            why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
             yield Missing("lift", arrow.set, why)
-        elif isinstance(got, str) or (value := _onset(got)) is None:
-            why = f"the run {got}" if isinstance(got, str) else "the contact at the floor opens and closes"
+        elif isinstance(near, str) or (onset := _onset(near)) is None:
+            why = f"the run {near}" if isinstance(near, str) else "the contact at the floor opens and closes"
             yield Missing("lift", arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
         else:
-            yield arrow.row("lift_onset", 1 / time_unit(arrow.p), value, tasks)
+            yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, later)
 
 
 def _force(run: Trajectory) -> Measured | None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from compare.kit.programme import FOUR, Protocol
+from compare.kit.programme import Protocol
 from compare.subjects.thresholds.measure import basins, thresholds
 
 PROTOCOLS = (
     Protocol("plane", basins.planes, alone="the planes of Figs. 7 and 8 are those of reference only", cost=3),
-    Protocol("thresholds", thresholds.measure, ("settled",), plain=FOUR, steps=(3, 4), follows=True, cost=20),
-    Protocol("edge", basins.borders, ("thresholds",), quick=("reference", "rough-floor"), cost=8),
+    Protocol("thresholds", thresholds.measure, ("settled",), follows=True, cost=20),
+    Protocol("edge", basins.borders, ("thresholds",), cost=8),
     Protocol("birth", thresholds.birth, ("thresholds",), cost=3),
 )

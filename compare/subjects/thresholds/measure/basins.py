@@ -24,7 +24,7 @@ from compare.kit.fits import vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
-from compare.kit.settling import LOOSE, begin, family, lasting, settle_groups
+from compare.kit.settling import LOOSE, Patience, begin, family, lasting, settle_groups
 from compare.kit.statistics import Measured, tail, taper
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
@@ -46,10 +46,10 @@ CLOSING = (0.1, 0.17, 0.26, 0.38)
 def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
     plane = sets["reference"].replace(c=DRAG)
-    points = {figure: spread(lab.effort("plane.spread"), 7 + k) for k, figure in enumerate(FIGURES)}
+    points = {figure: spread(lab.effort.plane_spread, 7 + k) for k, figure in enumerate(FIGURES)}
     seen: dict[str, list[tuple[Array, int]]] = {figure: [] for figure in FIGURES}
     tried: dict[str, set[tuple[float, ...]]] = {figure: set() for figure in FIGURES}
-    for count in (*lab.effort("plane.added"), 0):
+    for count in (*lab.effort.plane_added, 0):
         chosen = [(figure, u) for figure in FIGURES for u in points[figure]]
         starts = []
         for figure, u in chosen:
@@ -57,8 +57,8 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
             p = p.replace(mu=eta) if figure == "fig-8" else p
             starts.append([begin(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")])
-        how = {"span": 20.0, "loose": LOOSE, "rounds": lab.effort("plane.rounds")}
-        for (figure, u), states in zip(chosen, settle_groups(lab, starts, **how), strict=True):
+        patience = Patience(span=20.0, loose=LOOSE, rounds=lab.effort.plane_rounds)
+        for (figure, u), states in zip(chosen, settle_groups(lab, starts, patience), strict=True):
             if not any(each.failure for each in states):
                 mask = sum(1 << case for case in {family(each.case) for each in states})
                 seen[figure].append((u, mask))
@@ -146,18 +146,18 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
-        for part in (CLOSING if name == soonest else lab.effort("edge.flows"))
+        for part in (CLOSING if name == soonest else lab.effort.edge_flows)
     ]
     starts = [[begin(name, q, "rest"), begin(name, q, "on the wall")] for name, q in flows]
     edges = []
-    for (name, q), (slipping, lifted) in zip(flows, settle_groups(lab, starts, loose=10.0), strict=True):
+    for (name, q), (slipping, lifted) in zip(flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True):
         if slipping.failure or lifted.failure or (slipping.case, family(lifted.case)) != (Case.SS, Case.NR):
             fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
             yield Missing("edge", name, f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {fates}")
         else:
             a, b = _grounded(slipping.mean), _grounded(lifted.mean)
             edges.append(Edge(name, q, a, b, a, b - a))
-    for _ in range(lab.effort("edge.lines")):  # cross each border on one line after the other
+    for _ in range(lab.effort.edge_lines):  # cross each border on one line after the other
         lines = [_onward(edge) for edge in edges]
         for k, bracket in enumerate(narrow(lab, [_search(lab, line) for line in lines], careful=False)):
             edge = edges[k]
@@ -200,7 +200,7 @@ def _search(lab: Lab, edge: Edge) -> Search:
 
     Later lines are a hundredth as long, and four times as long after each that missed the border.
     """
-    t_end, step = lasting(edge.p, lab.effort("edge.time")), coarse_step(edge.p)
+    t_end, step = lasting(edge.p, lab.effort.edge_time), coarse_step(edge.p)
     reach = 5e-3 * 4.0**edge.missed
     around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 1e-5)
 

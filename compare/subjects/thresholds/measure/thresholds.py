@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 
@@ -28,15 +28,14 @@ from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
 from compare.kit.settling import (
     PRESSES,
+    Patience,
     Settled,
     begin,
     family,
     high,
     lasting,
-    presses,
     settle_groups,
     settled_cases,
-    settles,
 )
 from compare.kit.statistics import COVERAGE, Measured, settled_case, tail
 from compare.kit.tasks import Task
@@ -63,99 +62,303 @@ from those two, so far off that states still settle soon."""
 BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
 """Distances of the states from omega_02 there, in parts of the range of slipping."""
 
-FOUND = {"rolling": ("omega_01", "omega_03"), "riding": ("omega_02",), "slipping": ("omega_04",)}
+FOUND = {"rolling": ("omega_01", "omega_03"), "sinking": ("omega_02",), "slipping": ("omega_04",)}
 """The thresholds at which each ends or begins."""
 AWAY = 0.03
 """Relative distance from there at which an engine beside the one on trial looks for the end of rolling."""
 
-Key = tuple[str, str]
-"""A set, and what is looked for: the end of "rolling", "slipping", "leaning", the "fold", or where "riding" begins."""
 From = str | Array | Callable[[Parameters], Array]
 """How a ball starts: a name that `settling.begin` knows, a state, or a function of the parameters for it."""
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Begin between flows whose settled cases differ: settle states beside each change, then bisect and extrapolate.
-
-    A change is between the fastest flow at which a ball was seen to settle so, and the next at which it settled
-    otherwise. Without such flows it is looked for from half the slowest, or up to twice the fastest.
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What was found on one set so far, by kind: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or
+    where slip of a "riding" ball ends.
     """
-    fine, narrowest = lab.effort("thresholds.width"), lab.effort("thresholds.fold")
-    slowest = "with the fluid" if lab.beside else "rest"
-    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": slowest}
-    seen = {(name, kind): settled_cases(records, name, how) for name in sets for kind, how in kinds.items()}
-    around: dict[Key, Bracket] = {}
-    for key, cases in seen.items():
-        if flows := list(cases):
-            ended = {Case.NR} if key[1] != "rolling" else set(Case) - {Case.RR}
-            low = max((flow for flow in flows if cases[flow] not in ended), default=flows[0] / 2)
-            around[key] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
-        if any(m.set == key[0] for m in records.select(PROTOCOL)):  # look where the engine on trial found something
-            around.pop(key, None)
-            for known in filter(None, (records.threshold(key[0], quantity) for quantity in FOUND[key[1]])):
-                away = AWAY if key[1] == "rolling" else COARSE / 3
-                around[key] = Bracket(known.value * (1 - away), known.value * (1 + away))
 
-    # The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end.
-    searches: dict[Key, Search] = {}
-    for (name, kind), change in around.items():
-        if kind == "rolling":
-            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], fine * change.high)
-    brackets, searches = _narrowed(lab, searches, careful=not lab.beside), {}
-    for (name, kind), change in around.items():
-        if kind == "riding":
-            searches[name, kind] = _search(lab, sets[name], "sinking", change, kinds[kind], COARSE * change.low)
-        end = brackets.get((name, "rolling"))
-        if kind == "slipping" and end and not lifts(end) and end.high < change.high:
-            change = replace(change, low=max(change.low, end.high))
-            searches[name, kind] = _search(lab, sets[name], kind, change, "rest", COARSE * change.low)
-    brackets |= _narrowed(lab, searches, careful=False)
-    if not lab.beside:
-        brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
-    states, searches = _settled_beside(lab, sets, brackets), {}
+    lab: Lab
+    set: str
+    p: Parameters
+    cases: Mapping[str, Mapping[float, Case]]
+    """In which cases balls were seen to settle, by flow, the slowest first."""
+    changes: Mapping[str, Bracket]
+    """Flows between which it is looked for."""
+    brackets: Mapping[str, Bracket] = field(default_factory=dict)
+    states: Mapping[str, Sequence[Settled]] = field(default_factory=dict)
+    """Settled states beside a change, the nearest first, by kind: of "riding", "sinking", "lifted" balls; of "slipping"
+    ones near its beginning, and "turning" ones near its end."""
 
-    # Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again. They
-    # begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
-    for name, p in sets.items():
-        begins, end = brackets.pop((name, "riding"), None), brackets.get((name, "rolling"))
-        if begins and len(riding := states[name, "riding"]) == len(RIDES):
-            ride = rider(riding, height=high(p))
-            searches[name, "riding"] = _search(lab, p, "riding", begins, ride, fine * begins.high)
-        if end and len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
-            pressed = rider(lifted, height=0.0, less=1e-3)
-            change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
-            searches[name, "leaning"] = _search(lab, p, "leaning", change, pressed, fine * end.high)
-    brackets |= _narrowed(lab, searches, careful=not lab.beside)
+    def search(self, kind: str, around: Bracket, start: From, width: float, time: float = 1.0) -> tuple[str, Search]:
+        """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
 
-    # The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
-    # the branch. There is no fold where the floor would have to pull at that maximum, or there is none and the floor's
-    # force vanishes just where the wall begins to carry the ball.
-    folds, smooth, searches = {}, set(), {}
-    for name, p in sets.items():
-        turned, held = states.get((name, "turning"), []), brackets.get((name, "riding"))
-        top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
-        off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
-        forces = partial(turning, others=np.array([state.values["force_Ay"].value for state in turned]))
-        pressing = extrapolated(turned, "slip_x", forces)
-        sure = COVERAGE * pressing.uncertainty if pressing else math.inf
-        if pressing.value < -sure if pressing else held and off < narrowest * held.high:
-            smooth.add(name)
-        elif top and pressing and pressing.value > sure:
-            folds[name], half = top, max(narrowest, 5.0 * top.uncertainty / top.value)
-            change = Bracket(top.value * (1 - half), top.value * (1 + half))
-            # At a fold all slows down, like the root of the distance: that costs more than an engine beside may.
-            time, width = 1 / math.sqrt(narrowest), narrowest * top.value
-            if not lab.beside:
-                searches[name, "fold"] = _search(lab, p, "fold", change, turned[0].mean, width, time)
-    brackets |= _narrowed(lab, searches, careful=False)
-    for name, p in sets.items():
-        shown = {kind: b for (one, kind), b in brackets.items() if one == name and None not in b.runs}
-        beside = {kind: settled for (one, kind), settled in states.items() if one == name}
-        ends = _ends(seen[name, "slipping"], brackets.get((name, "slipping"))) if (name, "turning") in states else 0
-        for (one, kind), b in brackets.items():
-            if one == name and b.failure:
-                yield Missing(PROTOCOL, name, f"{kind}: its limit is known less well, as a run {b.failure}", 0)
-        yield from _rows(lab, name, p, shown, beside, folds.get(name), ends, name in smooth)
+        For the end of slipping, a run starts from the state that the ball reached at the largest flow so far.
+        """
+        units, answer = ASKED[kind]
+
+        def task(omega: float, bracket: Bracket, care: Care) -> Task:
+            q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
+            x0 = last.x[-1] if last else begin("", q, start).x0 if isinstance(start, str) else start
+            t_end = lasting(q, units * time * care.time)
+            return self.lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / care.refine)
+
+        return kind, Search(around, task, answer, width)
+
+    def shown(self, kind: str) -> Bracket | None:
+        """A bracket both of whose ends were seen in runs."""
+        bracket = self.brackets.get(kind)
+        return bracket if bracket and None not in bracket.runs else None
+
+    def missing(self, why: str, rows: int = 1) -> Missing:
+        """What was not found."""
+        return Missing(PROTOCOL, self.set, why, rows)
+
+    def row(
+        self, quantity: str, at: Measured | None, tasks: Sequence[Task], side: str, by: str
+    ) -> Measurement | Missing:
+        """A threshold that was found."""
+        if at is None:
+            return self.missing(f"too few states settled for {quantity} by {by}, or their extrapolation has no zero")
+        p = self.p.replace(omega_0=at.value)
+        return measurement(self.lab, PROTOCOL, self.set, p, quantity, at, tasks, side=side, by=by)
+
+    def count(self, quantity: str, value: float, tasks: Sequence[Task]) -> Measurement:
+        """How many there are of something."""
+        return measurement(self.lab, PROTOCOL, self.set, self.p, quantity, value, tasks)
+
+    def bisected(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
+        """A threshold in a bracket."""
+        # Slip that is still too small to count may have begun below: it is proportional to the distance.
+        speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run))
+        unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
+        place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
+        return self.row(quantity, place, of.tasks, side, by)
+
+    def vanishes(self, kind: str, what: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
+        """A threshold where something vanishes, if states settled beside it."""
+        if kind in self.states:
+            states = self.states[kind]
+            tasks = [state.task for state in states]
+            yield self.row(quantity, extrapolated(states, what, vanishing), tasks, side, f"{by} → 0")
+
+
+Questions = Callable[[Findings], Iterator[tuple[str, Search]]]
+"""What is to be narrowed down on a set, by kind."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Begin between flows whose settled cases differ; bisect; settle states beside each change; bisect again from
+    these, and extrapolate them.
+    """
+    sure = not lab.effort.granted
+    found = [_changes(lab, name, p, records) for name, p in sets.items()]
+    found = _narrowed(lab, found, _end_of_rolling, careful=sure)
+    found = _narrowed(lab, found, _sinking_and_slipping)
+    found = _settled_beside(lab, [each if lab.effort.granted else _seen(each) for each in found])
+    found = _narrowed(lab, found, _riding_and_leaning, careful=sure)
+    found = _narrowed(lab, found, _fold)
+    for each in found:
+        for kind, bracket in each.brackets.items():
+            if bracket.failure and kind != "sinking":  # which is looked for roughly
+                yield each.missing(f"{kind}: its limit is known less well, as a run {bracket.failure}", 0)
+        yield from _rolling_rows(each)
+        yield from _riding_rows(each)
+        yield from _slipping_rows(each)
+
+
+def _changes(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
+    """Where to look on a set: between the fastest flow at which a ball was seen to settle so, and the next at which it
+    settled otherwise.
+
+    Without such flows from half the slowest, or up to twice the fastest. An engine beside the one on trial looks where
+    that one found something.
+    """
+    starts = {"rolling": "with the fluid", "sinking": "on the wall", "slipping": lab.effort.settled_starts[0][0]}
+    cases = {kind: settled_cases(records, name, how) for kind, how in starts.items()}
+    changes = {}
+    for kind, seen in cases.items():
+        if flows := list(seen):
+            ended = {Case.NR} if kind != "rolling" else set(Case) - {Case.RR}
+            low = max((flow for flow in flows if seen[flow] not in ended), default=flows[0] / 2)
+            changes[kind] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
+    if any(m.set == name for m in records.select(PROTOCOL)):
+        changes = {}
+        for kind, quantities in FOUND.items():
+            for known in filter(None, (records.threshold(name, quantity) for quantity in quantities)):
+                away = AWAY if kind == "rolling" else COARSE / 3
+                changes[kind] = Bracket(known.value * (1 - away), known.value * (1 + away))
+    return Findings(lab, name, p, cases, changes)
+
+
+def _narrowed(lab: Lab, found: Sequence[Findings], questions: Questions, careful: bool = False) -> list[Findings]:
+    """Findings with what questions narrow down, on all sets together."""
+    asked = [dict(questions(each)) for each in found]
+    brackets = iter(narrow(lab, [search for own in asked for search in own.values()], careful))
+    new = [{kind: next(brackets) for kind in own} for own in asked]
+    return [replace(each, brackets={**each.brackets, **own}) for each, own in zip(found, new, strict=True)]
+
+
+def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
+    """The largest flow at which a ball that rolls on both goes on so."""
+    if change := each.changes.get("rolling"):
+        width = each.lab.effort.thresholds_width * change.high
+        yield each.search("rolling", change, "with the fluid", width)
+
+
+def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
+    """Roughly, up to which flow the wall doesn't hold a ball, and a slipping one settles on the floor."""
+    if change := each.changes.get("sinking"):
+        yield each.search("sinking", change, "on the wall", COARSE * change.low)
+    change, end = each.changes.get("slipping"), each.brackets.get("rolling")
+    if change and end and not lifts(end) and end.high < change.high:
+        change = replace(change, low=max(change.low, end.high))
+        yield each.search("slipping", change, "rest", COARSE * change.low)
+
+
+def _seen(each: Findings) -> Findings:
+    """The same with those brackets alone beyond which something was seen."""
+    brackets = {kind: b for kind, b in each.brackets.items() if b.runs[1] or b.high in each.cases[kind]}
+    return replace(each, brackets=brackets)
+
+
+def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
+    """Findings with settled states beside every change; only those that did settle in the case that belongs."""
+    belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
+    places = [_beside(each) for each in found]
+    starts = [
+        [begin(each.set, each.p.replace(omega_0=flow), how) for flow in flows.tolist()]
+        for each, own in zip(found, places, strict=True)
+        for flows, how in own.values()
+    ]
+    patience = Patience(loose=lab.effort.thresholds_loose, rounds=lab.effort.thresholds_rounds)
+    rows = iter(settle_groups(lab, starts, patience))
+    settled = []
+    for each, own in zip(found, places, strict=True):
+        states = {
+            kind: [s for s in next(rows) if not s.failure and family(s.case) is belongs.get(kind, Case.NR)]
+            for kind in own
+        }
+        settled.append(replace(each, states=states))
+    return settled
+
+
+def _beside(each: Findings) -> dict[str, tuple[Array, str]]:
+    """Flows of states beside every change, by kind, and how they start."""
+    places = {}
+    if carried := each.brackets.get("sinking"):
+        places["riding"] = carried.high * (1 + RIDES), "on the wall"
+        if each.lab.effort.slow:  # a ball that sinks swings for long
+            places["sinking"] = carried.low * (1 - DISTANCES / 2), "on the wall"
+    end, last = each.brackets.get("rolling"), each.brackets.get("slipping")
+    if end and lifts(end):
+        places["lifted"] = end.high * (1 + RIDES), "on the wall"
+    elif end and last:
+        span = last.low - end.high
+        places["slipping"] = end.high + DISTANCES * min(span, end.high), "rest"
+        places["turning"] = last.low - TURNS * span, "rest"
+    return places
+
+
+def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
+    """Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again.
+
+    They begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
+    """
+    width = each.lab.effort.thresholds_width
+    begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
+    if begins and len(riding) == len(RIDES):
+        ride = rider(riding, height=high(each.p))
+        yield each.search("riding", begins, ride, width * begins.high)
+    end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
+    if end and len(lifted) == len(RIDES):
+        pressed = rider(lifted, height=0.0, less=1e-3)
+        change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
+        yield each.search("leaning", change, pressed, width * end.high)
+
+
+def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
+    """The maximum of omega_0 along the branch of slipping, if it ends in a fold; and whether it ends without one.
+
+    There is no fold where the floor would have to pull at that maximum, or there is none and the floor's force vanishes
+    just where the wall begins to carry the ball.
+    """
+    turned, held = each.states.get("turning", []), each.brackets.get("riding")
+    top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
+    off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
+    forces = partial(turning, others=np.array([state.values["force_Ay"].value for state in turned]))
+    if pressing := extrapolated(turned, "slip_x", forces):
+        sure = COVERAGE * pressing.uncertainty
+        return top if pressing.value > sure else None, pressing.value < -sure
+    return None, bool(held and off < each.lab.effort.thresholds_fold * held.high)
+
+
+def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
+    """The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
+    the branch.
+
+    At a fold all slows down, like the root of the distance.
+    """
+    top, _ = _end_of_slipping(each)
+    if top and each.lab.effort.slow:
+        narrowest = each.lab.effort.thresholds_fold
+        half = max(narrowest, 5.0 * top.uncertainty / top.value)
+        change, start = Bracket(top.value * (1 - half), top.value * (1 + half)), each.states["turning"][0].mean
+        yield each.search("fold", change, start, narrowest * top.value, 1 / math.sqrt(narrowest))
+
+
+NONE = "no flow that was tried, up to twice the fastest of the settled states,"
+
+
+def _rolling_rows(each: Findings) -> Iterator[Measurement | Missing]:
+    """The end of rolling on both: by lifting off, or by slip."""
+    if not (rolling := each.shown("rolling")):
+        yield each.missing(f"{NONE} ends two-point rolling")
+    elif lifts(rolling):
+        yield each.count("lifts", 1.0, rolling.tasks)
+        yield each.bisected("omega_03", rolling, "from below", "loss of the floor")
+        if leaning := each.shown("leaning"):
+            yield each.bisected("omega_03", leaning, "from above", "return to rolling when pressed")
+        else:
+            why = "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
+            yield each.missing(why)
+    else:
+        yield each.count("lifts", 0.0, rolling.tasks)
+        yield each.bisected("omega_01", rolling, "from below", "onset of slip")
+        yield from each.vanishes("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
+
+
+def _riding_rows(each: Findings) -> Iterator[Measurement | Missing]:
+    """The least flow that holds a ball on the wall."""
+    if riding := each.shown("riding"):
+        yield each.bisected("omega_02", riding, "from above", "onset of sliding on the wall")
+    else:
+        yield each.missing(f"{NONE} is the least to hold a ball on the wall")
+    yield from each.vanishes("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
+
+
+def _slipping_rows(each: Findings) -> Iterator[Measurement | Missing]:
+    """The end of slipping on both: at a fold, or where the wall begins to carry the ball; and at how many folds."""
+    if "turning" not in each.states:
+        if (rolling := each.shown("rolling")) and not lifts(rolling):
+            yield each.missing("no end of slipping at both points was found", 3)
+        return
+    (top, smooth), tasks = _end_of_slipping(each), [state.task for state in each.states["turning"]]
+    settles, ends = len(tasks) >= POINTS, _ends(each.cases["slipping"], each.brackets.get("slipping"))
+    # Beside known flows only a ball may have settled at none beyond the last.
+    if settles and (ends or not each.lab.effort.granted):
+        yield each.count("folds", ends - smooth, tasks)
+    if smooth:
+        yield from each.vanishes("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
+    elif top is None:
+        yield each.missing("settled slipping points to no flow at which it ends", 2 if settles else 3)
+    else:
+        yield each.row("omega_04", top, tasks, "from below", "maximum of omega_0 along the branch")
+        if fold := each.shown("fold"):
+            yield each.bisected("omega_04", fold, "from below", "last settled slipping")
+        else:
+            slow = "costs more than an engine beside the one on trial may"
+            why = "could not be done" if each.lab.effort.slow else slow
+            yield each.missing(f"the end of slipping at both points is extrapolated; to bracket it {why}")
 
 
 def _ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
@@ -163,56 +366,6 @@ def _ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
     said = {flow: case is Case.SS for flow, case in cases.items()} | dict(bracket.said if bracket else ())
     settles = [said[flow] for flow in sorted(said)]
     return sum(bool(before) and after is False for before, after in pairwise(settles))
-
-
-def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, Bracket]) -> dict[Key, list[Settled]]:
-    """Settled states beside every change, the nearest first; only those that did settle in the case that belongs."""
-    places: dict[Key, tuple[Array, str]] = {}
-    for name in sets:
-        if carried := of.get((name, "riding")):
-            places[name, "riding"] = carried.high * (1 + RIDES), "on the wall"
-            if not lab.beside:  # a ball that sinks swings for long
-                places[name, "sinking"] = carried.low * (1 - DISTANCES / 2), "on the wall"
-        end, last = of.get((name, "rolling")), of.get((name, "slipping"))
-        if end and lifts(end):
-            places[name, "lifted"] = end.high * (1 + RIDES), "on the wall"
-        elif end and last:
-            span = last.low - end.high
-            places[name, "slipping"] = end.high + DISTANCES * min(span, end.high), "rest"
-            places[name, "turning"] = last.low - TURNS * span, "rest"
-    starts = [
-        [begin(name, sets[name].replace(omega_0=flow), how) for flow in flows.tolist()]
-        for (name, _), (flows, how) in places.items()
-    ]
-    belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
-    how = {name: lab.effort(f"thresholds.{name}") for name in ("loose", "rounds")}
-    rows = settle_groups(lab, starts, **how)
-    return {
-        key: [s for s in states if not s.failure and family(s.case) is belongs.get(key[1], Case.NR)]
-        for key, states in zip(places, rows, strict=True)
-    }
-
-
-def _narrowed(lab: Lab, searches: Mapping[Key, Search], careful: bool = True) -> dict[Key, Bracket]:
-    return dict(zip(searches, narrow(lab, list(searches.values()), careful), strict=True))
-
-
-def _search(
-    lab: Lab, p: Parameters, question: str, around: Bracket, start: From, width: float, time: float = 1.0
-) -> Search:
-    """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
-
-    For the end of slipping, a run starts from the state that the ball reached at the largest flow so far.
-    """
-    units, answer = ASKED[question]
-
-    def task(omega: float, bracket: Bracket, care: Care) -> Task:
-        q, last = p.replace(omega_0=float(omega)), bracket.runs[0] if question == "slipping" else None
-        x0 = last.x[-1] if last else begin("", q, start).x0 if isinstance(start, str) else start
-        t_end = lasting(q, units * time * care.time)
-        return lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / care.refine)
-
-    return Search(around, task, answer, width)
 
 
 def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> Callable[[Parameters], Array]:
@@ -280,6 +433,25 @@ def may_settle(run: Trajectory) -> bool | None:
     return settles(run, 0.02) if brief else settles(run) is not False
 
 
+def presses(run: Trajectory) -> bool:
+    """Whether the floor carries something all the time in the end."""
+    return bool(np.all(run.force_A[tail(run), 1] > 0))
+
+
+def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
+    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the run is too short.
+
+    In the last tenth its speed must change by less than a share `slowed` of what it does in the tenth before the
+    middle. On the way past a fold that it has missed the change falls at most like 1/time^2, from one to the other to
+    0.22; after that it rises.
+    """
+    if settled_case(run).A is Contact.N or settled_case(run) is Case.SR or not presses(run):
+        return False
+    middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
+    slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
+    return False if slowing > 1 else True if slowing < slowed else None
+
+
 ASKED: dict[str, tuple[float, Answer]] = {
     "rolling": (5, stays_rolling),
     "sinking": (20, lambda run: family(settled_case(run)) is not Case.NR),
@@ -308,120 +480,66 @@ def extrapolated(
     return place if math.isfinite(place.uncertainty) else None
 
 
-def _rows(
-    lab: Lab,
-    name: str,
-    p: Parameters,
-    brackets: Mapping[str, Bracket],
-    states: Mapping[str, Sequence[Settled]],
-    top: Measured | None,
-    ends: int,
-    smooth: bool,
-) -> Iterator[Measurement | Missing]:
-    """What was measured on one set: the end of rolling, the begin of riding, and the end of slipping on both.
+@dataclass(frozen=True, eq=False)
+class BranchEnd:
+    """How the branch of slipping ends in one drag."""
 
-    `ends` says at how many flows slipping ends; `top` where by a jump, and `smooth` that it ends once without one.
-    """
-    tasks = {kind: [state.task for state in settled] for kind, settled in states.items()}
-    missing = partial(Missing, PROTOCOL, name)
-
-    def row(quantity: str, at: Measured | None, tasks: Sequence[Task], side: str, by: str) -> Measurement | Missing:
-        if at is None:
-            return missing(f"too few states settled for {quantity} by {by}, or their extrapolation has no zero")
-        return measurement(lab, PROTOCOL, name, p.replace(omega_0=at.value), quantity, at, tasks, side=side, by=by)
-
-    def bisected(quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
-        # Slip that is still too small to count may have begun below: it is proportional to the distance.
-        speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run))
-        unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
-        place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
-        return row(quantity, place, of.tasks, side, by)
-
-    def vanishes(kind: str, what: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
-        if kind in states:
-            yield row(quantity, extrapolated(states[kind], what, vanishing), tasks[kind], side, f"{by} → 0")
-
-    rolling, leaning, riding, fold = (brackets.get(kind) for kind in ("rolling", "leaning", "riding", "fold"))
-    none = "no flow that was tried, up to twice the fastest of the settled states,"
-    if not rolling:
-        yield missing(f"{none} ends two-point rolling")
-    elif lifts(rolling):
-        yield measurement(lab, PROTOCOL, name, p, "lifts", 1.0, rolling.tasks)
-        yield bisected("omega_03", rolling, "from below", "loss of the floor")
-        if leaning:
-            yield bisected("omega_03", leaning, "from above", "return to rolling when pressed")
-        else:
-            yield missing(
-                "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
-            )
-    else:
-        yield measurement(lab, PROTOCOL, name, p, "lifts", 0.0, rolling.tasks)
-        yield bisected("omega_01", rolling, "from below", "onset of slip")
-        yield from vanishes("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
-    if riding:
-        yield bisected("omega_02", riding, "from above", "onset of sliding on the wall")
-    else:
-        yield missing(f"{none} is the least to hold a ball on the wall")
-    yield from vanishes("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
-    if "turning" not in states:
-        if rolling and not lifts(rolling):
-            yield missing("no end of slipping at both points was found", 3)
-        return
-    counts = len(states["turning"]) >= POINTS  # slipping settles
-    if counts and (
-        ends or not lab.beside
-    ):  # which looks beside known flows only, and may have settled at none beyond the last
-        yield measurement(lab, PROTOCOL, name, p, "folds", ends - smooth, tasks["turning"])
-    if smooth:
-        yield from vanishes("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
-    elif top is None:
-        yield missing("settled slipping points to no flow at which it ends", 2 if counts else 3)
-    else:
-        yield row("omega_04", top, tasks["turning"], "from below", "maximum of omega_0 along the branch")
-        if fold:
-            yield bisected("omega_04", fold, "from below", "last settled slipping")
-        else:
-            why = "costs more than an engine beside the one on trial may" if lab.beside else "could not be done"
-            yield missing(f"the end of slipping at both points is extrapolated; to bracket it {why}")
+    lag: float
+    """1/c, s, to which the lag by a force is proportional."""
+    slope: Measured
+    """Of omega_0 as a function of the floor's force where that vanishes."""
+    tasks: list[Task]
 
 
 def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The drag at which omega_0 as a function of the floor's force has no slope where that vanishes.
 
-    The zero of the straight line through the slopes as a function of 1/c, to which the lag by a force is proportional.
+    The zero of the straight line through the slopes as a function of 1/c.
     """
     ranges = {}
     for name in sets:
         begins, ends = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
         if begins and ends and begins.value < ends.value:
             ranges[name] = begins.value, ends.value
-    slopes: dict[str, list[tuple[float, Measured, list[Settled]]]] = {name: [] for name in ranges}
+    found: dict[str, list[BranchEnd]] = {name: [] for name in ranges}
     lags: dict[str, Measured] = {}
     drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
     for _ in (FIRST_DRAGS, NEARER_DRAGS):
-        starts = [
-            [begin(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
-            for name, c in drags
-            for low, high in [ranges[name]]
-        ]
-        for (name, c), states in zip(drags, settle_groups(lab, starts), strict=True):
-            if not any(state.failure or state.case is not Case.SS for state in states):
-                flows = np.array([state.start.p.omega_0 for state in states])
-                slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
-                slopes[name].append((1 / c, slope, states))
-        for name, points in slopes.items():
-            if len(points) >= len(FIRST_DRAGS):
-                at, measured = [lag for lag, *_ in points], [slope for _, slope, _ in points]
-                lags[name], _ = straight_line(at, [m.value for m in measured], [m.uncertainty for m in measured])
+        for (name, _), end in zip(drags, _branch_ends(lab, sets, ranges, drags), strict=True):
+            found[name] += [end] if end else []
+        for name, own in found.items():
+            if len(own) >= len(FIRST_DRAGS):
+                values, noise = zip(*((end.slope.value, end.slope.uncertainty) for end in own), strict=True)
+                lags[name], _ = straight_line([end.lag for end in own], values, noise)
         drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in NEARER_DRAGS]
     for name, p in sets.items():
         if name not in ranges:
             yield Missing("birth", name, "there is no range of slipping at both points that ends at the wall")
-        elif len(slopes[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
+        elif len(found[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
             yield Missing("birth", name, "too few states of slipping at both points settle near the end of the branch")
         else:
             drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)
-            tasks = [state.task for *_, settled in slopes[name] for state in settled]
-            yield if_found(
-                measurement(lab, "birth", name, p, "critical_drag", drag, tasks), "no drag gives birth to a fold"
-            )
+            tasks = [task for end in found[name] for task in end.tasks]
+            row = measurement(lab, "birth", name, p, "critical_drag", drag, tasks)
+            yield if_found(row, "no drag gives birth to a fold")
+
+
+def _branch_ends(
+    lab: Lab,
+    sets: Mapping[str, Parameters],
+    ranges: Mapping[str, tuple[float, float]],
+    drags: Sequence[tuple[str, float]],
+) -> Iterator[BranchEnd | None]:
+    """From states that settle near the ends of the ranges of slipping; None where one does not, or not in SS."""
+    starts = [
+        [begin(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
+        for name, c in drags
+        for low, high in [ranges[name]]
+    ]
+    for (_, c), states in zip(drags, settle_groups(lab, starts), strict=True):
+        if any(state.failure or state.case is not Case.SS for state in states):
+            yield None
+        else:
+            flows = np.array([state.start.p.omega_0 for state in states])
+            slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
+            yield BranchEnd(1 / c, slope, [state.task for state in states])
