@@ -10,7 +10,7 @@ from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit import levels, settling, statistics
 from compare.kit.lab import Lab, time_unit
-from compare.kit.levels import EFFORT, Level
+from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.kit.trials import Start
@@ -34,8 +34,8 @@ def records(lab: Lab) -> Records:
 
 
 def _measured(lab: Lab, patch: pytest.MonkeyPatch, p: Parameters, *flows: float) -> Records:
-    starts = dict.fromkeys(("rest", "with the fluid", "on the wall"), flows)
-    patch.setitem(EFFORT, "settled.starts", (starts,) * 3)
+    starts = tuple((how, flows) for how in ("rest", "with the fluid", "on the wall"))
+    patch.setattr(levels, "QUICK", replace(levels.QUICK, settled_starts=starts))
     return Records.of(settled.measure(lab, {"thick": p}, Records()))
 
 
@@ -62,7 +62,7 @@ class TestSettled:
         assert [seen[flow, "on the wall"] for flow in FLOWS] == [Case.NS, Case.NS, Case.NS, Case.NR]
 
     def test_what_does_not_settle_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(levels.EFFORT, "settling.rounds", ((1.0,),) * 3)
+        monkeypatch.setattr(levels, "QUICK", replace(levels.QUICK, settling_rounds=(1.0,)))
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
         found = _measured(lab, monkeypatch, THICK, 0.6)
         assert not found.measurements
@@ -76,9 +76,9 @@ class TestSettled:
     def test_a_state_that_depends_on_the_step_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         right = settling.settle
 
-        def other_case(lab: Lab, starts: list[Start], **how: float) -> list[settling.Settled]:
-            states = right(lab, starts, **how)
-            return [replace(each, case=Case.SN) for each in states] if how.get("refine") == 2 else states
+        def other_case(lab: Lab, starts: list[Start], patience: settling.Patience) -> list[settling.Settled]:
+            states = right(lab, starts, patience)
+            return [replace(each, case=Case.SN) for each in states] if patience.refine == 2 else states
 
         monkeypatch.setattr(settled, "settle", other_case)
         found = _measured(lab, monkeypatch, THICK, 0.6)
@@ -184,8 +184,7 @@ class TestPlane:
         assert any(u[0] < 0.6 and u[1] > 0.6 for u in added)
 
     def test_a_few_points_are_measured(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(EFFORT, "plane.spread", (2, 2, 2))
-        monkeypatch.setitem(EFFORT, "plane.added", ((), (), ()))
+        monkeypatch.setattr(levels, "QUICK", replace(levels.QUICK, plane_spread=2, plane_added=()))
         monkeypatch.setattr(basins, "DRAG", 10.0)
         rows = list(basins.planes(lab, {"reference": THICK}, Records()))
         masks = [row for row in rows if isinstance(row, Measurement)]
