@@ -8,7 +8,7 @@ from analytic.bifurcation import diagram as bifurcation
 from compare.claim import When
 from compare.judge import theory
 from compare.kit.record import Measurement
-from compare.kit.settling import family, forces
+from compare.kit.settling import forces, physical_case
 from model import Case, Parameters
 
 
@@ -27,7 +27,7 @@ def detected(m: Measurement) -> Case:
 
     SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall.
     """
-    case = family(Case[str(m.conditions["case"])])
+    case = physical_case(Case[str(m.conditions["case"])])
     return Case.RS if case is Case.RN else case
 
 

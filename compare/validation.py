@@ -98,12 +98,12 @@ def validate(
     ):
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
         jobs = [(protocol, lab) for lab in labs for protocol in todo if protocol.measures(lab)]
-        far.costs = {programme.called(protocol.name, lab): programme.cost((protocol, lab)) for protocol, lab in jobs}
+        far.costs = {programme.job_name(protocol.name, lab): programme.cost((protocol, lab)) for protocol, lab in jobs}
         judge_what_is_there()
         for job, found in programme.run(tuple(jobs), sets, output):
             protocol, lab = job
             jobs.remove(job)
-            name = programme.called(protocol.name, lab)
+            name = programme.job_name(protocol.name, lab)
             far.measured(name)
             if isinstance(found, Records):
                 testimony[lab.engine.name][lab.refine] += found

@@ -80,9 +80,9 @@ def hear(claim: Claim, testimony: RecordsByEngine) -> Verdict:
         said = verdict(claim, measured)
         first = _on_trial(name, said)
     else:
-        first = _heard(claim, engine(name), steps, ends)
+        first = _testify(claim, engine(name), steps, ends)
         said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
-    beside = (_heard(claim, engine(other), own, ends, first.checks) for other, own in others)
+    beside = (_testify(claim, engine(other), own, ends, first.checks) for other, own in others)
     return replace(said, witnesses=(first, *beside))
 
 
@@ -128,7 +128,7 @@ class Asked:
         return {(c.bearing, c.measurement.set) for c in checks}
 
 
-def _heard(
+def _testify(
     claim: Claim, by: Engine, steps: Mapping[int, Records], ends: Set[tuple[str, float]], trial: Sequence[Check] = ()
 ) -> Witness:
     """What an engine says; `ends` are thresholds measured on sets, `trial` the checks of the engine on trial.

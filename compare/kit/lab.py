@@ -31,10 +31,10 @@ class Lab:
     @property
     def effort(self) -> Effort:
         """How much is measured at this level by this engine."""
-        return levels.effort(self.level, self.beside)
+        return levels.effort(self.level, self.is_witness)
 
     @property
-    def beside(self) -> bool:
+    def is_witness(self) -> bool:
         """Whether the engine is heard beside the one on trial, or in its place, with time steps of its own."""
         return self.engine.refine != (1,)
 

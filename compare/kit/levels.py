@@ -1,7 +1,7 @@
 """How much each level measures: step counts, durations and grids of every protocol; and what other engines change.
 
 An engine other than the one on trial, with time steps of its own, measures as much as the quick level at every level,
-but for what `BESIDE` says, and looks where the one on trial found something.
+but for what `WITNESS` says, and looks where the one on trial found something.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ FULL = replace(
     laws_refined=(16, 32),
     motions_pieces=32,
 )
-BESIDE = replace(
+WITNESS = replace(
     QUICK,
     halves=(2, 2),  # the same run twice: all numbers are extrapolated to no step from several steps
     granted=True,
@@ -183,12 +183,12 @@ BESIDE = replace(
     field_starts=2,
     field_kept=2,
 )
-BESIDE_LONGER = replace(BESIDE, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0)
+WITNESS_ABOVE_QUICK = replace(WITNESS, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0)
 """At the levels above quick, on whose rarer sets motions die out more slowly."""
 
 
-def effort(level: Level, beside: bool = False) -> Effort:
+def effort(level: Level, witness: bool = False) -> Effort:
     """How much is measured at a level; by an engine beside the one on trial if `beside`."""
-    if beside:
-        return BESIDE if level is Level.QUICK else BESIDE_LONGER
+    if witness:
+        return WITNESS if level is Level.QUICK else WITNESS_ABOVE_QUICK
     return (QUICK, DEFAULT, FULL)[level]

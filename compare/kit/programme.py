@@ -75,7 +75,7 @@ class Protocol:
             names = tuple(known)[:most] if above else coverage.limit
             if lab.refine not in lab.engine.refine[: coverage.steps[above]]:
                 names = ()
-        return {name: p for name, p in known.items() if name in names and not (lab.beside and self.engine)}
+        return {name: p for name, p in known.items() if name in names and not (lab.is_witness and self.engine)}
 
 
 Job = tuple[Protocol, Lab]
@@ -103,16 +103,16 @@ def _program(engine: Engine, module: str) -> str:
     return sources(*engine.sources, "compare.kit", *([subject + measure] if measure else []))
 
 
-def called(protocol: str, lab: Lab) -> str:
+def job_name(protocol: str, lab: Lab) -> str:
     """The name of a protocol, and of the engine and its step where these are not those on trial."""
-    return f"{protocol} by {lab.engine.name}, step/{lab.refine}" if lab.beside else protocol
+    return f"{protocol} by {lab.engine.name}, step/{lab.refine}" if lab.is_witness else protocol
 
 
 def cost(job: Job) -> float:
     """Processor time at the quick level, about."""
     protocol, lab = job
     asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.coverage.quick), 1)
-    return protocol.cost * asked * lab.refine if lab.beside else protocol.cost
+    return protocol.cost * asked * lab.refine if lab.is_witness else protocol.cost
 
 
 def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
@@ -136,9 +136,9 @@ def run(
     would be kept, and taken for whole the next time.
     The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
     """
-    known = {called(protocol.name, lab): (protocol, lab) for protocol, lab in jobs}
+    known = {job_name(protocol.name, lab): (protocol, lab) for protocol, lab in jobs}
     needs = {
-        name: [other if other in known else called(other, lab) for other in protocol.needs]
+        name: [other if other in known else job_name(other, lab) for other in protocol.needs]
         + [protocol.name] * (protocol.follows and name != protocol.name)
         for name, (protocol, lab) in known.items()
     }
@@ -187,7 +187,7 @@ def carry_out(
     """
     path = file(protocol, results, lab, chosen)
     label = f"{protocol.name}-{path.parent.name}"
-    campaign = lab.campaign.under(label, called(protocol.name, lab))
+    campaign = lab.campaign.under(label, job_name(protocol.name, lab))
     lab = replace(lab, engine=protocol.engine or lab.engine, campaign=campaign)
     if not path.exists():
         sets = protocol.measures(lab) if chosen is None else chosen
@@ -202,7 +202,7 @@ def carry_out(
         about = {"protocol": protocol.name, "engine": lab.engine.name, "step": lab.refine, "level": lab.level.name}
         place = f"{campaign.directory.name}/{label}.h5"
         for k, row in enumerate(rows):
-            if isinstance(row, Measurement) and protocol.drawn(row) and not lab.beside:
+            if isinstance(row, Measurement) and protocol.drawn(row) and not lab.is_witness:
                 rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         records = Records.of(rows)
         campaign.keep({run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})

@@ -178,7 +178,7 @@ def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
     return unit * math.ceil(max(span / p.c, turns) / unit)
 
 
-def high(p: Parameters) -> float:
+def safe_height(p: Parameters) -> float:
     """A height in m from which a ball that sinks freely doesn't land within a round."""
     return 1.25 * dragged_speed(p) * duration(p, LONGEST * SPAN)
 
@@ -188,10 +188,10 @@ def lasting(p: Parameters, units: float) -> float:
     return float(2.0 ** round(math.log2(units / p.c)))
 
 
-def begin(set: str, p: Parameters, how: str) -> Start:
+def named_start(set: str, p: Parameters, how: str) -> Start:
     """At the flow of p from rest, going round with the fluid or half as fast, or with it and so high up on the wall."""
     orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
-    return Start(set, p, how, State(y=high(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked())
+    return Start(set, p, how, State(y=safe_height(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked())
 
 
 def rotation_scale(p: Parameters) -> float:
@@ -224,7 +224,7 @@ def determined(case: Case) -> tuple[str, ...]:
     return ("omega_c", "slip_x", *upright, "slip_z", "wall_spin", "v_y", *forces)
 
 
-def family(case: Case) -> Case:
+def physical_case(case: Case) -> Case:
     """SR with an unloaded floor and NR at y = 0 are one physical state: both count as NR."""
     return Case.NR if case is Case.SR else case
 
@@ -232,4 +232,4 @@ def family(case: Case) -> Case:
 def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
     """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest first."""
     found = records.select("settled", "case", lambda m: m.set == set and m.conditions["start"] == how)
-    return dict(sorted((m.parameters.omega_0, family(Case(int(m.value)))) for m in found))
+    return dict(sorted((m.parameters.omega_0, physical_case(Case(int(m.value)))) for m in found))

@@ -16,7 +16,7 @@ from compare.kit.lab import coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
-from compare.kit.settling import PRESSES, begin, lasting
+from compare.kit.settling import PRESSES, lasting, named_start
 from compare.kit.statistics import Measured
 from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure import thresholds
@@ -129,7 +129,7 @@ def test_a_line_has_no_maximum(bend):
 def _ran(lab, p, omega, x0=None, units=5.0):
     """A run at a flow from a state, rolling with the fluid if none is given."""
     q = p.replace(omega_0=omega)
-    x0 = begin("", q, "with the fluid").x0 if x0 is None else x0
+    x0 = named_start("", q, "with the fluid").x0 if x0 is None else x0
     return lab.campaign.run([lab.task(q, x0, lasting(q, units), coarse_step(q))])[0]
 
 

@@ -13,7 +13,7 @@ from analytic.flowmeter import design
 from compare.claim import Bearing, Text, claim, every, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
-from compare.kit.settling import family
+from compare.kit.settling import physical_case
 from compare.kit.statistics import Measured
 from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, reached, slips_first
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
@@ -83,7 +83,7 @@ def _ends(*starts: str) -> tuple[Bearing, ...]:
     """The case in which motions end that start in one of these ways."""
 
     def case(m: Measurement) -> float:
-        return family(Case(_run(m).case[-1]))
+        return physical_case(Case(_run(m).case[-1]))
 
     ends = (given(start=start) for start in starts)
     return tuple(Bearing("unloading", "case", case, when=when, by=_SIMULATED) for when in ends)

@@ -29,12 +29,12 @@ from compare.kit.settling import (
     STEPS_A_SAMPLE,
     Patience,
     Settled,
-    begin,
     duration,
-    family,
-    high,
     judged,
     lasting,
+    named_start,
+    physical_case,
+    safe_height,
     settle_groups,
     settled_cases,
 )
@@ -110,7 +110,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
     states: dict[Case, dict[float, dict[str, Measurement]]] = {case: {} for case in Case}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity != "case"):
         if m.parameters.omega_0:
-            at = states[family(Case[str(m.conditions["case"])])].setdefault(m.parameters.omega_0, {})
+            at = states[physical_case(Case[str(m.conditions["case"])])].setdefault(m.parameters.omega_0, {})
             at[m.quantity] = m
     for case in (Case.RR, Case.SS, Case.NR):
         alike = sorted(states[case].items())
@@ -118,7 +118,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
         for k in sorted({int(n) for n in few if alike}):
             omega_0, values = alike[k]
             q, moving = values["omega_c"].parameters, ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
-            x0 = (high(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
+            x0 = (safe_height(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
             flows = tuple(omega_0 * (1 + d) for d in (-NEIGHBOUR, -NEIGHBOUR / 2, NEIGHBOUR / 2, NEIGHBOUR))
             yield Curve("neighbours", name, q, flows, x0)
     slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
@@ -142,7 +142,7 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
     f, onset = np.array(curve.flows), curve.p.omega_0
     w, noises = np.transpose([(v.value, v.uncertainty) for v in (each.values["omega_c"] for each in states)])
     noise, below = float(noises.max()), (w[1] - w[0]) / (f[1] - f[0])
-    if curve.by == "neighbours" and len(set(map(family, cases))) == 1:
+    if curve.by == "neighbours" and len(set(map(physical_case, cases))) == 1:
         wide, near = (w[3] - w[0]) / (f[3] - f[0]), (w[2] - w[1]) / (f[2] - f[1])
         return Measured(near + (near - wide) / 3, math.hypot((near - wide) / 3, 2 * noise / (f[2] - f[1])))
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
@@ -187,7 +187,7 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
                 sure = math.hypot(omega_c.uncertainty, certainty * level.p.omega_0)
                 yield row(quantity="case", value=ended.case)
                 yield row(quantity="omega_c", value=Measured(omega_c.value, sure))
-            before = family(ended.case).name
+            before = physical_case(ended.case).name
 
 
 def _round(lab: Lab, levels: Sequence[Parameters]) -> Task:
@@ -232,7 +232,7 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
         # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by lifting, too.
         lifts = records.threshold(name, "omega_03") or limit
         flows = ABOVE * limit.value, 1.1 * max(limit.value, lifts.value)
-        starts.append([begin(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
+        starts.append([named_start(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
     for states in settle_groups(lab, starts, Patience(loose=lab.effort.thresholds_loose)):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
@@ -286,7 +286,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
             numbers = {Number(name, "lift", "first top"): first_top(run)}
         elif name == BY_SPIN:  # it leaves the floor at a whole step, up to one late or early, which changes its height
             numbers = {Number(name, "lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
-        return family(settled_case(run)), numbers
+        return physical_case(settled_case(run)), numbers
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
     samples = None if name == LANDING else 1000

@@ -27,7 +27,7 @@ from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
-from compare.kit.settling import SOLVED, SPIN, family, high
+from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
 from compare.kit.statistics import COVERAGE, Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
@@ -183,10 +183,10 @@ def _settled(records: Records, name: str) -> Iterator[Pushed]:
     """The settled states of a set; one on the wall alone high up, and where it only just touches the floor."""
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
+        values.setdefault((m.parameters, physical_case(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
     for (p, case), value in values.items():
         x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
-        raised = x._replace(y=high(p)) if case.A is Contact.N else x
+        raised = x._replace(y=safe_height(p)) if case.A is Contact.N else x
         yield Pushed(Start(name, p, "settled", raised.stacked()), case)
         if case is Case.NR:
             yield Pushed(Start(name, p, "settled", x.stacked()), Case.SR)

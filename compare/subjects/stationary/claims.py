@@ -98,21 +98,11 @@ def _in_region(m: Measurement) -> float:
     return float(sum(1 << case for flag, case in _LASTING.items() if flag in region))
 
 
-def _lasting(m: Measurement) -> float:
-    """The same by the stationary states that last."""
-    return float(sum(1 << case for case in cases(m.parameters)))
-
-
 def _dividing(m: Measurement) -> float:
     """omega_c of SS beyond the fold; LookupError where the region lacks it, or an attractor that it divides."""
     if Exists.SS | Exists.SS_BEYOND_FOLD | Exists.NR not in _region(m):
         raise LookupError("the region lacks SS, SS beyond the fold, or NR")
     return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
-
-
-def _leaning(m: Measurement) -> float:
-    """How many modes SR has, none where the region has no SR."""
-    return 2.0 * (Exists.SR in _region(m))
 
 
 def _born(m: Measurement) -> float:
@@ -126,13 +116,10 @@ def _born(m: Measurement) -> float:
     return p.c * math.sqrt(p.eta / born.eta)
 
 
-def _all_meet(m: Measurement) -> float:
-    return bifurcation.double_points(m.parameters)[-1].omega_0
-
-
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
 _LEANS = every(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
+_DOUBLE = "analytic.bifurcation.diagram.double_points"
 
 CLAIMS = (
     claim(
@@ -245,7 +232,13 @@ DIAGRAMS = (
             f"Fig. {figure[-1]}",
             f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
             "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
-            Bearing("plane", "cases", _lasting, when=given(figure=figure), by="analytic.stable_solutions"),
+            Bearing(
+                "plane",
+                "cases",
+                lambda m: sum(1 << case for case in cases(m.parameters)),
+                when=given(figure=figure),
+                by="analytic.stable_solutions",
+            ),
         )
         for figure, axis in (("fig-7", "η"), ("fig-8", "μ = η"))
     ),
@@ -256,14 +249,14 @@ DIAGRAMS = (
         "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the floor.",
         Bearing("plane", "cases", _in_region, by="analytic.bifurcation.diagram.case_map"),
         Bearing("edge", "edge_omega_c", _dividing, by="case_map, analytic.solution"),
-        Bearing("rates", "modes", _leaning, when=given(case="SR"), by="case_map"),
+        Bearing("rates", "modes", lambda m: 2.0 * (Exists.SR in _region(m)), when=given(case="SR"), by="case_map"),
     ),
     claim(
         "double-points",
         "Figs. 7 and 8, black dots",
         "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j rolling ends at ω₀₃ = √(g/(jR)), where all meet.",
-        Bearing("birth", "critical_drag", _born, by="analytic.bifurcation.diagram.double_points"),
-        Bearing("thresholds", "omega_03", _all_meet, by="analytic.bifurcation.diagram.double_points"),
+        Bearing("birth", "critical_drag", _born, by=_DOUBLE),
+        Bearing("thresholds", "omega_03", lambda m: bifurcation.double_points(m.parameters)[-1].omega_0, by=_DOUBLE),
     ),
 )
 SECTIONS = {"Stationary states": CLAIMS, "Bifurcations": DIAGRAMS}

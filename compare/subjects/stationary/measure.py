@@ -14,7 +14,17 @@ from typing import Self
 from compare.kit.lab import Lab, time_unit
 from compare.kit.programme import Protocol
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.settling import ERROR_GROUPS, SPIN, Patience, Settled, begin, duration, family, scale, settle
+from compare.kit.settling import (
+    ERROR_GROUPS,
+    SPIN,
+    Patience,
+    Settled,
+    duration,
+    named_start,
+    physical_case,
+    scale,
+    settle,
+)
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
 from model import Case, Parameters, State
@@ -36,7 +46,7 @@ class Kind:
     @classmethod
     def of(cls, state: Settled) -> Self:
         """That of a settled state."""
-        return cls(state.start.set, state.start.p.omega_0, family(state.case))
+        return cls(state.start.set, state.start.p.omega_0, physical_case(state.case))
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -71,7 +81,7 @@ def _starts(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Start]:
     """At rest, going round with the fluid, and so high up on the wall; and spinning in a fluid at rest."""
     for name, p in sets.items():
         for how, flows in lab.effort.settled_starts:
-            yield from (begin(name, p.replace(omega_0=flow / time_unit(p)), how) for flow in flows)
+            yield from (named_start(name, p.replace(omega_0=flow / time_unit(p)), how) for flow in flows)
         spinning = State(slip_y=SPIN / time_unit(p) * p.R / p.r)
         yield Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked())
 
@@ -91,7 +101,7 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
     p = fine.start.p
     if fine.failure:
         yield _unsettled(fine, len(fine.values))
-    elif family(fine.case) is not family(same[0].case):
+    elif physical_case(fine.case) is not physical_case(same[0].case):
         why = f"{same[0].case.name} at omega_0 = {p.omega_0:.4g} rad/s is {fine.case.name} with half the time step"
         yield Missing(PROTOCOL, fine.start.set, why, len(fine.values))
     else:
@@ -106,7 +116,9 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
 def mirrored(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Case and values to which a ball settles in a flow the other way round."""
     starts = [
-        begin(name, p.replace(omega_0=-flow / time_unit(p)), how) for name, p in sets.items() for how, flow in MIRRORED
+        named_start(name, p.replace(omega_0=-flow / time_unit(p)), how)
+        for name, p in sets.items()
+        for how, flow in MIRRORED
     ]
     for state in settle(lab, starts):
         if state.failure:

@@ -20,7 +20,7 @@ import numpy as np
 from compare.kit.fits import straight_line, vanishing, zero_and_slope
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
-from compare.kit.settling import begin, settle_groups
+from compare.kit.settling import named_start, settle_groups
 from compare.kit.short import DOUBT, EXTRAPOLATION, REFINED, lag_error, polynomials, slip_unit
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
@@ -125,7 +125,7 @@ def _hanging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict
     """For each set the line out of rolling on the wall alone, from settled states; none where one is no such state."""
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
     starts = [
-        [begin(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in HANGING]
+        [named_start(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in HANGING]
         for name, end in ends.items()
     ]
     lines = {}

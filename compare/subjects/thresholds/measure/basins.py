@@ -24,7 +24,7 @@ from compare.kit.fits import vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
-from compare.kit.settling import LOOSE, Patience, begin, family, lasting, settle_groups
+from compare.kit.settling import LOOSE, Patience, lasting, named_start, physical_case, settle_groups
 from compare.kit.statistics import Measured, tail, taper
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
@@ -56,11 +56,13 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             eta, flow = (np.array([0.02, 0.45]) + u * np.array([0.78, 3.15])).tolist()
             p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
             p = p.replace(mu=eta) if figure == "fig-8" else p
-            starts.append([begin(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")])
+            starts.append(
+                [named_start(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")]
+            )
         patience = Patience(span=20.0, loose=LOOSE, rounds=lab.effort.plane_rounds)
         for (figure, u), states in zip(chosen, settle_groups(lab, starts, patience), strict=True):
             if not any(each.failure for each in states):
-                mask = sum(1 << case for case in {family(each.case) for each in states})
+                mask = sum(1 << case for case in {physical_case(each.case) for each in states})
                 seen[figure].append((u, mask))
                 p, tasks = states[0].start.p, [each.task for each in states]
                 yield measurement(lab, "plane", "reference", p, "cases", mask, tasks, figure=figure)
@@ -148,10 +150,10 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         for name, (low, high) in limits.items()
         for part in (CLOSING if name == soonest else lab.effort.edge_flows)
     ]
-    starts = [[begin(name, q, "rest"), begin(name, q, "on the wall")] for name, q in flows]
+    starts = [[named_start(name, q, "rest"), named_start(name, q, "on the wall")] for name, q in flows]
     edges = []
     for (name, q), (slipping, lifted) in zip(flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True):
-        if slipping.failure or lifted.failure or (slipping.case, family(lifted.case)) != (Case.SS, Case.NR):
+        if slipping.failure or lifted.failure or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR):
             fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
             yield Missing("edge", name, f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {fates}")
         else:

@@ -30,10 +30,10 @@ from compare.kit.settling import (
     PRESSES,
     Patience,
     Settled,
-    begin,
-    family,
-    high,
     lasting,
+    named_start,
+    physical_case,
+    safe_height,
     settle_groups,
     settled_cases,
 )
@@ -68,7 +68,7 @@ AWAY = 0.03
 """Relative distance from there at which an engine beside the one on trial looks for the end of rolling."""
 
 From = str | Array | Callable[[Parameters], Array]
-"""How a ball starts: a name that `settling.begin` knows, a state, or a function of the parameters for it."""
+"""How a ball starts: a name that `settling.named_start` knows, a state, or a function of the parameters for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class Findings:
 
         def task(omega: float, bracket: Bracket, care: Care) -> Task:
             q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
-            x0 = last.x[-1] if last else begin("", q, start).x0 if isinstance(start, str) else start
+            x0 = last.x[-1] if last else named_start("", q, start).x0 if isinstance(start, str) else start
             t_end = lasting(q, units * time * care.time)
             return self.lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / care.refine)
 
@@ -226,7 +226,7 @@ def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
     places = [_beside(each) for each in found]
     starts = [
-        [begin(each.set, each.p.replace(omega_0=flow), how) for flow in flows.tolist()]
+        [named_start(each.set, each.p.replace(omega_0=flow), how) for flow in flows.tolist()]
         for each, own in zip(found, places, strict=True)
         for flows, how in own.values()
     ]
@@ -235,7 +235,7 @@ def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
     settled = []
     for each, own in zip(found, places, strict=True):
         states = {
-            kind: [s for s in next(rows) if not s.failure and family(s.case) is belongs.get(kind, Case.NR)]
+            kind: [s for s in next(rows) if not s.failure and physical_case(s.case) is belongs.get(kind, Case.NR)]
             for kind in own
         }
         settled.append(replace(each, states=states))
@@ -267,7 +267,7 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
     width = each.lab.effort.thresholds_width
     begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
     if begins and len(riding) == len(RIDES):
-        ride = rider(riding, height=high(each.p))
+        ride = rider(riding, height=safe_height(each.p))
         yield each.search("riding", begins, ride, width * begins.high)
     end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
     if end and len(lifted) == len(RIDES):
@@ -454,7 +454,7 @@ def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
 
 ASKED: dict[str, tuple[float, Answer]] = {
     "rolling": (5, stays_rolling),
-    "sinking": (20, lambda run: family(settled_case(run)) is not Case.NR),
+    "sinking": (20, lambda run: physical_case(settled_case(run)) is not Case.NR),
     "slipping": (10, may_settle),
     "riding": (5, lambda run: slip(sliding_speeds(run)[1], run) > 1),
     "leaning": (20, lambda run: presses(run) and settled_case(run) is Case.RR),
@@ -532,7 +532,7 @@ def _branch_ends(
 ) -> Iterator[BranchEnd | None]:
     """From states that settle near the ends of the ranges of slipping; None where one does not, or not in SS."""
     starts = [
-        [begin(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
+        [named_start(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
         for name, c in drags
         for low, high in [ranges[name]]
     ]
