@@ -1,4 +1,4 @@
-"""Thresholds, the fold and the maps of Figs. 7 and 8, against arithmetic of 50 digits and against the solutions."""
+"""Thresholds, fold and the maps of Figs. 7 and 8 are where solutions come and go, to all digits."""
 
 import numpy as np
 import pytest
@@ -15,11 +15,11 @@ EPS = np.finfo(float).eps
 KAPPAS = [1e-6, 1e-3, 0.07, 1.0, 30.0]
 
 
-def groups(mu: float, eta: float, kappa: float) -> Parameters:
+def groups(mu, eta, kappa):
     return P.replace(mu=mu, eta=eta, c=kappa * np.sqrt(P.g / P.R))
 
 
-def exact_fold(p: Parameters) -> tuple[sp.Float, sp.Float]:
+def exact_fold(p):
     """alpha and Omega_0 of the fold with 50 digits: the root of d Omega_0/d alpha of (41), differentiated by sympy."""
     a = sp.Symbol("a")
     J, M, E, K = (sp.Rational(v) for v in (p.j, p.mu, p.eta, p.kappa))
@@ -41,7 +41,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("mu", "eta", "kappa"), CASES)
-def test_fold_to_1e_12(mu: float, eta: float, kappa: float) -> None:
+def test_fold_to_1e_12(mu, eta, kappa):
     p = groups(mu, eta, kappa)
     alpha, Omega_0 = exact_fold(p)
     assert abs(thresholds(p).omega_04 / np.sqrt(p.g / p.R) / float(Omega_0) - 1) <= 1e-12
@@ -49,7 +49,7 @@ def test_fold_to_1e_12(mu: float, eta: float, kappa: float) -> None:
     assert abs(place / float(alpha) - 1) <= 1e-10
 
 
-def test_order_and_existence_of_the_thresholds() -> None:
+def test_order_and_existence_of_the_thresholds():
     for p in map(Parameters.named, Parameters.names()):
         t = thresholds(p)
         if p.eta < p.j:
@@ -60,7 +60,7 @@ def test_order_and_existence_of_the_thresholds() -> None:
             assert t.omega_02 < t.omega_03
         assert t.eta_cr == pytest.approx(p.c**2 * p.R / (4 * p.g * p.mu**2), rel=8 * EPS)
 
-    def missing(**change: float) -> set[str]:
+    def missing(**change):
         t = thresholds(P.replace(**change))
         return {n for n in ("omega_01", "omega_02", "omega_03", "omega_04", "eta_cr") if np.isnan(getattr(t, n))}
 
@@ -91,7 +91,7 @@ def test_order_and_existence_of_the_thresholds() -> None:
         (0.6, {"omega_02": {"SR": 1, "NR": 1, "NS": -1}, "omega_03": {"RR": -1}}),
     ],
 )
-def test_solutions_appear_and_vanish_at_the_thresholds(eta: float, changes: dict[str, dict[str, int]]) -> None:
+def test_solutions_appear_and_vanish_at_the_thresholds(eta, changes):
     """The number of solutions that exist changes exactly at the special points (relative 1e-9 on either side)."""
     p = P.replace(eta=eta)
     for name, expected in changes.items():
@@ -103,26 +103,28 @@ def test_solutions_appear_and_vanish_at_the_thresholds(eta: float, changes: dict
         assert {case: number for case, number in change.items() if number} == expected
 
 
-def test_the_branch_is_asked_for_where_there_is_one() -> None:
+def test_the_branch_is_asked_for_where_there_is_one():
     for change in ({"eta": 0.6}, {"eta": 0.0}, {"mu": 0.0}, {"c": 0.0}):
         with pytest.raises(InputError, match="SS has a branch from RR to SR for"):
             number_of_folds(P.replace(**change))
 
 
+@pytest.mark.parametrize("law", ["stokes", "quadratic"])
 @pytest.mark.parametrize("equal", [False, True])
-def test_double_points(equal: bool) -> None:
-    """There the curves that are said to meet do meet."""
-    points = double_points(P, equal)
-    assert len(points) == 2
+def test_double_points(equal, law):
+    """There the curves that are said to meet do meet; under the quadratic law the fold is never born."""
+    p = P.replace(drag=law, nu_f=1e-5)
+    points = double_points(p, equal)
+    assert len(points) == (2 if law == "stokes" else 1)
     for point in points:
         eta = point.eta * np.array([1 + 1e-8, 1 - 1e-8])
-        curves = threshold_curves(P, eta if equal else P.mu, eta)
+        curves = threshold_curves(p, eta if equal else p.mu, eta)
         for name in point.meets:  # some of them begin or end there
             assert np.nanmax(np.abs(curves[name] * np.sqrt(P.g / P.R) / point.omega_0 - 1)) <= 1e-6
 
 
 @pytest.mark.parametrize("mu", [0.2, None])
-def test_map_against_the_solutions(mu: float | None) -> None:
+def test_map_against_the_solutions(mu):
     """A coarse map agrees with `stationary_solutions` at every point (None: mu = eta, Fig. 8)."""
     eta, omega_0 = np.linspace(0.0, 0.7, 8), np.linspace(-60.0, 60.0, 13)
     plane = case_map(P, eta if mu is None else mu, eta, omega_0)
@@ -143,22 +145,18 @@ def test_map_against_the_solutions(mu: float | None) -> None:
 # --- the fluid's inertia against the balance of forces and moments of a ball in a swirl ----------------------
 
 
-BALL = Parameters.named("steel-in-water")
-RATIOS = [0.0, 0.127, 0.4, 0.7]
+BALL, RATIOS = Parameters.named("steel-in-water"), [0.0, 0.127, 0.4, 0.7]
 
 
-def rolls(p: Parameters, omega: float) -> bool:
-    """Whether forces within both cones hold a ball that rolls round with the fluid: some free force B_y does.
+def rolls(p, omega):
+    """Whether some free force B_y puts the forces on a ball that rolls round with the fluid into both cones.
 
     Newton with the pressure gradient of the swirl, 3/2 of the displaced mass times its centripetal acceleration, and
     with half the displaced mass added to the ball's; Euler without either.
     """
-    s, centripetal = p.density_ratio, p.R * omega**2
-    pull = 1.5 * s * p.m * centripetal
-    B_y = np.linspace(0.0, p.m * p.g, 200_001)
-    A_y = p.m * p.g - B_y
-    A_x = B_y - p.j * p.m * centripetal  # turns the spin with the orbit
-    B_x = (p.m + s * p.m / 2) * centripetal - pull - A_x
+    s, centripetal, B_y = p.density_ratio, p.R * omega**2, np.linspace(0.0, p.m * p.g, 200_001)
+    A_y, A_x = p.m * p.g - B_y, B_y - p.j * p.m * centripetal  # A_x turns the spin with the orbit
+    B_x = (p.m + s * p.m / 2) * centripetal - 1.5 * s * p.m * centripetal - A_x
     return bool(np.any((np.abs(A_x) <= p.mu * A_y) & (B_y <= p.eta * B_x)))
 
 
@@ -173,3 +171,14 @@ def test_rolling_ends_where_no_forces_hold_it_and_the_wall_carries_it(s):
     p = BALL.replace(density_ratio=s)
     centripetal = p.m * p.R * diagram.thresholds_with_inertia(p)["omega_02"] ** 2
     assert p.eta * ((1 + s / 2) * centripetal - 1.5 * s * centripetal) == pytest.approx(p.m * p.g, rel=1e-12)
+
+
+def test_the_fluid_that_comes_along_slows_the_answer():
+    """Forces along the orbit on a ball that rolls at both points, with half the displaced mass added to its own."""
+    p = BALL.replace(density_ratio=0.4)
+    # m (1 + s/2) R w' = A_z + B_z + push, j m R w' = -A_z, j m R w' = -B_z
+    m, jm = p.m * (1 + p.density_ratio / 2) * p.R, p.j * p.m * p.R
+    rate, without = (
+        np.linalg.solve([[mass, -1, -1], [jm, 1, 0], [jm, 0, 1]], [1.0, 0, 0])[0] for mass in (m, p.m * p.R)
+    )
+    assert diagram.inertia_shifts(p)["rolling_rate"] == pytest.approx(rate / without - 1, rel=1e-12)

@@ -24,7 +24,7 @@ FLOOR = 1e-9
 RAMP = motion.Fluid(0.0, P.omega_0, 3.0)
 
 
-def moment(case: Case, seed: int) -> motion.Moment:
+def moment(case, seed):
     """A random state of the case."""
     rng = np.random.default_rng(seed)
     values = dict(zip(VARIABLES, rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3], strict=True))

@@ -10,7 +10,6 @@ from scipy.optimize import brentq
 
 from analytic import (
     Stability,
-    StationarySolution,
     contact_forces,
     leaning_modes,
     slowest_time_constant,
@@ -35,12 +34,12 @@ LIGHT = {STOKES: 1.0, SCHILLER_NAUMANN: 1.0, QUADRATIC: 0.0}
 NOT_STOKES = [law for law in LAWS if law != STOKES]
 
 
-def resistance(speed: float, p: Parameters) -> float:
+def resistance(speed, p):
     """Drag per mass, m s-2."""
     return float(drag_laws.resistance(speed, p)) * speed if speed else 0.0
 
 
-def at_angle(angle: float, p: Parameters) -> tuple[float, float]:
+def at_angle(angle, p):
     """omega_c and omega_0 of SS at |alpha| from (38), (39), with the lag whose drag balances friction, (41)."""
     cos, sin = np.cos(angle), np.sin(angle)
     den = (1 + p.j * cos**2) * p.mu * p.eta + (p.j - p.eta) * cos
@@ -53,7 +52,7 @@ def at_angle(angle: float, p: Parameters) -> tuple[float, float]:
     return omega_c, omega_c + lag / p.R
 
 
-def random_sets(law: str, count: int) -> list[Parameters]:
+def random_sets(law, count):
     """With folds for the most; Re along the branch from 1 to 1e4."""
     rng = np.random.default_rng([count, LAWS.index(law)])
     sets = []
@@ -66,7 +65,7 @@ def random_sets(law: str, count: int) -> list[Parameters]:
     return sets
 
 
-def scanned(p: Parameters) -> tuple[float, int]:
+def scanned(p):
     """The greatest omega_0 of the branch inside its ends, by ever finer scans, and how many extrema the first saw."""
     angles = np.concatenate([np.geomspace(1e-9, 0.1, 100), np.linspace(0.1, np.pi / 2 - 0.1, 400)[1:]])
     angles = np.concatenate([angles, np.pi / 2 - np.geomspace(1e-9, 0.1, 200)[::-1][1:]])
@@ -81,7 +80,7 @@ def scanned(p: Parameters) -> tuple[float, int]:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_fold_against_a_scan(law: str) -> None:
+def test_fold_against_a_scan(law):
     """omega_04 to 1e-10, one fold beyond eta_cr and none before; omega_01, omega_02, omega_03 are those of Stokes."""
     folds = []
     for p in random_sets(law, 12):
@@ -98,7 +97,7 @@ def test_fold_against_a_scan(law: str) -> None:
 
 
 @pytest.mark.parametrize("nu_f", [1e-6, 5e-6, 1e-5, 1e-4])
-def test_fold_where_the_drag_bends(nu_f: float) -> None:
+def test_fold_where_the_drag_bends(nu_f):
     """With C_D constant beyond Re = 989 the drag grows faster at once: for 1e-6 and 5e-6 the fold is that corner."""
     p = P.replace(c=0.07, nu_f=nu_f, drag=SCHILLER_NAUMANN)
     top, turns = scanned(p)
@@ -110,7 +109,7 @@ def test_fold_where_the_drag_bends(nu_f: float) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_points_and_slopes_of_the_branch(law: str) -> None:
+def test_points_and_slopes_of_the_branch(law):
     """d omega_c/d omega_0 and the sign of `slope` against differences; solutions SS by the formulas written out here.
 
     There are two of them beyond omega_02.
@@ -136,7 +135,7 @@ def test_points_and_slopes_of_the_branch(law: str) -> None:
 # --- stationary solutions and their eigenvalues ----------------------------------------------------------------
 
 
-def field(case: Case, x: np.ndarray, p: Parameters) -> np.ndarray:
+def field(case, x, p):
     """Rates of a state on the wall under the drag of the law."""
     _, v_y, omega_c, w_x, w_y, w_z, *_ = x
     speed = float(np.hypot(v_y, p.R * (omega_c - p.omega_0)))
@@ -147,7 +146,7 @@ def field(case: Case, x: np.ndarray, p: Parameters) -> np.ndarray:
     return np.array(solved[:8], dtype=float)
 
 
-def by_differences(s: StationarySolution, p: Parameters) -> np.ndarray:
+def by_differences(s, p):
     """Eigenvalues of the Jacobian of `field` in the active variables but y."""
     rows = [State._fields.index(name) for name in TRAITS[s.case].active if name != "y"]
     columns = []
@@ -158,7 +157,7 @@ def by_differences(s: StationarySolution, p: Parameters) -> np.ndarray:
     return np.linalg.eigvals(np.array(columns).T)
 
 
-def nearest(values: np.ndarray, to: np.ndarray) -> np.ndarray:
+def nearest(values, to):
     """Of the values those next to others, one each."""
     order = [int(np.argmin(np.abs(values - value))) for value in to]
     assert len(set(order)) == len(values) == len(to)
@@ -168,7 +167,7 @@ def nearest(values: np.ndarray, to: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("eta", [0.02, 0.2, 0.39, 0.6])
 @pytest.mark.parametrize("omega_0", [0.5, 1.0, 5.0, 8.0, 13.0, 14.0, 20.0, 22.0, 28.0, 31.0, 31.5, 33.0, 41.0, 60.0])
-def test_solutions_are_zeros_of_the_equations(law: str, omega_0: float, eta: float) -> None:
+def test_solutions_are_zeros_of_the_equations(law, omega_0, eta):
     """Of those of the simulators to round-off of the largest acceleration, of those written out here to 1e-12 of it.
 
     NS sinks, which is its only rate (48): the drag alone balances the weight that the wall doesn't carry.
@@ -189,7 +188,7 @@ def test_solutions_are_zeros_of_the_equations(law: str, omega_0: float, eta: flo
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(("case", "omega_0"), [(Case.NS, 20.0), (Case.NS, 5.0), (Case.SS, 15.0), (Case.SS, 25.0)])
-def test_eigenvalues_by_differences(law: str, case: Case, omega_0: float) -> None:
+def test_eigenvalues_by_differences(law, case, omega_0):
     """Where the ball lags behind the fluid or sinks through it: along the lag the drag's slope counts, across it c."""
     for nu_f in (2e-5, 2e-4, 2e-3):
         p = P.replace(drag=law, omega_0=omega_0, nu_f=nu_f)
@@ -204,7 +203,7 @@ def test_eigenvalues_by_differences(law: str, case: Case, omega_0: float) -> Non
 
 @pytest.mark.parametrize("law", NOT_STOKES)
 @pytest.mark.parametrize("omega_0", [5.0, 25.0, 40.0])
-def test_where_the_fluid_takes_the_ball_along_a_slight_lag_decides(law: str, omega_0: float) -> None:
+def test_where_the_fluid_takes_the_ball_along_a_slight_lag_decides(law, omega_0):
     """RR, SR, NR: the eigenvalues of Stokes' drag, or those without drag under the quadratic law, said so."""
     p = P.replace(drag=law, omega_0=omega_0, eta=0.6)
     same = p.replace(drag=STOKES, c=LIGHT[law] * p.c)
@@ -227,7 +226,7 @@ def test_where_the_fluid_takes_the_ball_along_a_slight_lag_decides(law: str, ome
 
 @pytest.mark.parametrize(("mu", "eta", "c"), [(0.2, 0.2, 1.0), (0.2, 0.02, 1.0), (0.7, 0.35, 0.01), (1.5, 0.1, 5.0)])
 @pytest.mark.parametrize("law", LAWS)
-def test_ends_of_the_branch(mu: float, eta: float, c: float, law: str) -> None:
+def test_ends_of_the_branch(mu, eta, c, law):
     """The finite eigenvalues tend to closed forms with the c of a vanishing lag.
 
     In RR (omega_01) lambda^2 + c lambda/(1+2j) + 2 (g/R) mu (1+eta)/((1+mu eta)(1+2j)) = 0; in SR (omega_02)
@@ -252,7 +251,7 @@ def test_ends_of_the_branch(mu: float, eta: float, c: float, law: str) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_slip_bounds(law: str) -> None:
+def test_slip_bounds(law):
     """(66), (73) and (56) against the vector fields; at its zero gamma vanishes with the slope that is given."""
     for p in random_sets(law, 8):
         p, rolling = p.replace(omega_0=20.0), np.array(State(omega_c=9.0))

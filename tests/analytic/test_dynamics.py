@@ -18,7 +18,7 @@ P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
 N = 2_000
 
 
-def random_states(case: Case, n: int, seed: int = 0) -> np.ndarray:
+def random_states(case, n, seed=0):
     """States (n, 8) of a case with entries over several orders of magnitude."""
     rng = np.random.default_rng([seed, int(case)])
     sign = rng.choice([-1.0, 1.0], (n, 8))
@@ -33,7 +33,7 @@ def random_states(case: Case, n: int, seed: int = 0) -> np.ndarray:
     return x
 
 
-def test_rolling_at_both_points_symbolically() -> None:
+def test_rolling_at_both_points_symbolically():
     """RR has one equation too few: all forces follow from B_y, all rates are free of it (23)."""
     rank_unknowns = [*ne.RATE, *ne.FORCE_A, ne.FORCE_B[0], ne.FORCE_B[2]]
     # dv_y = 0 follows from A, dslip_z = 0 from both contacts: the doubled equation is what leaves a force free.
@@ -53,7 +53,7 @@ def test_rolling_at_both_points_symbolically() -> None:
 @pytest.mark.parametrize("friction", [(0.3, 0.45), (0.01, 0.9), (0.9, 0.01)])
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", [case for case in Case if case is not Case.RR])
-def test_rates_and_forces_at_random_states(case: Case, law: str, friction: tuple[float, float]) -> None:
+def test_rates_and_forces_at_random_states(case, law, friction):
     """Off the wall, too. Errors are measured against the sum of all accelerations that enter, as round-off is."""
     mu, eta = friction
     x, p = random_states(case, N), P.replace(drag=law, nu_f=1e-5, mu=mu, eta=eta)
@@ -73,7 +73,7 @@ def test_rates_and_forces_at_random_states(case: Case, law: str, friction: tuple
 
 
 @pytest.mark.parametrize("case", list(Case))
-def test_shapes_and_a_flow_of_its_own(case: Case) -> None:
+def test_shapes_and_a_flow_of_its_own(case):
     """Six entries mean a closed wall."""
     x = random_states(case, 6).reshape(2, 3, 8)
     fluid = np.array([1.0, 2.0, 3.0])
@@ -88,7 +88,7 @@ def test_shapes_and_a_flow_of_its_own(case: Case) -> None:
 
 
 @pytest.mark.parametrize("case", list(Case))
-def test_constraints_are_kept_exactly_and_mirror_images_too(case: Case) -> None:
+def test_constraints_are_kept_exactly_and_mirror_images_too(case):
     """Reflection in a plane through the axis turns (omega_c, slip_x, slip_y, omega_0) and leaves the rest."""
     x = random_states(case, 100)
     rates = vector_field(case, x, P)
@@ -104,7 +104,7 @@ def test_constraints_are_kept_exactly_and_mirror_images_too(case: Case) -> None:
 
 
 @pytest.mark.parametrize("case", list(Case))
-def test_vanishing_parameters(case: Case) -> None:
+def test_vanishing_parameters(case):
     """Each has a defined result, also with an orbit at rest (omega_c = 0)."""
     x = random_states(case, 50)
     x[:25, 2] = 0.0
@@ -137,7 +137,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("case", "x", "message"), BAD)
-def test_states_of_another_case_are_refused_by_name(case: Case, x: list[float], message: str) -> None:
+def test_states_of_another_case_are_refused_by_name(case, x, message):
     for function in (vector_field, contact_forces):
         with pytest.raises(InputError, match=message.replace("+", r"\+")):
             function(case, x, P)

@@ -12,7 +12,7 @@ from model import Case, Parameters
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
 
 
-def test_section_1_1() -> None:
+def test_section_1_1():
     """In a fluid at rest a ball may spin on the spot away from the wall: nothing moves, and the floor alone presses."""
     x = [0.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.02, 0.0]
     still = P.replace(omega_0=0.0)
@@ -21,14 +21,14 @@ def test_section_1_1() -> None:
     np.testing.assert_array_equal([F_A, F_B], [[0.0, P.m * P.g, 0.0], [0.0] * 3])
 
 
-def test_section_1_3() -> None:
+def test_section_1_3():
     """Steel in water by (10)."""
     water = {"nu_f": 1.004e-6, "rho_f": 998.2, "rho_b": 7850.0, "R": 0.025, "mu": 0.2, "eta": 0.2}
     assert Parameters.from_fluid(r=2e-3, **water).c == pytest.approx(0.144, abs=1e-3)
     assert Parameters.from_fluid(r=7.5e-3, **water).c == pytest.approx(1e-2, rel=0.03)
 
 
-def test_section_5_1() -> None:
+def test_section_5_1():
     """eta_cr mu^2 = c^2 R/(4 g) isn't below 1e-6, and eta_cr may be above eta."""
     steel = Parameters.named("steel-in-water")
     small = Parameters.from_fluid(nu_f=1.004e-6, rho_f=998.2, rho_b=7850.0, r=2e-3, R=0.025, mu=0.2, eta=0.2)
@@ -38,7 +38,7 @@ def test_section_5_1() -> None:
     assert thresholds(plastic).eta_cr > 0.87 > plastic.eta
 
 
-def test_equation_40() -> None:
+def test_equation_40():
     """Where cos alpha < 0 the spin can't be steady about both the radius and the tangent: (45), rows 4 and 5."""
     for omega_c in np.geomspace(0.5, 60.0, 15):
         for alpha in np.linspace(0.5 * np.pi, 1.5 * np.pi, 99)[1:-1]:
@@ -52,7 +52,7 @@ def test_equation_40() -> None:
 
 
 @pytest.mark.parametrize("document", ["errata.md", "theory.md"])
-def test_documents_name_what_exists(document: str) -> None:
+def test_documents_name_what_exists(document):
     """Every test, function and module the documents point to is there."""
     root = Path(__file__).parents[2]
     text = (root / "docs" / document).read_text("utf-8")

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-import analytic
 from analytic import (
     characteristic_slope,
     mean_slope,
@@ -21,14 +20,14 @@ from analytic import (
 )
 from analytic.flowmeter import pulsation, response
 from analytic.flowmeter.characteristic import End
-from model import Case, Contact, Flow, InputError, Parameters
+from model import Case, Flow, InputError, Parameters
 
 P = Parameters.named("reference")
 ROUGH = Parameters.named("high-wall-friction")
 
 
 @pytest.mark.parametrize("trial", range(12))
-def test_what_ends_the_operating_range(trial: int) -> None:
+def test_what_ends_the_operating_range(trial):
     """What else lasts just beyond: slip at both points, or the ride on the wall while the ball still rolls, too."""
     rng = np.random.default_rng(trial)
     p = P.replace(mu=rng.uniform(0.05, 2), eta=rng.uniform(0.05, 1), j=rng.uniform(0.2, 0.66))
@@ -41,7 +40,7 @@ def test_what_ends_the_operating_range(trial: int) -> None:
     assert (limit.end is End.SLIP) == (p.eta < p.j)
 
 
-def test_limits_and_edges() -> None:
+def test_limits_and_edges():
     """On either side of the unloading limit a ball on the wall can stay, or not; smooth contacts leave no range."""
     limit = unloading_limit(ROUGH)
     assert operating_range(ROUGH) == limit < thresholds(ROUGH).omega_03
@@ -59,22 +58,17 @@ def test_limits_and_edges() -> None:
     assert np.isnan(unloading_limit(P.replace(eta=0.0)))
 
 
-def test_characteristic_slope_between_omega_02_and_omega_04() -> None:
-    """Two branches: the wall reads the flow, SS doesn't; towards the fold its slope grows without bound."""
+def test_the_characteristic_has_two_branches_between_omega_02_and_omega_04():
     p = P.replace(omega_0=35.0)
     with pytest.raises(InputError, match="several branches at omega_0 = 35 rad s-1: choose SR, SS, NR"):
         characteristic_slope(p)
     assert characteristic_slope(p, Case.NR) == characteristic_slope(p, Case.SR) == 1.0
-    slopes = [characteristic_slope(P.replace(omega_0=f * thresholds(P).omega_04), Case.SS) for f in (0.9, 0.99, 0.9999)]
-    assert 0 < slopes[0] < slopes[1] < slopes[2]
-    # omega_c - its value at the fold goes with the root of the distance, its slope with the inverse of the root.
-    assert slopes[2] / slopes[1] == pytest.approx(10, rel=0.2)
     assert characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
     with pytest.raises(InputError, match=r"no motion follows the flow at omega_0 = 12 rad s-1 with c = 0"):
         characteristic_slope(P.replace(c=0.0, omega_0=12.0))
 
 
-def test_jump_and_mean_of_the_slope() -> None:
+def test_jump_and_mean_of_the_slope():
     """The mean of the slope, integrated over omega_0: evenly spread midpoints err by the square of their distance."""
     for name in ("reference", "steel-in-water", "air"):
         p = Parameters.named(name)
@@ -96,35 +90,23 @@ def test_jump_and_mean_of_the_slope() -> None:
         mean_slope(ROUGH)
 
 
-# --- linear response and ramps against the event-driven simulator, which knows nothing of either -------------
+# --- linear response -----------------------------------------------------------------------------------------
 
 
 SLIPPING = P.replace(omega_0=25.0)
 
 
-def pulsating(p: Parameters, case: Case, amplitude: float, frequency: float):
-    """Mean shift of omega_c over a period, and omega_c over omega_0 at the frequency, once settled."""
-    x = analytic.solution(p, case).x
-    slowest = analytic.slowest_time_constant(analytic.solution(p, case))
-    count, each = 1 + int(np.ceil(20 * slowest * frequency)), 64
-    flow = Flow.sine(p.omega_0, amplitude, frequency)
-    run = analytic.simulate(p, x, count / frequency, flow, sample_interval=1 / (each * frequency))
-    shift = float(run.theta[-1] - run.theta[-1 - each]) * frequency - x[2]
-    wave = np.exp(-2j * np.pi * frequency * run.time[-each:])
-    return shift, 2j * np.mean(run.omega_c[-each:] * wave) / amplitude
-
-
-@pytest.mark.parametrize("frequency", [0.03, 0.3, 3.0])
-def test_rolling_is_a_first_order_lag_at_any_amplitude(frequency: float) -> None:
-    k = P.c / (1 + 2 * P.j)
-    expected = 1 / (1 + 2j * np.pi * frequency / k)
-    shift, ratio = pulsating(P, Case.RR, 1.4, frequency)
-    assert response.transfer(P, Case.RR, frequency) == pytest.approx(expected, rel=1e-14)
-    assert ratio == pytest.approx(expected, rel=1e-7)
-    assert abs(shift) < 1e-8
-    t = np.array([0.0, 0.1, 1.0, 30.0])
+def test_rolling_is_a_first_order_lag_and_slow_pulsations_follow_the_characteristic():
+    """What SS and RR do in pulsations, jumps and ramps claims show: pulsation-lag, jump-slipping, ramp-law."""
+    k, t = P.c / (1 + 2 * P.j), np.array([0.0, 0.1, 1.0, 30.0])
+    for frequency in (0.03, 3.0):
+        assert response.transfer(P, Case.RR, frequency) == pytest.approx(
+            1 / (1 + 2j * np.pi * frequency / k), rel=1e-14
+        )
     np.testing.assert_allclose(response.step_response(P, Case.RR, t), -np.expm1(-k * t), rtol=1e-14)
     assert response.peak(P, Case.RR) == (np.inf, 1.0)
+    slope = characteristic_slope(SLIPPING, Case.SS)
+    assert response.transfer(SLIPPING, Case.SS, 0.0) == pytest.approx(slope, rel=1e-7)
 
 
 def test_a_peak_lies_between_the_points_of_a_grid():
@@ -137,39 +119,7 @@ def test_a_peak_lies_between_the_points_of_a_grid():
     assert y[1] == pytest.approx(height, rel=1e-12)
 
 
-@pytest.mark.parametrize("frequency", [0.3, 1.1, 3.0])
-def test_slipping_follows_by_its_jacobian(frequency: float) -> None:
-    """What the linear theory leaves out goes with the square of the amplitude, and so does the shift of the mean."""
-    transfer = response.transfer(SLIPPING, Case.SS, frequency)
-    (much, high), (little, low) = (pulsating(SLIPPING, Case.SS, amplitude, frequency) for amplitude in (0.5, 0.25))
-    assert abs(low / transfer - 1) < max(0.4 * abs(high / transfer - 1), 1e-6)
-    assert little / much == pytest.approx(0.25, rel=1e-2)
-
-
-def test_slow_pulsations_follow_the_characteristic() -> None:
-    def slope(omega_0: float) -> float:
-        return analytic.characteristic_slope(P.replace(omega_0=omega_0), Case.SS)
-
-    assert response.transfer(SLIPPING, Case.SS, 0.0) == pytest.approx(slope(25.0), rel=1e-7)
-
-
-def test_a_ramp_passes_the_fold_by_the_two_thirds_power_of_its_rate() -> None:
-    """Beyond the local law K rate^(2/3) the overshoot has terms rate ln(rate) and rate: three rates show all three."""
-    fold, K = analytic.thresholds(P).omega_04, response.ramp_coefficient(P)
-    rates = np.array([0.003, 0.01, 0.03])
-    passed = []
-    for rate in rates:
-        before, after = 10 * K * rate ** (2 / 3) / rate, 2 * K * rate ** (2 / 3) / rate
-        start, t_end = fold - rate * before, before + after
-        x = analytic.solution(P.replace(omega_0=start), Case.SS).x
-        run = analytic.simulate(P, x, t_end, Flow.ramp(start, start + rate * t_end, t_end))
-        lift = next(t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is Contact.N)
-        passed.append(start + rate * lift - fold)
-    terms = np.stack([rates ** (2 / 3), rates * np.log(rates), rates], axis=-1)
-    assert np.linalg.solve(terms, passed)[0] == pytest.approx(K, rel=0.005)
-
-
-def test_what_there_is_not() -> None:
+def test_what_there_is_not():
     with pytest.raises(InputError, match="there is no fold"):
         response.ramp_coefficient(P.replace(eta=0.02))
     with pytest.raises(InputError, match="case SS has no stable"):
@@ -187,15 +137,16 @@ PULSATING = {
     "slips at the floor": Parameters.named("high-wall-friction").replace(omega_0=20.0),
     "wake": P.replace(omega_0=11.0, nu_f=5e-5, drag="schiller-naumann"),
     "quadratic": P.replace(omega_0=11.0, nu_f=2e-5, drag="quadratic"),
+    "fills both cones": P.replace(omega_0=12.0, mu=0.6),
 }
 
 
-def rolling_rate(p: Parameters) -> float:
+def rolling_rate(p):
     """With Stokes' law; some rate of this order with others."""
     return p.c / (1 + 2 * p.j)
 
 
-def slips(p: Parameters, amplitude: float, frequency: float) -> bool:
+def slips(p, amplitude, frequency):
     """Whether the ball, rolling in the rhythm of the flow, slips within a period."""
     x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
     run = simulate(p, x0, 1.1 / frequency, Flow.sine(p.omega_0, amplitude, frequency))
@@ -204,7 +155,7 @@ def slips(p: Parameters, amplitude: float, frequency: float) -> bool:
 
 @pytest.mark.parametrize("p", PULSATING.values(), ids=PULSATING)
 @pytest.mark.parametrize("pace", [0.3, 2.0, 10.0, 60.0])
-def test_onset(p: Parameters, pace: float) -> None:
+def test_onset(p, pace):
     """Found again by simulations that stop at the end of RR, to a part of ten thousand."""
     frequency = pace * rolling_rate(p) / (2 * math.pi)
     onset = pulsation.slip_onset(p, frequency)
@@ -213,13 +164,13 @@ def test_onset(p: Parameters, pace: float) -> None:
 
 
 @pytest.mark.parametrize("p", PULSATING.values(), ids=PULSATING)
-def test_slow_and_fast_pulsations_have_the_limits_in_closed_form(p: Parameters) -> None:
+def test_slow_and_fast_pulsations_have_the_limits_in_closed_form(p):
     rate = rolling_rate(p) / (2 * math.pi)
     assert pulsation.slip_onset(p, 1e-4 * rate) == pytest.approx(pulsation.slow_onset(p), rel=1e-3)
     assert pulsation.slip_onset(p, 1e4 * rate) == pytest.approx(pulsation.fast_onset(p), rel=1e-5)
 
 
-def test_the_mean_of_a_pulsation_is_that_of_the_thirtieth_period() -> None:
+def test_the_mean_of_a_pulsation_is_that_of_the_thirtieth_period():
     p = PULSATING["slips at both"]
     frequency = rolling_rate(p) / math.pi
     amplitude = 1.3 * pulsation.slip_onset(p, frequency)
@@ -231,7 +182,7 @@ def test_the_mean_of_a_pulsation_is_that_of_the_thirtieth_period() -> None:
     assert pulsation.mean_error(p, 0.7 * amplitude, frequency) == 0  # rolls on
 
 
-def test_forces_may_allow_more_on_a_rough_floor() -> None:
+def test_forces_may_allow_more_on_a_rough_floor():
     """Between (73) and the cone of the floor, see docs/theory.md, section 7; elsewhere both ends of RR are one."""
     p = PULSATING["slips at both"]
     assert pulsation.slip_onset(p, 1.0, "infeasible") == pytest.approx(pulsation.slip_onset(p, 1.0), rel=1e-9)

@@ -1,7 +1,4 @@
-"""Event-driven simulation against closed forms, plain integration and stationary solutions.
-
-Event times are compared at 1e-9 relative, the default tolerance of the integrator.
-"""
+"""The event-driven simulation has the motions and events of closed forms, to its tolerance of 1e-9."""
 
 import math
 
@@ -10,27 +7,27 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analytic import simulate, solution, vector_field
+from analytic import contact_forces, simulate, solution
 from analytic.mechanics import rolling_forces
 from analytic.simulation import integrator
 from model import Case, Flow, Parameters, SimulationError
+from model.cases import TRAITS
+from model.kinematics import VARIABLES
 
 P = Parameters.named("reference")
 RTOL = 1e-9
-OFFSET = np.array([0, 0, 0.5, 3, 2, -3])
 
 
 def states_of(trajectory):
     """(from, to) of every event."""
-    events = trajectory.events
-    return [(Case(a), Case(b)) for a, b in zip(events.from_case, events.to_case, strict=True)]
+    return [(Case(a), Case(b)) for a, b in zip(trajectory.events.from_case, trajectory.events.to_case, strict=True)]
 
 
 def balance(trajectory):
     return trajectory.header.settings["energy_residual"] / trajectory.header.settings["energy_scale"]
 
 
-# Closed forms -------------------------------------------------------------------------------------------------------
+# --- closed forms -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("method", "slack"), [("event", 0.0), ("time-stepping", 1.01e-4)])
@@ -104,26 +101,39 @@ def test_rolling_ends_where_no_forces_are_left():
     assert soon / sooner == pytest.approx(4.0, rel=0.05)
 
 
-# Against plain integration and stationary solutions -----------------------------------------------------------------
+DRAGGED = P.replace(c=5.0, omega_0=0.0)
+LIMITS = {
+    "the wall opens": (DRAGGED, [0, 0, 6.4, 20, 30, -150], None, Case.SS, Case.SN),
+    "the floor slips off the wall": (DRAGGED, [0, 0, 0, 0, 3.0, 0, 0.03, 0], Flow.ramp(0, 100, 0.05), Case.RN, Case.SN),
+    "the wall slips": (DRAGGED.replace(eta=0.6), [0.1, 0, 30, -100, 0, 0], Flow.ramp(30, -60, 0.2), Case.NR, Case.NS),
+    "the floor lets go": (
+        DRAGGED.replace(eta=0.6, mu=0.05),
+        [0, 0, 22, -40, 0, 0],
+        Flow.ramp(22, 60, 0.1),
+        Case.SR,
+        Case.NR,
+    ),
+}
 
 
-def f_ss(p):
-    """f_SS of (26) in (omega_c, w_x, w_y, w_z) for a plain integrator."""
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_case_ends_where_its_forces_do(name):
+    """Against the clock, too: a normal force that vanishes, or friction that is full, by `contact_forces`."""
+    p, x, flow, before, after = LIMITS[name]
+    flow = flow or Flow.steady(p.omega_0)
+    end = simulate(p, x, 0.3, flow, sample_interval=0.3).events.time[0]
+    run = simulate(p, x, end, flow, sample_interval=end)
+    assert states_of(run)[:1] in ([(before, after)], [])
+    last = run.x[-1] * [
+        name in VARIABLES[:3] or name in TRAITS[before].active or before is Case.RN for name in VARIABLES
+    ]
+    (A_x, A_y, A_z), (B_x, B_y, B_z) = contact_forces(before, last, p, flow(end))
+    left = {"A": p.mu * A_y - math.hypot(A_x, A_z), "B": p.eta * B_x - math.hypot(B_y, B_z)}
+    load = {"the wall opens": B_x, "the floor lets go": A_y}.get(name, left["A" if before is Case.RN else "B"])
+    assert load == pytest.approx(0.0, abs=1e-7 * p.m * p.g)
 
-    def rhs(_, z):
-        return vector_field(Case.SS, [0, 0, *z], p)[2:]
 
-    return rhs
-
-
-def test_two_point_slipping_against_plain_integration():
-    p = P.replace(omega_0=25.0)
-    x0 = solution(p, Case.SS).x[:6] + OFFSET
-    run = simulate(p, x0, 10.0, sample_interval=0.1)
-    plain = solve_ivp(f_ss(p), (0, 10), x0[2:], method="DOP853", rtol=1e-13, atol=1e-13, t_eval=run.time)
-    np.testing.assert_allclose(run.x[:, 2:6], plain.y.T, rtol=1e-8, atol=1e-8)
-    assert not len(run.events)
-    assert balance(run) < RTOL
+# --- stationary solutions, flows, solvers ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -150,16 +160,13 @@ def test_stationary_solutions_stay(name, omega_0, case, method, tolerance):
         np.testing.assert_allclose(run.force_A[-1], settled.force_A, atol=1e-8 * p.m * p.g)
 
 
-def test_flow_that_jumps_and_ramps():
-    """Two levels and a ramp at RR: omega_c follows its linear equation through each piece."""
+def test_flows_of_several_pieces():
+    """RR through two levels and ramps, and through waves: omega_c follows its linear equation; a jump at its moment."""
     p = P.replace(omega_0=0.0)
     for flow in (Flow.sampled([0.0, 1.0, 2.0], [8.0, 12.0, 10.0]), Flow.sines(8.0, [(2.0, 0.5, 0.0), (1.0, 3.0, 1.0)])):
         run = simulate(p, [0, 0, 8.0, 0, 0, 0], 3.0, flow, sample_interval=0.05)
-
-        def rate(t, omega_c, flow=flow):
-            return -p.c * (omega_c - flow(t)) / (1 + 2 * p.j)
-
-        plain = solve_ivp(rate, (0, 3), [8.0], rtol=1e-11, atol=1e-12, max_step=0.01, t_eval=run.time)
+        given = (lambda t, w, flow=flow: -p.c * (w - flow(t)) / (1 + 2 * p.j)), (0, 3), [8.0]
+        plain = solve_ivp(*given, rtol=1e-11, atol=1e-12, max_step=0.01, t_eval=run.time)
         np.testing.assert_allclose(run.omega_c, plain.y[0], rtol=1e-8)
     assert balance(run) < 1e-12
     stairs = simulate(p, [0, 0, 10.0, 0, 0, 0], 3.0, Flow.staircase([10.0, 25.0], 1.0), sample_interval=0.05)
@@ -190,36 +197,37 @@ def test_near_the_axis_is_an_ordinary_place():
     np.testing.assert_allclose(place, start + velocity * run.time, atol=1e-11)
 
 
-@pytest.mark.parametrize("name", ["BDF", "LSODA"])
-def test_a_solver_that_fails_gives_way_to_the_other(name, monkeypatch):
-    """The same motion, through RR and the onset of SS, where one solver breaks off now and then."""
-    p, x0 = P.replace(omega_0=25.0), [0, 0, 9.0, 0, 0, 0]
-    right = simulate(p, x0, 1.5, sample_interval=0.1)
+def failing(method, at):
+    """A solver of scipy that breaks off at some steps."""
 
-    class Fails(getattr(integrator, name)):
+    class Fails(method):
         steps = 0
 
         def step(self):
             Fails.steps += 1
-            if Fails.steps in (10, 30, 31, 60):
+            if Fails.steps in at:
                 self.status = "failed"
                 return "step size below spacing of numbers"
             return super().step()
 
+    return Fails
+
+
+@pytest.mark.parametrize("name", ["BDF", "LSODA"])
+def test_a_solver_that_fails_gives_way_to_the_other(name, monkeypatch):
+    """The same motion, through RR and the onset of SS; where both fail for ever, the run ends."""
+    given = P.replace(omega_0=25.0), [0, 0, 9.0, 0, 0, 0], 1.5
+    right, solvers = (
+        simulate(*given, sample_interval=0.1),
+        {each: getattr(integrator, each) for each in ("BDF", "LSODA")},
+    )
     monkeypatch.setattr(integrator, "_solvers", lambda: None)
-    monkeypatch.setattr(integrator, name, Fails)
-    run = simulate(p, x0, 1.5, sample_interval=0.1)
-    assert Fails.steps >= 10
-    np.testing.assert_allclose(run.x, right.x, rtol=0, atol=1e-7 * 25.0)
-
-
-def test_solvers_that_both_fail_end_the_run(monkeypatch):
-    def fails(self):
-        self.status = "failed"
-        return "step size below spacing of numbers"
-
-    monkeypatch.setattr(integrator, "_solvers", lambda: None)
-    monkeypatch.setattr(integrator.BDF, "step", fails)
-    monkeypatch.setattr(integrator.LSODA, "step", fails)
+    with monkeypatch.context() as patch:
+        patch.setattr(integrator, name, fails := failing(solvers[name], (10, 30, 31, 60)))
+        run = simulate(*given, sample_interval=0.1)
+        assert fails.steps >= 10
+        np.testing.assert_allclose(run.x, right.x, rtol=0, atol=1e-7 * 25.0)
+    for each, solver in solvers.items():
+        monkeypatch.setattr(integrator, each, failing(solver, range(10**9)))
     with pytest.raises(SimulationError, match="in case SS: step size below spacing of numbers"):
-        simulate(P.replace(omega_0=25.0), [0, 0, 9.0, 3, 2, -3], 1.5)
+        simulate(given[0], [0, 0, 9.0, 3, 2, -3], 1.5)

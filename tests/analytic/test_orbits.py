@@ -1,7 +1,5 @@
 """Periodic motions, closed and followed to their births, and what motions from many starts come to."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -9,12 +7,11 @@ from scipy.integrate import solve_ivp
 from analytic import attractors, simulate, stable_solutions
 from analytic.orbits import fates, orbit_branch
 from analytic.orbits import periodic as orbits
-from analytic.orbits.fates import Kind, Run
+from analytic.orbits.fates import Kind
 from analytic.orbits.orbit_branch import Bifurcation
-from analytic.orbits.periodic import NoOrbitError, Orbit
+from analytic.orbits.periodic import NoOrbitError
 from analytic.simulation import ensemble
 from model import Case, Events, Flow, Header, InputError, Parameters, State, Trajectory
-from model.arrays import Array
 from model.kinematics import state_units
 from model.trajectory import SAMPLE
 
@@ -27,16 +24,16 @@ SWUNG = (0.0, 0.0, 22.39, -0.03, 0.0, 0.26)
 
 
 @pytest.fixture(scope="module")
-def hop() -> Orbit:
+def hop():
     return orbits.refine(HOPPING, TOP, 0.223)
 
 
 @pytest.fixture(scope="module")
-def swing() -> Orbit:
+def swing():
     return orbits.refine(SWINGING, SWUNG, 0.327)
 
 
-def test_newton_closes_the_orbit(hop: Orbit, swing: Orbit) -> None:
+def test_newton_closes_the_orbit(hop, swing):
     """After five periods of a simulation with another tolerance and other samples the ball is where it was."""
     for orbit in (hop, swing):
         assert orbit.steps <= 8
@@ -47,7 +44,7 @@ def test_newton_closes_the_orbit(hop: Orbit, swing: Orbit) -> None:
         assert orbit.turn == pytest.approx((run.theta[-1] - run.theta[0]) / 5, rel=1e-8)
 
 
-def test_what_the_orbits_are(hop: Orbit, swing: Orbit) -> None:
+def test_what_the_orbits_are(hop, swing):
     """The hop lands once a period; the swinging ball slips all the time."""
     assert sum(before.A.name == "N" != after.A.name for before, after in hop.changes) == 1
     assert set(swing.cases) == {Case.SS}
@@ -57,7 +54,7 @@ def test_what_the_orbits_are(hop: Orbit, swing: Orbit) -> None:
         assert np.all(orbit.mean <= orbit.cycle.x.max(axis=0))
 
 
-def test_multipliers_are_how_disturbances_change(hop: Orbit, swing: Orbit) -> None:
+def test_multipliers_are_how_disturbances_change(hop, swing):
     """Simulated returns to the section: the disturbance p periods later is M^p of it, within 1 %."""
     for orbit in (hop, swing):
         push = 1e-4 * orbit.loop.extent * np.ones(len(orbit.loop.free))
@@ -74,7 +71,7 @@ def test_multipliers_are_how_disturbances_change(hop: Orbit, swing: Orbit) -> No
         assert np.abs(windows @ polynomial).max() < 0.01 * np.abs(series).max()
 
 
-def test_a_branch_ends_at_the_range(hop: Orbit) -> None:
+def test_a_branch_ends_at_the_range(hop):
     """In a short range the branch has an orbit at either end, and all are stable."""
     branch = orbit_branch.follow(hop, "omega_0", 69.0, 69.4)
     assert branch.values[[0, -1]] == pytest.approx([69.0, 69.4])
@@ -84,7 +81,7 @@ def test_a_branch_ends_at_the_range(hop: Orbit) -> None:
 
 
 @pytest.mark.slow
-def test_hops_that_rebound_end_in_a_torus(hop: Orbit) -> None:
+def test_hops_that_rebound_end_in_a_torus(hop):
     """Followed in the coefficient of restitution, from where the orbit can be found from that without."""
     x, period = hop.loop.x, hop.period
     for restitution in (0.2, 0.3, 0.4, 0.5, 0.53):
@@ -100,7 +97,7 @@ def test_hops_that_rebound_end_in_a_torus(hop: Orbit) -> None:
 @pytest.mark.parametrize(
     ("eta", "faster", "hops"), [(0.0905, 4e-4, True), (0.0905, 1e-3, False), (0.0915, 1e-4, False)]
 )
-def test_no_torus_attracts_beyond_the_torus_bifurcation(hop: Orbit, eta: float, faster: float, hops: bool) -> None:
+def test_no_torus_attracts_beyond_the_torus_bifurcation(hop, eta, faster, hops):
     """It is subcritical: ever smaller disturbances end the hops before it, and beyond it any does."""
     orbit = orbit_branch.follow(hop, "eta", 0.0725, eta).orbits[-1]
     assert orbit.p.eta == pytest.approx(eta)
@@ -112,7 +109,7 @@ def test_no_torus_attracts_beyond_the_torus_bifurcation(hop: Orbit, eta: float, 
         assert run.cases[-1] is Case.NR
 
 
-def test_no_orbit_and_bad_input(hop: Orbit) -> None:
+def test_no_orbit_and_bad_input(hop):
     """Rolling for ever has no period; a guess far from all orbits doesn't converge; ranges must make sense."""
     with pytest.raises(NoOrbitError, match="rolls at both points"):
         orbits.refine(Parameters.named("reference"), (0, 0, 12, 0, 0, 0), 0.2)
@@ -132,7 +129,7 @@ def test_no_orbit_and_bad_input(hop: Orbit) -> None:
 SLIPS, RIDES = (0, 0, 20, 0, 0, 0), (0.03, 0, 69, -100, 0, 0)
 
 
-def test_three_attractors_at_once() -> None:
+def test_three_attractors_at_once():
     """The hopping set: hopping, slipping at both points, and riding the wall."""
     groups = attractors(HOPPING, (TOP, SLIPS, RIDES))
     assert [each.count for each in groups] == [1, 1, 1]
@@ -149,7 +146,7 @@ def test_three_attractors_at_once() -> None:
     assert 0 < low < groups[0].share < high < 1
 
 
-def test_random_starts_are_reproducible_and_inside() -> None:
+def test_random_starts_are_reproducible_and_inside():
     """The same seed gives the same starts; all of them can be simulated."""
     first, again, other = (ensemble.random_starts(HOPPING, 50, seed) for seed in (1, 1, 2))
     assert np.array_equal(first, again)
@@ -167,14 +164,14 @@ def test_random_starts_are_reproducible_and_inside() -> None:
         ({"starts": SLIPS, "lasting": -1.0}, "lasting = -1"),
     ],
 )
-def test_bad_input(given: dict[str, object], match: str) -> None:
+def test_bad_input(given, match):
     with pytest.raises(InputError, match=match):
         attractors(HOPPING, **given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="lasting"):  # no time constant to take it from
         attractors(HOPPING.replace(c=0.0), 1)
 
 
-def test_lyapunov_exponent_of_an_orbit_is_zero(hop: Orbit) -> None:
+def test_lyapunov_exponent_of_an_orbit_is_zero(hop):
     """Along the orbit disturbances neither grow nor die out."""
     exponent, error = fates.lyapunov(hop.p, hop.loop.x, 20 * hop.period, hop.period)
     # The first of the ten parts has the decay of what lies across, with the modulus of the largest multiplier.
@@ -182,21 +179,21 @@ def test_lyapunov_exponent_of_an_orbit_is_zero(hop: Orbit) -> None:
     assert abs(exponent) <= 3 * error + 0.1 * decay
 
 
-def torus(time: float, z: Array) -> Array:
+def torus(time, z):
     """Two harmonic oscillators whose frequencies are in the golden ratio."""
     return 3 * np.array([-z[1], z[0], -(1 + 5**0.5) / 2 * z[3], (1 + 5**0.5) / 2 * z[2]])
 
 
-def lorenz(time: float, z: Array) -> Array:
+def lorenz(time, z):
     """Lorenz's equations, five times as fast, in a tenth of their variables; the largest exponent is 5 times 0.906."""
     _, x, y, w = z
     return 5 * np.array([0.0, 10 * (y - x), x * (28 - 10 * w) - y, 10 * x * y - 8 / 3 * w])
 
 
-def slipping_by(rates: Callable[[float, Array], Array]) -> Run:
+def slipping_by(rates):
     """A simulator of a ball that slips at both points, with omega_c and slips of these rates in natural units."""
 
-    def run(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
+    def run(p, x0, duration, interval):
         size, unit = state_units(p)[2:6], (p.R / p.g) ** 0.5
         time = np.arange(round(duration / interval) + 1) * interval
         z = solve_ivp(rates, (0, time[-1] / unit), x0[2:6] / size, "DOP853", time / unit, rtol=1e-10, atol=1e-12).y
@@ -213,9 +210,7 @@ def slipping_by(rates: Callable[[float, Array], Array]) -> Run:
 @pytest.mark.parametrize(
     ("rates", "kind", "exponent"), [(torus, Kind.QUASI_PERIODIC, 0.0), (lorenz, Kind.CHAOTIC, 5 * 0.906)]
 )
-def test_recurrent_motions_that_do_not_close(
-    rates: Callable[[float, Array], Array], kind: Kind, exponent: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_recurrent_motions_that_do_not_close(rates, kind, exponent, monkeypatch):
     """Flows whose largest Lyapunov exponents are known."""
     monkeypatch.setattr(fates, "GROWING", 100.0)
     unit = (HOPPING.R / HOPPING.g) ** 0.5

@@ -11,7 +11,7 @@ from model import Case, InputError, Parameters, State
 
 @pytest.mark.parametrize("name", ["steel-in-water", "plastic-in-oil", "air", "reference"])
 @pytest.mark.parametrize("layer", [False, True])
-def test_rolling_with_the_torque_obeys_newton_and_euler(name: str, layer: bool) -> None:
+def test_rolling_with_the_torque_obeys_newton_and_euler(name, layer):
     """(20) with one torque more, as vectors, with the forces of rolling that the two balances leave."""
     p = Parameters.named(name)
     at = real_fluid.rolling(p, layer)
@@ -19,6 +19,8 @@ def test_rolling_with_the_torque_obeys_newton_and_euler(name: str, layer: bool) 
     spin = p.R / p.r * at.omega_c * (inwards - up)
     relative = spin - p.omega_0 * up
     inertia = p.j * p.m * p.r**2
+    assert at.rate == pytest.approx(real_fluid.torque_rate(np.linalg.norm(relative), p, layer), rel=1e-12)
+    assert at.Re == pytest.approx(np.linalg.norm(relative) * p.r**2 / p.nu_f if p.nu_f else np.nan, nan_ok=True)
     torque = -inertia * at.rate * relative
     lag = p.R * (at.omega_c - p.omega_0)
     push = -p.m * drag.coefficient(abs(lag), p) * lag
@@ -32,7 +34,7 @@ def test_rolling_with_the_torque_obeys_newton_and_euler(name: str, layer: bool) 
         np.testing.assert_allclose(moment, np.cross(at.omega_c * up, inertia * spin), atol=1e-9 * np.abs(moment).max())
 
 
-def test_the_torque_is_of_the_order_of_the_drag_for_every_ball() -> None:
+def test_the_torque_is_of_the_order_of_the_drag_for_every_ball():
     """8 pi rho_f nu r/(j m), which is 10/3 of the drag's rate for a uniform ball; the two laws meet at Re = 8."""
     p = Parameters.named("steel-in-water")
     rho_f = p.density_ratio * p.m / (4 / 3 * np.pi * p.r**3)
@@ -44,7 +46,7 @@ def test_the_torque_is_of_the_order_of_the_drag_for_every_ball() -> None:
     assert rates[3] == pytest.approx(2000 / (16 * np.pi) * (6.45 / np.sqrt(2000) + 32.1 / 2000))
 
 
-def test_time_stepping_takes_the_torque_and_the_event_driven_simulation_refuses_it() -> None:
+def test_time_stepping_takes_the_torque_and_the_event_driven_simulation_refuses_it():
     """Where friction suffices the ball stays in the stationary motion; the work of the torque is in the balance."""
     p = Parameters.named("reference").replace(mu=1.0, eta=1.0, fluid_torque=10 / 3)
     start = State(omega_c=real_fluid.rolling(p).omega_c)
@@ -58,7 +60,7 @@ def test_time_stepping_takes_the_torque_and_the_event_driven_simulation_refuses_
         simulate(p, start, 1.0)
 
 
-def test_the_mirror_image_and_where_nothing_moves() -> None:
+def test_the_mirror_image_and_where_nothing_moves():
     p = Parameters.named("steel-in-water")
     there, back = (real_fluid.rolling(p.replace(omega_0=flow)) for flow in (15.0, -15.0))
     assert back.omega_c == -there.omega_c

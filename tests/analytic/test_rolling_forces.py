@@ -15,7 +15,7 @@ OMEGA_C = RNG.uniform(-40, 40, 300)
 OMEGA_0 = OMEGA_C + RNG.normal(0, 60, 300)
 
 
-def utilisation(omega_c: np.ndarray, p: Parameters, omega_0: np.ndarray, B_y: np.ndarray) -> np.ndarray:
+def utilisation(omega_c, p, omega_0, B_y):
     """The larger utilisation at given B_y, inf where a contact would have to pull."""
     A_x, A_y, A_z, B_x, B_y, B_z = rolling_family(omega_c, p, omega_0, B_y)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -25,7 +25,7 @@ def utilisation(omega_c: np.ndarray, p: Parameters, omega_0: np.ndarray, B_y: np
 
 
 @pytest.mark.parametrize(("mu", "eta"), FRICTION)
-def test_least_utilisation_interval_and_margin_agree(mu: float, eta: float) -> None:
+def test_least_utilisation_interval_and_margin_agree(mu, eta):
     """No B_y of a dense scan does better, the member itself attains what is claimed, and the ends of the interval 1."""
     p = P.replace(mu=mu, eta=eta)
     best = rolling_forces.least_utilisation(OMEGA_C, p, OMEGA_0)
@@ -50,7 +50,7 @@ def test_least_utilisation_interval_and_margin_agree(mu: float, eta: float) -> N
 
 
 @pytest.mark.parametrize(("mu", "eta"), [(1.5, 0.3), (1.2, 0.1), (3.0, 0.5)])
-def test_stationary_rolling_jams_for_mu_over_1(mu: float, eta: float) -> None:
+def test_stationary_rolling_jams_for_mu_over_1(mu, eta):
     """omega_0^2 <= (g/R) mu(1 - eta)/(j + eta - mu eta(1 + j)) if that is positive, without end if not."""
     p = P.replace(mu=mu, eta=eta)
     divisor = p.j + eta - mu * eta * (1 + p.j)
@@ -63,7 +63,7 @@ def test_stationary_rolling_jams_for_mu_over_1(mu: float, eta: float) -> None:
         assert np.all(rolling_forces.margin(ends, p, ends) >= 0)
 
 
-def test_at_rest_and_without_friction() -> None:
+def test_at_rest_and_without_friction():
     """B_x = 0 at omega_c = 0: in a driving flow spin-up begins in RS (eta <= 1)."""
     assert rolling_forces.margin(0.0, P, 1.0) < 0
     assert rolling_forces.margin(0.0, P, 0.0) >= 0
@@ -78,7 +78,7 @@ def test_at_rest_and_without_friction() -> None:
         assert (rolling_forces.least_utilisation(8.0, p, 8.0).utilisation <= 1) == holds
 
 
-def test_public_forces_are_the_member_of_least_utilisation() -> None:
+def test_public_forces_are_the_member_of_least_utilisation():
     omega = np.array([5.0, 12.0])
     F_A, F_B = contact_forces(Case.RR, np.stack([0 * omega, 0 * omega, omega, *[0 * omega] * 3], axis=-1), P, omega)
     best = rolling_forces.least_utilisation(omega, P, omega)

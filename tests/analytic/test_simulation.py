@@ -129,13 +129,26 @@ def test_trajectory_describes_itself(method):
     )
 
 
+@pytest.mark.parametrize(("method", "torque"), [("event", 0.0), ("time-stepping", 0.0), ("time-stepping", 3.0)])
+@pytest.mark.parametrize("x", [[0, 0, 9, 0, 0, 0, 0, 0], [0.01, 0, 20, -30, 10, 20, 0.002, -0.1]])
+def test_a_motion_against_the_clock_is_the_reflection_of_that_with_it(method, torque, x):
+    """Onsets of slip, landings and the fluid's torque: reflection turns omega_c, slip_x, slip_y and omega_0."""
+    p, flip, way = P.replace(fluid_torque=torque), np.array([1, 1, -1, -1, -1, 1, 1, 1]), {"timestep": 1e-3}
+    there, back = (
+        simulate(p.replace(omega_0=s * 25.0), turn * x, 2.0, method=method, sample_interval=0.1, **way)
+        for s, turn in ((1.0, 1), (-1.0, flip))
+    )
+    assert len(there.events)
+    np.testing.assert_array_equal(back.events.to_case, there.events.to_case)
+    np.testing.assert_allclose(back.x, flip * there.x, rtol=0, atol=1e-7 * np.abs(there.x).max(axis=0).max())
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_within_a_long_stretch(method, monkeypatch):
     """A single case and a single sample: the steps themselves report, so that a caller can stop the run in time."""
     for between_two_reports in ("hybrid.REPORT_EVERY", "integrator.REPORT_EVERY", "time_stepping.AT_ONCE"):
         monkeypatch.setattr(f"analytic.simulation.{between_two_reports}", 10)
-    p, seen = P.replace(omega_0=25.0), []
-    x0 = [0, 0, 13.8, -4, 0.5, 10]
+    p, x0, seen = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10], []
     assert len(simulate(p, x0, 0.2, method=method).time) == 1001  # samples as they are by default
     run = simulate(p, x0, 4.0, method=method, timestep=1e-3, sample_interval=4.0, progress=seen.append)
     assert not len(run.events)
@@ -204,10 +217,9 @@ def test_bad_input_is_refused(arguments, message):
 @pytest.mark.parametrize("method", METHODS)
 def test_interruption_is_raised(method, monkeypatch):
     """Ctrl-C in the middle of the equations: no run that could be taken for a whole one comes back."""
-    name = {
-        "event": "analytic.simulation.equations.rates",
-        "time-stepping": "analytic.simulation.stepping.advance",
-    }[method]
+    name = {"event": "analytic.simulation.equations.rates", "time-stepping": "analytic.simulation.stepping.advance"}[
+        method
+    ]
     calls = iter(range(10**9))
 
     def stop(*args):

@@ -1,7 +1,5 @@
 """The slip bounds of sections 3.2 and 4: as printed, from Newton and Euler by algebra, and at random sets."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 import sympy as sp
@@ -17,7 +15,7 @@ P = Parameters.named("reference")
 w = sp.Symbol("w", positive=True)
 
 
-def random_sets(count: int, top: float = 1.0) -> list[Parameters]:
+def random_sets(count, top=1.0):
     rng = np.random.default_rng(count)
     sets = []
     for _ in range(count):
@@ -29,13 +27,13 @@ def random_sets(count: int, top: float = 1.0) -> list[Parameters]:
     return sets
 
 
-def equal(left: Any, right: Any) -> bool:
+def equal(left, right):
     return bool(sp.simplify(left - right) == 0)
 
 
-def test_zeros_as_printed() -> None:
+def test_zeros_as_printed():
     """(61), (67), (74), (82), (83); those of a lag, (66) with eta and (73), are below."""
-    p: Any = ne.PARAMETERS
+    p = ne.PARAMETERS
     j, mu, eta, square = p.j, p.mu, p.eta, p.g / (p.eta * p.R)
     assert equal(slip_bounds.nr_to_ns(p).zero, square)
     assert slip_bounds.rr_to_rs_stationary(p).zero == 0
@@ -48,12 +46,12 @@ def test_zeros_as_printed() -> None:
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_from_newton_and_euler(side: int) -> None:
+def test_from_newton_and_euler(side):
     """gamma of every bound is the rate of the slip itself, with the forces of the case it leads to."""
-    p: Any = ne.PARAMETERS
+    p = ne.PARAMETERS
     omega_0 = ne.omega_0
     spin = p.g / (p.j * omega_0 * p.r) - omega_0 * p.R / p.r
-    table: list[tuple[SlipBound | HeldBound, Case, Any, Any, int, list[tuple[Any, Any]]]] = [
+    table = [
         (slip_bounds.rr_to_rs(p, w, side), Case.RS, w, 0, 4, [(side, 0)]),
         (slip_bounds.rr_to_rs_stationary(p), Case.RS, omega_0, 0, 4, [(side, 0)]),
         (slip_bounds.rr_to_sr(p, w, side), Case.SR, w, 0, 3, [(side, 0)]),
@@ -72,7 +70,7 @@ def test_from_newton_and_euler(side: int) -> None:
 
 
 @pytest.mark.parametrize(("outer", "name"), [(Case.RS, "slip_y"), (Case.SR, "slip_x")])
-def test_69_rolling_is_a_mixture_of_both_directions_of_slip(outer: Case, name: str) -> None:
+def test_69_rolling_is_a_mixture_of_both_directions_of_slip(outer, name):
     p, x = P.replace(omega_0=20.0), State(omega_c=9.0)
     minus, plus = (np.array(vector_field(outer, x._replace(**{name: side * 1e-9}), p)) for side in (-1, 1))
     share = slip_bounds.filippov_share(outer, 9.0, p)
@@ -82,7 +80,7 @@ def test_69_rolling_is_a_mixture_of_both_directions_of_slip(outer: Case, name: s
         slip_bounds.filippov_share(Case.SS, 9.0, p)
 
 
-def states_of_nr(p: Parameters, count: int) -> np.ndarray:
+def states_of_nr(p, count):
     rng = np.random.default_rng(7)
     unit = np.sqrt(p.g / p.R)
     x = rng.normal(size=(count, 6)) * [p.R, np.sqrt(p.g * p.R), 2 * unit, 3 * unit * p.R / p.r, 0, 0]
@@ -90,7 +88,7 @@ def states_of_nr(p: Parameters, count: int) -> np.ndarray:
     return x
 
 
-def test_56_at_any_state() -> None:
+def test_56_at_any_state():
     """Against the vector field of NS, with v_y, omega_c, slip_x and beta anything."""
     for p in random_sets(20):
         beta = np.linspace(-np.pi, np.pi, 9)

@@ -1,9 +1,6 @@
 """Stability with respect to slipping: the paper's formulas, the other two routes, and where the paper's claim fails."""
 
-from collections.abc import Callable
-
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.optimize import minimize
 
@@ -18,7 +15,7 @@ P = Parameters.named("reference")
 RNG = np.random.default_rng(3)
 
 
-def direction(alpha: npt.ArrayLike, beta: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def direction(alpha, beta):
     """Unit vectors (slip_x, slip_y, slip_z) with slip directions alpha, beta: (75), shape (..., 3).
 
     Both angles must lie in [-pi/2, pi/2] or both in [pi/2, 3 pi/2] (76); the quarter turns themselves are singular.
@@ -28,7 +25,7 @@ def direction(alpha: npt.ArrayLike, beta: npt.ArrayLike) -> npt.NDArray[np.float
     return sign[..., None] * n / np.linalg.norm(n, axis=-1, keepdims=True)
 
 
-def growth_of_energy(inner: Case, outer: Case, x: npt.ArrayLike, n: np.ndarray, p: Parameters) -> np.ndarray:
+def growth_of_energy(inner, outer, x, n, p):
     """gamma out of RR into SS by kinetic energy: the work done on the slip, divided by its size in that product.
 
     The mass matrix of the slip in units of m r^2 is the kinetic energy with what else moves eliminated.
@@ -38,24 +35,16 @@ def growth_of_energy(inner: Case, outer: Case, x: npt.ArrayLike, n: np.ndarray, 
     return np.sum(n @ M * rates, axis=-1) / np.sqrt(np.sum(n @ M * n, axis=-1))
 
 
-def extreme(
-    side: int,
-    inner: Case,
-    outer: Case,
-    x: npt.ArrayLike,
-    p: Parameters,
-    gamma: Callable[..., np.ndarray] = slip.gamma,
-    closed: bool = False,
-) -> tuple[np.ndarray, float]:
+def extreme(side, inner, outer, x, p, gamma=slip.gamma, closed=False):
     """The direction of greatest (side 1) or least (side -1) gamma of all, and that: the best of a grid, polished.
 
     With `closed` only of those along which both contacts press: elsewhere the ball would lift instead of slipping.
     """
 
-    def growth(n: np.ndarray) -> np.ndarray:
+    def growth(n):
         return side * gamma(inner, outer, x, n, p)
 
-    def allowed(n: np.ndarray) -> np.ndarray:
+    def allowed(n):
         _, A_y, B_x = slip.slip_rates(inner, outer, x, n, p)
         return (not closed) | (A_y >= 0) & (B_x >= 0)
 
@@ -70,7 +59,7 @@ def extreme(
     return best / np.linalg.norm(best), side * float(value)
 
 
-def directions(dimension: int) -> np.ndarray:
+def directions(dimension):
     """Directions (n, dimension) all over the unit sphere, but for those that leave a contact rolling."""
     if dimension == 1:
         return np.array([[1.0], [-1.0]])
@@ -94,7 +83,7 @@ INNER = {
 
 
 @pytest.mark.parametrize(("inner", "outer"), slip.SLIP_ARROWS)
-def test_gamma_of_every_arrow(inner: Case, outer: Case) -> None:
+def test_gamma_of_every_arrow(inner, outer):
     """(53) from the vector field itself at x* + eps n, in random directions: the error is linear in eps."""
     p, x = P.replace(omega_0=10.0), np.array(INNER[inner])
     W = [VARIABLES.index(name) for name in slip.normals(inner, outer)]
@@ -107,7 +96,7 @@ def test_gamma_of_every_arrow(inner: Case, outer: Case) -> None:
 
 
 @pytest.mark.parametrize(("mu", "eta"), [(0.2, 0.2), (0.1, 0.39), (0.9, 0.05), (0.5, 0.3)])
-def test_energy_and_forces_agree_on_omega_01(mu: float, eta: float) -> None:
+def test_energy_and_forces_agree_on_omega_01(mu, eta):
     """gamma by energy is negative in all directions, and forces are admissible, exactly up to (84)."""
     p = P.replace(mu=mu, eta=eta)
     for factor, holds in ((0.5, True), (1 - 1e-6, True), (1 + 1e-6, False)):
@@ -122,7 +111,7 @@ def test_energy_and_forces_agree_on_omega_01(mu: float, eta: float) -> None:
 # --- where the paper's Euclidean claim fails -------------------------------------------------------------------
 
 
-def test_counter_example_to_the_claim_after_80() -> None:
+def test_counter_example_to_the_claim_after_80():
     """With the normal of (75), (0, 0) is not the global maximum of gamma, and gamma > 0 somewhere though RR is stable.
 
     mu = eta = 0.2 at half of omega_01: gamma(0, 0) < 0, forces exist, and gamma_M < 0 for all n, yet the greatest
@@ -151,7 +140,7 @@ def test_counter_example_to_the_claim_after_80() -> None:
         (Case.SS, Case.NS, State(omega_c=9.0, slip_x=-20.0, slip_y=4.0, slip_z=22.0)),
     ],
 )
-def test_the_ball_lifts_where_the_floor_would_have_to_pull(inner: Case, outer: Case, x: State) -> None:
+def test_the_ball_lifts_where_the_floor_would_have_to_pull(inner, outer, x):
     p = P.replace(omega_0=12.0)
     onset = slip.lift_onset(inner, outer, x, p)
     for factor, lifts in ((0.999, False), (1.001, True)):
@@ -167,7 +156,7 @@ def test_the_ball_lifts_where_the_floor_would_have_to_pull(inner: Case, outer: C
 # --- arrows -----------------------------------------------------------------------------------------------------
 
 
-def test_arrows_of_figure_6() -> None:
+def test_arrows_of_figure_6():
     for inner, outer in slip.SLIP_ARROWS:
         assert len(slip.normals(inner, outer)) == TRAITS[outer].dimension - TRAITS[inner].dimension
     for inner, outer in slip.LIFT_ARROWS:
@@ -178,7 +167,7 @@ def test_arrows_of_figure_6() -> None:
 
 
 @pytest.mark.parametrize("eta", [0.2, 0.6])
-def test_definition_3(eta: float) -> None:
+def test_definition_3(eta):
     """Neutral on the thresholds (67), (74), (82), (61), found from wherever near, and where there is no friction."""
     p = P.replace(eta=eta)
     t, SlipStability = thresholds(p), slip.SlipStability
@@ -204,7 +193,7 @@ def test_definition_3(eta: float) -> None:
 
 
 @pytest.mark.parametrize("trial", range(40))
-def test_rolling_is_stable_where_slip_dies_out(trial: int) -> None:
+def test_rolling_is_stable_where_slip_dies_out(trial):
     """By `slip_margin`, which creep determines, at stationary orbits; also from omega_03 to omega_01, for mu > 1."""
     rng = np.random.default_rng(trial)
     p = P.replace(mu=rng.uniform(0.05, 2.5), eta=rng.uniform(0.02, 1), j=rng.uniform(0.2, 0.66))
@@ -215,7 +204,7 @@ def test_rolling_is_stable_where_slip_dies_out(trial: int) -> None:
         assert (slip.stability(Case.RR, p) is slip.SlipStability.STABLE) == dies_out
 
 
-def test_both_consistent_between_73_and_the_cone() -> None:
+def test_both_consistent_between_73_and_the_cone():
     """Off the stationary point the floor's cone allows more drag than gamma of (73), by 1/sqrt(1 - mu^2)."""
     p, omega_c = P.replace(mu=0.9, eta=1e6), 9.0
     T = p.mu * (1 - p.j * p.R * omega_c**2 / p.g)

@@ -1,4 +1,4 @@
-"""Time stepping: exact where it should be, of second order between events, one run and many at once."""
+"""Time stepping is exact where it should be, and one run or many; claim two-methods has its limit of no step."""
 
 import math
 import os
@@ -14,21 +14,7 @@ from analytic.simulation.time_stepping import prepared
 from model import Case, Flow, InputError, Parameters, SimulationError, State
 
 P = Parameters.named("reference")
-SPEED, SPIN = math.sqrt(P.g * P.R), math.sqrt(P.g * P.R) / P.r
-SCALE = np.array([P.R, SPEED, SPEED / P.R, SPIN, SPIN, SPIN, P.R, SPEED])
-"""Natural sizes of the state variables."""
-
-
-def order(steps, errors):
-    """Order of convergence by a fit in logarithms."""
-    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-
-
-def deviations(p, x0, t_end, steps, flow=None, **given):
-    """The event-driven run, and mean errors of time stepping against it with these steps, in natural sizes."""
-    exact = simulate(p, x0, t_end, flow, rtol=1e-11, **given)
-    runs = [simulate(p, x0, t_end, flow, method="time-stepping", timestep=s, **given) for s in steps]
-    return exact, [np.mean(np.abs(run.x[1:] - exact.x[1:]) / SCALE) for run in runs]
+SPEED = math.sqrt(P.g * P.R)
 
 
 @pytest.mark.parametrize(
@@ -48,33 +34,6 @@ def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, given):
         after = step(ball, dt, p.omega_0, constants)
         assert after.residual == 0
         rolls, slips = (middle, slips) if after.case == Case.RR else (rolls, middle)
-
-
-ALL_NINE = [
-    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
-    (12.0, State(0.022, 0.042, 33.0, 39.6, 8.5, 1.5, 0.034, 0.178), ["NN", "SN", "RN", "NS", "SS", "RS", "RR"]),
-    # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
-    (14.5, State(0.0, 0.0, -22.669, -0.266, 27.136, -7.88, 0.015, -0.085), ["SN", "RN", "NR", "NS", "SS", "SR", "RR"]),
-]
-
-
-@pytest.mark.parametrize(("omega_0", "x0", "visited"), ALL_NINE)
-def test_converges_to_the_event_driven_result(omega_0, x0, visited):
-    """First order in the step, in the mean over the run, through every kind of transition and impact."""
-    assert {name for *_, names in ALL_NINE for name in names} == {case.name for case in Case}
-    steps = [4e-4, 2e-4, 1e-4, 5e-5]
-    exact, errors = deviations(P.replace(omega_0=omega_0, eta=0.6), x0, 0.4, steps, sample_interval=2e-3)
-    assert {Case(code).name for code in (*exact.events.from_case, *exact.events.to_case)} >= set(visited)
-    # Single steps may be lucky or not with the moment of an impact within them.
-    assert order(steps, errors) > 0.8
-    assert errors[-1] < steps[-1] * SPEED / P.R * 0.1
-
-
-def test_converges_through_bounces_and_a_ramp():
-    x0, flow, steps = [0.01, 0.1, 8.0, 1.0, 2.0, 30.0, 0.01, 0.0], Flow.ramp(5.0, 25.0, 0.2, 0.1), [4e-4, 2e-4, 1e-4]
-    _, errors = deviations(P.replace(c=2.0), x0, 0.4, steps, flow, restitution=0.5, sample_interval=4e-3)
-    assert order(steps, errors) > 0.7
-    assert errors[-1] < 1e-3
 
 
 FLOWS = [
@@ -130,10 +89,10 @@ def test_no_convergence_keeps_the_samples():
 
 def test_where_no_step_is_given_it_fits_the_problem():
     """At c = 1e4 a five hundredth of sqrt(R/g) is too long."""
-    p, x0 = P.replace(c=1e4), [0.01, 0, 10, 1, 2, 30]
-    assert simulate(p, x0, 0.01, method="time-stepping", sample_interval=1e-3).complete
+    problem = P.replace(c=1e4), [0.01, 0, 10, 1, 2, 30], 0.01
+    assert simulate(*problem, method="time-stepping", sample_interval=1e-3).complete
     with pytest.raises(InputError, match="must be <= 5e-05 s, half of 1/c"):
-        simulate(p, x0, 0.01, method="time-stepping", timestep=1e-3)
+        simulate(*problem, method="time-stepping", timestep=1e-3)
 
 
 # --- many runs at once are the same runs one by one; the step settles and chooses where it once did not ------
@@ -142,7 +101,7 @@ def test_where_no_step_is_given_it_fits_the_problem():
 STEPPING = Settings(method="time-stepping", timestep=1e-3)
 
 
-def groups(mu: float, eta: float, j: float, kappa: float, Omega_0: float) -> Parameters:
+def groups(mu, eta, j, kappa, Omega_0):
     unit = math.sqrt(P.R / P.g)
     return P.replace(mu=mu, eta=eta, j=j, c=kappa / unit, omega_0=Omega_0 / unit)
 

@@ -15,7 +15,7 @@ OWN = "compare.adapters"
 
 
 @pytest.mark.parametrize("name", ["dart", "drake", "pybullet", "rapier", "sapien"])
-def test_an_engine_reaches_its_order(name: str) -> None:
+def test_an_engine_reaches_its_order(name):
     """Semi-implicit steps are leapfrog where a sphere slides; a block that friction can hold rests."""
     try:
         importlib.import_module(f"{OWN}.{name}")
@@ -30,7 +30,7 @@ def test_an_engine_reaches_its_order(name: str) -> None:
     assert run(CASES["lands"], f"{OWN}.{name}:defaults", steps=(2e-3,)).error < 2
 
 
-def test_what_spins_and_rolls_has_second_order() -> None:
+def test_what_spins_and_rolls_has_second_order():
     """A disc on its rim, whose gyroscopic moments are as large as those of its contact (1.6e-2 without these)."""
     coarse, fine = (run(CASES["rolling-disc"], f"{OWN}.mujoco_free:best", steps=(h,)).error for h in (4e-3, 2e-3))
     assert coarse < 1e-3
@@ -39,16 +39,16 @@ def test_what_spins_and_rolls_has_second_order() -> None:
 
 @pytest.mark.slow  # they compile for minutes where they haven't run before
 @pytest.mark.parametrize("engine", ["newton:xpbd", "mujoco_warp:best"])
-def test_engines_on_warp(engine: str) -> None:
+def test_engines_on_warp(engine):
     pytest.importorskip("warp")
     assert run(CASES["sphere-slips-down"], f"{OWN}.{engine}", steps=(2e-3,), limit=600).passed
 
 
-def test_engines_that_are_not_installed() -> None:
+def test_engines_that_are_not_installed():
     with pytest.raises(InputError, match="No module named 'nosuchengine'"):
         run(CASES["block-rests"], "nosuchengine")
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])
-def test_turns(normal: tuple[float, float, float]) -> None:
+def test_turns(normal):
     assert rotated(np.array(upright(normal)), np.array([0, 0, 1])) == pytest.approx(normal)

@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +11,12 @@ from compare.kit.statistics import hops
 from compare.kit.trials import finer
 from compare.subjects.attractors import measure as attractors
 from model import Events, Flow, Header, Parameters, Trajectory
-from model.arrays import Array
 from model.trajectory import SAMPLE
 
 HOPPING = Parameters.named("hopping")
 
 
-def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_undecided_with_what_it_did_last(capsys, tmp_path):
     """JSON, and a page with a row for each set."""
     page = tmp_path / "page.md"
     given = ["--set", "hopping", "--start", "omega_c=20", "--time", "1", "--vary", "omega_0=60,70", "-o", str(page)]
@@ -37,7 +35,7 @@ def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp
     assert len({row.replace("\\|", "").count("|") for row in rows}) == 1
 
 
-def test_tops_of_known_hops() -> None:
+def test_tops_of_known_hops():
     """Parabolas of one period and height: the tops come out between the samples."""
     period, height = 0.2217, 4e-3
     time = np.arange(0, 5, 1e-3)
@@ -52,7 +50,7 @@ def test_tops_of_known_hops() -> None:
 
 
 @pytest.mark.parametrize("size", [0.9, 1.05])
-def test_map_from_hop_to_hop(size: float) -> None:
+def test_map_from_hop_to_hop(size):
     """States that follow a linear map with a complex pair and a fast root: how they change, and what stays."""
     cos, sin = size * math.cos(0.23), size * math.sin(0.23)
     turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 0.03]])
@@ -66,7 +64,7 @@ def test_map_from_hop_to_hop(size: float) -> None:
     assert steady == pytest.approx((5e-3, 0, 57.0, -100.0, 0, 0, 0, 0), rel=1e-6)
 
 
-def test_where_hopping_begins_and_ends() -> None:
+def test_where_hopping_begins_and_ends():
     """At no height; and where disturbances neither grow nor shrink."""
     flows = (58.0, 56.0, 54.0)
     curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
@@ -77,7 +75,7 @@ def test_where_hopping_begins_and_ends() -> None:
     assert (place.value, place.uncertainty) == pytest.approx((0.1, 5e-3))
 
 
-def test_which_balls_hop() -> None:
+def test_which_balls_hop():
     """Those that come down again and again, but none that swings on the wall, sinks, or hardly leaves the floor."""
     t = np.arange(0, 5, 1e-3)
     hop = 4e-3 * np.abs(np.sin(12 * t))
@@ -85,7 +83,7 @@ def test_which_balls_hop() -> None:
     assert not any(hops(_run(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000))
 
 
-def _run(time: Array, y: Array, theta: Array) -> Trajectory:
+def _run(time, y, theta):
     block = np.zeros(len(time), SAMPLE)
     block["time"], block["y"], block["theta"], block["omega_c"] = time, y, theta, np.gradient(theta, time)
     return Trajectory.from_blocks(Header("mujoco", HOPPING, Flow.steady(HOPPING.omega_0)), [block], Events())

@@ -29,11 +29,11 @@ WILD = Task(engine="mujoco", parameters=P, x0=(0, 0, 1e9, 0, 0, 0), t_end=0.2)
 """Diverges."""
 
 
-def tasks(count: int = 9, t_end: float = 0.2) -> list[Task]:
+def tasks(count=9, t_end=0.2):
     return [Task(engine="mujoco", parameters=P.replace(omega_0=5.0 + k), x0=REST, t_end=t_end) for k in range(count)]
 
 
-def data(directory: Path) -> dict[str, dict[str, bytes]]:
+def data(directory):
     """All numbers of all runs of a directory."""
     runs = [run for path in directory.glob("*.h5") for run in storage.load_runs(path).values()]
     numbers = {str(run.header.parameters): {c: getattr(run, c).tobytes() for c in columns(Trajectory)} for run in runs}
@@ -42,21 +42,21 @@ def data(directory: Path) -> dict[str, dict[str, bytes]]:
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, bytes]]:
+def undisturbed(tmp_path_factory):
     directory = tmp_path_factory.mktemp("undisturbed")
     with Campaign(directory, workers=0) as campaign:
         assert campaign.complete(tasks()) == []
     return data(directory)
 
 
-def test_workers_and_batches_change_no_bit(tmp_path: Path, undisturbed) -> None:
+def test_workers_and_batches_change_no_bit(tmp_path, undisturbed):
     with Campaign(tmp_path, workers=2, batch=2) as campaign:
         assert campaign.complete(reversed(tasks())) == []
     assert data(tmp_path) == undisturbed
 
 
-def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
-    seen: list[tuple[object, ...]] = []
+def test_what_is_done_is_not_done_again(tmp_path):
+    seen = []
     with Campaign(tmp_path, workers=0, report=lambda *now: seen.append(now), doing="it") as campaign:
         campaign.complete(tasks(3))
         before = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
@@ -69,9 +69,9 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
     """New runs, of 201 samples each, aren't read, nor is any file twice, as long as there is room."""
-    loaded: list[Path] = []
+    loaded = []
     read = storage.load_runs
     monkeypatch.setattr(storage, "load_runs", lambda path: [loaded.append(path), read(path)][1])
     for room, times in ((2**19, (0, 0, 2)), (500, (2, 4, 8))):
@@ -87,7 +87,7 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: p
         loaded.clear()
 
 
-def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path: Path) -> None:
+def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path):
     with Campaign(tmp_path, workers=0, batch=2, label="first") as campaign:
         campaign.complete([*tasks(3), WILD])
         campaign.label = "first-and-more"
@@ -103,9 +103,7 @@ def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path: Path) -> None:
     assert len(data(tmp_path)) == 5
 
 
-def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
-    tmp_path: Path, undisturbed, monkeypatch
-) -> None:
+def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(tmp_path, undisturbed, monkeypatch):
     """Runs of 201 samples each; the numbers are those of runs that were stored at once."""
     for where, room, short, files in (("held", 2**18, 1e9, 0), ("tight", 500, 1e9, 3), ("slow", 2**18, 0.0, 5)):
         monkeypatch.setattr("compare.kit.campaign.READ", room)
@@ -123,22 +121,22 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
             assert campaign.load(tasks()[4].key).header.parameters == tasks()[4].parameters
 
 
-def test_runs_that_nobody_looks_at_are_not_handed_out(tmp_path: Path) -> None:
+def test_runs_that_nobody_looks_at_are_not_handed_out(tmp_path):
     ended = run_batch(tasks(2), tmp_path, "runs", math.inf, collection.save_means, False)
     assert [(reason, run) for reason, _, run in ended] == [("", None)] * 2
     assert len({file for _, file, _ in ended}) == 1
 
 
-def cut(content: bytes) -> bytes:
+def cut(content):
     return content[:-100]
 
 
-def edited(content: bytes) -> bytes:
+def edited(content):
     return content[:4000] + bytes([content[4000] ^ 1]) + content[4001:]
 
 
 @pytest.mark.parametrize("damage", [cut, edited])
-def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path: Path, undisturbed, capsys, damage) -> None:
+def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path, undisturbed, capsys, damage):
     with Campaign(tmp_path, workers=0, batch=3) as campaign:
         campaign.complete(tasks())
     path = min(tmp_path.iterdir())
@@ -153,7 +151,7 @@ def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path: Path, u
     assert untouched.items() <= {each: each.stat().st_mtime_ns for each in tmp_path.iterdir()}.items()
 
 
-def test_runs_of_other_versions_are_left_alone(tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
     """Those of other versions by what they say, those of before there were batches by their names."""
     with monkeypatch.context() as other:
         other.setattr("model.storage.current_versions", lambda: {"dualball": "9.9"})
@@ -170,7 +168,7 @@ def test_runs_of_other_versions_are_left_alone(tmp_path: Path, capsys, monkeypat
     assert len(before) + 1 == len(list(tmp_path.iterdir()))
 
 
-def test_every_input_is_part_of_the_identity() -> None:
+def test_every_input_is_part_of_the_identity():
     from mjsim import ContactSettings
     from model import Flow
 
@@ -187,7 +185,7 @@ def test_every_input_is_part_of_the_identity() -> None:
     assert Task(**given, flow=Flow.steady(p.omega_0)).key == task.key
 
 
-def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path):
     with Campaign(tmp_path, workers=0) as campaign:
         failures = campaign.complete([*tasks(2), WILD])
         assert [failure.task for failure in failures] == [WILD]
@@ -200,7 +198,7 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path: Path) ->
         assert [failure.task.key for failure in again.complete([WILD])] == [WILD.key]
 
 
-def test_a_run_that_takes_too_long_is_reported(tmp_path: Path) -> None:
+def test_a_run_that_takes_too_long_is_reported(tmp_path):
     endless = Task(engine="mujoco", parameters=P, x0=REST, t_end=6000.0)
     slow = Task(engine="time-stepping", parameters=endless.parameters, x0=REST, t_end=6000.0, sample_interval=0.01)
     with Campaign(tmp_path, workers=0, limit=2) as campaign:
@@ -217,9 +215,7 @@ def deadly(tasks, *where):
     return run_batch(tasks, *where)
 
 
-def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
-    tmp_path: Path, undisturbed, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(tmp_path, undisturbed, monkeypatch):
     monkeypatch.setattr("compare.kit.campaign.run_batch", deadly)
     with Campaign(tmp_path, workers=2, batch=3) as campaign:
         failures = campaign.complete(tasks())
@@ -229,20 +225,20 @@ def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
     assert stored.items() <= undisturbed.items()
 
 
-def square(parent: int, number: int) -> int:
+def square(parent, number):
     if number == 3 and os.getpid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)
     return number**2
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_what_a_killed_process_was_to_do_is_done_here(count: int) -> None:
+def test_what_a_killed_process_was_to_do_is_done_here(count):
     with processes(count) as work:
         assert list(work.map(functools.partial(square, os.getpid()), range(8))) == [k**2 for k in range(8)]
         assert list(work.map(abs, [-1, -2])) == [1, 2]
 
 
-def test_a_full_disk_is_said_once_and_what_is_whole_stays(tmp_path: Path) -> None:
+def test_a_full_disk_is_said_once_and_what_is_whole_stays(tmp_path):
     """A limit on the size of files, in a process of its own, plays the disk that is full."""
     program = f"""
 import resource, sys
@@ -264,13 +260,13 @@ with test_campaign.Campaign({str(tmp_path)!r}, workers=0) as campaign:
 
 
 @pytest.mark.filterwarnings("ignore")  # Dask's own, on shutting down
-def test_a_killed_dask_worker_changes_no_bit(tmp_path: Path, undisturbed) -> None:
+def test_a_killed_dask_worker_changes_no_bit(tmp_path, undisturbed):
     """Of two on loopback one is killed as soon as a task is done."""
     distributed = pytest.importorskip("distributed")
     two, killed = {"n_workers": 2, "threads_per_worker": 1, "processes": True}, []
     with distributed.LocalCluster(**two, host="127.0.0.1", dashboard_address=None) as cluster:
 
-        def kill_one(doing: str, done: int, total: int, failed: int) -> None:
+        def kill_one(doing, done, total, failed):
             if not killed and done:
                 killed.append(next(iter(cluster.workers.values())).pid)
                 os.kill(killed[0], signal.SIGKILL)
@@ -290,15 +286,13 @@ class Orphaned(ThreadPoolExecutor):
         self.asked += 1
         if self.asked <= 2:
             return super().submit(*call)
-        gone: Future[object] = Future()
+        gone = Future()
         gone.cancel()
         return gone
 
 
 @pytest.mark.parametrize("slow", [False, True])
-def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
-    slow: bool, tmp_path: Path, undisturbed, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(slow, tmp_path, undisturbed, monkeypatch):
     """Also where all that it did is there before it is missed."""
     if slow:
         monkeypatch.setattr("compare.kit.campaign.wait", lambda futures, **how: wait(futures))
@@ -312,14 +306,14 @@ def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
     assert data(tmp_path) == undisturbed
 
 
-def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_does_not_answer(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("compare.kit.workers.PATIENCE", 0.5)
     with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         dask("tcp://127.0.0.1:1")
 
 
-def test_bad_campaigns(tmp_path: Path) -> None:
+def test_bad_campaigns(tmp_path):
     with pytest.raises(InputError, match="workers = -1"):
         Campaign(tmp_path, workers=-1)
     with pytest.raises(InputError, match="batch = 0"):
@@ -333,7 +327,7 @@ def test_bad_campaigns(tmp_path: Path) -> None:
         Task(engine="mujoco", parameters=P, x0=(0.0, 1.0), t_end=1)
 
 
-def test_workers_end_with_a_killed_campaign(tmp_path: Path) -> None:
+def test_workers_end_with_a_killed_campaign(tmp_path):
     program = tmp_path / "campaign.py"
     program.write_text("""
 import time
@@ -353,7 +347,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_path: Path, by: signal.Signals) -> None:
+def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_path, by):
     # Runs of some tenths of a second: however late the signal comes, most of them are still to be done.
     sweep = f"sweep --vary omega_0=5:10:24 --batch 2 --time 20 -o {tmp_path} --workers".split()
     process = subprocess.Popen(

@@ -9,35 +9,35 @@ from compare.kit.programme import needed
 from compare.kit.sets import COUNT, COVERAGE, sets
 
 
-def test_names_are_unique() -> None:
+def test_names_are_unique():
     for names in ([claim.id for claim in CLAIMS], [protocol.name for protocol in PROTOCOLS]):
         assert max(Counter(names).values()) == 1
 
 
-def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols() -> None:
+def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols():
     used = {name for claim in CLAIMS for name in claim.protocols}
     assert used == {protocol.name for protocol in PROTOCOLS}
 
 
-def test_the_table_of_who_measures_what_lists_every_protocol() -> None:
+def test_the_table_of_who_measures_what_lists_every_protocol():
     assert COVERAGE.keys() == {protocol.name for protocol in PROTOCOLS}
     asked = {name for each in COVERAGE.values() for name in (*each.quick, *each.limit, *each.as_it_comes)}
     assert asked <= sets(Level.QUICK).keys()
 
 
-def test_protocols_come_after_what_they_need() -> None:
+def test_protocols_come_after_what_they_need():
     for k, protocol in enumerate(PROTOCOLS):
         assert set(protocol.needs) <= {earlier.name for earlier in PROTOCOLS[:k]}
         assert needed(PROTOCOLS, [protocol.name])[-1] is protocol
 
 
-def test_what_is_corrected_or_expected_to_fail_says_why() -> None:
+def test_what_is_corrected_or_expected_to_fail_says_why():
     for claim in CLAIMS:
         if claim.text is Text.CORRECTED or claim.expected != "confirmed":
             assert claim.reason, claim.id
 
 
-def test_sets_are_many_and_different() -> None:
+def test_sets_are_many_and_different():
     quick, default = sets(Level.QUICK), sets(Level.DEFAULT)
     assert len(quick) >= 6
     assert len(default) == COUNT[Level.DEFAULT] >= 24

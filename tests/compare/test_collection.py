@@ -22,7 +22,7 @@ OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
 
 
 @pytest.fixture(scope="module")
-def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def grid(tmp_path_factory):
     """The runs of a grid, a batch each."""
     directory = tmp_path_factory.mktemp("grid")
     sets = [P.replace(omega_0=omega, eta=eta) for omega in OMEGAS for eta in ETAS]
@@ -32,12 +32,12 @@ def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def runs(grid: Path, tmp_path: Path) -> Path:
+def runs(grid, tmp_path):
     """A copy of them, to be damaged."""
     return Path(shutil.copytree(grid, tmp_path / "runs"))
 
 
-def test_the_varied_parameters_of_a_grid_are_dimensions(grid: Path, tmp_path: Path) -> None:
+def test_the_varied_parameters_of_a_grid_are_dimensions(grid, tmp_path):
     assert collection.collect(grid, tmp_path / "all.h5") == 6
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         assert dict(data.sizes) == {"eta": 2, "omega_0": 3}
@@ -57,7 +57,7 @@ def test_the_varied_parameters_of_a_grid_are_dimensions(grid: Path, tmp_path: Pa
     assert len(about["names"]) == 6
 
 
-def test_the_varied_parameters_of_other_runs_are_coordinates(runs: Path, tmp_path: Path) -> None:
+def test_the_varied_parameters_of_other_runs_are_coordinates(runs, tmp_path):
     """Of a grid in which a point is missing."""
     min(runs.glob("*.h5")).unlink()
     assert collection.collect(runs, tmp_path / "all.h5") == 5
@@ -69,7 +69,7 @@ def test_the_varied_parameters_of_other_runs_are_coordinates(runs: Path, tmp_pat
     assert collection.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
 
 
-def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
+def test_the_law_of_drag_is_kept(tmp_path):
     sets = [P, P.replace(drag="quadratic", nu_f=1e-6)]
     with Campaign(tmp_path / "runs", workers=0) as campaign:
         assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
@@ -82,7 +82,7 @@ def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
     assert collection.described(older)["varied"] == ["nu_f"]
 
 
-def test_theory_stands_beside_what_was_measured(tmp_path: Path) -> None:
+def test_theory_stands_beside_what_was_measured(tmp_path):
     """For a ball that slips at both points; its height, which is free in flight along the wall, has no prediction."""
     sets = {"SS": P.replace(omega_0=25.0), "NR": P.replace(omega_0=40.0)}
     states = {name: analytic.solution(p, name).state for name, p in sets.items()}
@@ -97,7 +97,7 @@ def test_theory_stands_beside_what_was_measured(tmp_path: Path) -> None:
         np.testing.assert_array_equal(np.isnan(data.y_theory), [False, True])
 
 
-def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ(runs: Path, tmp_path: Path) -> None:
+def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ(runs, tmp_path):
     first, copy = min(runs.glob("*.h5")), runs / "copies" / "copy.h5"
     ((key, run),) = storage.load_runs(first).items()
     copy.parent.mkdir()
@@ -112,7 +112,7 @@ def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ
 
 
 @pytest.mark.parametrize(("damaged", "named"), [(2, 2), (6, 5)])
-def test_what_cannot_be_read_is_named(runs: Path, tmp_path: Path, damaged: int, named: int) -> None:
+def test_what_cannot_be_read_is_named(runs, tmp_path, damaged, named):
     paths = sorted(runs.glob("*.h5"))[:damaged]
     for path in paths:
         path.write_bytes(path.read_bytes()[:-1])
@@ -123,7 +123,7 @@ def test_what_cannot_be_read_is_named(runs: Path, tmp_path: Path, damaged: int, 
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_no_run_is_left_out(runs: Path) -> None:
+def test_what_is_no_run_is_left_out(runs):
     """The collection of the last time, and the journal of a run that goes on."""
     (runs / "x.journal").mkdir()
     (runs / "x.journal" / "000000.h5").touch()
@@ -131,9 +131,7 @@ def test_what_is_no_run_is_left_out(runs: Path) -> None:
     assert collection.collect(runs, runs / "all.h5") == 6
 
 
-def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(tmp_path, capsys):
     tasks = [Task(engine="event", parameters=P.replace(omega_0=omega), x0=(0.0,) * 8, t_end=0.1) for omega in OMEGAS]
     with Campaign(tmp_path / "runs", workers=0) as campaign:
         campaign.complete(tasks)
@@ -149,9 +147,7 @@ def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
     assert collection.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
 
 
-def test_means_alone_make_the_same_collection_in_any_number_of_processes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_path, capsys, monkeypatch):
     """In less than a third of the space; what is done is not done again."""
     monkeypatch.setattr(collection, "SHARE", 1)
     ranges = ["--vary", "omega_0=5:10:6", "--vary", "eta=0.1,0.3"]
@@ -180,7 +176,7 @@ def test_means_alone_make_the_same_collection_in_any_number_of_processes(
     assert "holds another sweep (means_only = True, not False)" in capsys.readouterr().err
 
 
-def test_a_sweep_is_sampled_as_often_as_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sweep_is_sampled_as_often_as_asked(tmp_path, capsys):
     common = ["sweep", "--vary", "omega_0=5,6", "--time", "0.2", "--workers", "0", "--quiet", "-o", str(tmp_path / "s")]
     for wrong in ("0.5", "1e-5"):
         assert cli.main([*common, "--sample-interval", wrong]) == 2

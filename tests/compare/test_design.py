@@ -2,8 +2,6 @@
 
 import json
 import math
-from pathlib import Path
-from typing import Any
 
 import pytest
 import tomli_w
@@ -12,7 +10,7 @@ from analytic import operating_range, thresholds
 from compare.commands import cli
 from model import Parameters
 
-METER: dict[str, Any] = {
+METER = {
     "fluid": {"nu_f": 1.004e-6, "rho_f": 998.2},
     "flow": {"slowest": 3.0, "fastest": 18.0},
     "bounds": {"r": [0.004, 0.006], "R": 0.02, "mu": [0.1, 0.3], "eta": [0.1, 0.6]},
@@ -21,7 +19,7 @@ METER: dict[str, Any] = {
 }
 
 
-def written(folder: Path, **changes: Any) -> str:
+def written(folder, **changes):
     """A file of `METER` with other tables; None leaves one out."""
     asked = {name: value for name, value in {**METER, **changes}.items() if value is not None}
     path = folder / "meter.toml"
@@ -29,7 +27,7 @@ def written(folder: Path, **changes: Any) -> str:
     return str(path)
 
 
-def test_design_as_json_and_as_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_design_as_json_and_as_a_page(tmp_path, capsys):
     page = tmp_path / "meter.html"
     assert cli.main(["design", written(tmp_path), "-o", str(page), "--json"]) == 0
     made = json.loads(capsys.readouterr().out)
@@ -56,7 +54,7 @@ def test_design_as_json_and_as_a_page(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "cork can't be used" in text
 
 
-def test_design_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_design_as_tables(tmp_path, capsys):
     """Without a material that is good enough: the best there is, and exit code 1."""
     ball = {"r": 0.005, "R": [0.02, 0.03], "rho_b": [2000, 3000], "mu": 0.2, "eta": 0.2}
     path = written(tmp_path, bounds=ball, material=None, tolerances=None, flow={"slowest": 0, "fastest": 60})
@@ -68,7 +66,7 @@ def test_design_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert shown.startswith("Warning: the paper's model doesn't hold for this fluid.")
 
 
-def test_design_warns_and_says_when_there_is_no_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_design_warns_and_says_when_there_is_no_range(tmp_path, capsys):
     """Stokes' law is meant for Re < 1, a ball that slips in water has thousands; a smooth floor drives nothing."""
     ball = {"r": 0.005, "R": 0.02, "rho_b": 7850, "mu": 0.2, "eta": 0.2}
     flow = {"slowest": 3, "fastest": 10}
@@ -82,7 +80,7 @@ def test_design_warns_and_says_when_there_is_no_range(tmp_path: Path, capsys: py
 
 
 FLUID, FLOW, BOUNDS = METER["fluid"], METER["flow"], METER["bounds"]
-WRONG: list[tuple[dict[str, Any], str]] = [
+WRONG = [
     ({"fluid": FLUID | {"nu_f": -1.0}}, "fluid.nu_f = -1 m2 s-1 is out of range: must be > 0"),
     ({"fluid": FLUID | {"rho_f": -5}}, "fluid.rho_f = -5 kg m-3 is out of range: must be > 0"),
     ({"fluid": {"rho_f": 998.2}}, "missing entry of [fluid] 'nu_f'"),
@@ -108,7 +106,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("changes", "message"), WRONG)
-def test_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: dict[str, Any], message: str) -> None:
+def test_refused(tmp_path, capsys, changes, message):
     path = written(tmp_path, **changes)
     assert cli.main(["design", path]) == 2
     captured = capsys.readouterr()

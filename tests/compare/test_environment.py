@@ -17,14 +17,14 @@ SCENE = """<mujoco><worldbody><geom name="Tür" type="plane" size="1 1 .1"/>
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def here(tmp_path_factory):
     """A directory with a run, whose name has a space and letters beyond ASCII."""
     made = tmp_path_factory.mktemp("mit Öl ω")
     storage.save(analytic.simulate(Parameters.named("reference"), [0] * 6, 0.1), made / "run é.h5")
     return made
 
 
-def dualball(where: Path, *words: str, before: str = "", **environment: str) -> subprocess.CompletedProcess[bytes]:
+def dualball(where, *words, before="", **environment):
     """The program in a shell, after redirections; without what pytest's own environment says of output."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "LC_", "LANG"))}
     shell = ["bash", "-c", f'"$@" {before}', "bash", sys.executable, "-m", "compare", *words]
@@ -37,15 +37,15 @@ def dualball(where: Path, *words: str, before: str = "", **environment: str) -> 
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-16"])
-def test_any_encoding(here: Path, encoding: str) -> None:
+def test_any_encoding(here, encoding):
     done = dualball(here, "predict", PYTHONIOENCODING=encoding)
     assert done.returncode == 0
     shown = done.stdout.decode(encoding)
     assert ("omega01" in shown) is (encoding != "utf-16")
 
 
-def test_what_cannot_be_shown_is_spelled() -> None:
-    def shown(text: str, encoding: str) -> str:
+def test_what_cannot_be_shown_is_spelled():
+    def shown(text, encoding):
         return "".join(pages.spelled(UnicodeEncodeError(encoding, text, k, k + 1, ""))[0] for k in range(len(text)))
 
     assert shown("ω₀₁Ωω̃²√±…é", "ascii") == "omega01Omegaomega2sqrt +-...e"
@@ -53,14 +53,14 @@ def test_what_cannot_be_shown_is_spelled() -> None:
 
 
 @pytest.mark.parametrize("backend", ["nonsense", "module://matplotlib_inline.backend_inline", "tkagg"])
-def test_any_backend(here: Path, backend: str) -> None:
+def test_any_backend(here, backend):
     done = dualball(here, "inspect", "run é.h5", "--plot", "run ü.png", MPLBACKEND=backend)
     assert done.returncode == 0
     assert (here / "run ü.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("words", ["predict", "--help", "--version"])
-def test_a_full_output_is_said(here: Path, words: str) -> None:
+def test_a_full_output_is_said(here, words):
     done = dualball(here, words, before=">/dev/full")
     assert (done.returncode, done.stdout) == (2, b"")
     assert done.stderr.startswith(b"dualball: error: ")
@@ -68,13 +68,13 @@ def test_a_full_output_is_said(here: Path, words: str) -> None:
     assert done.stderr.count(b"\n") == 1
 
 
-def test_a_reader_that_has_gone_is_no_error(here: Path) -> None:
+def test_a_reader_that_has_gone_is_no_error(here):
     done = dualball(here, "predict", before="| true; exit ${PIPESTATUS[0]}")
     assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
-def test_closed_outputs_take_nothing_with_them(here: Path, closed: str) -> None:
+def test_closed_outputs_take_nothing_with_them(here, closed):
     """A file that is opened next would have their numbers, and what a library prints would go into it."""
     path = here / "closed.h5"
     assert dualball(here, "simulate", "--time", "0.05", "-o", str(path), before=closed).returncode == 0
@@ -83,11 +83,11 @@ def test_closed_outputs_take_nothing_with_them(here: Path, closed: str) -> None:
 
 
 @pytest.mark.parametrize("home", [{"HOME": "/nonexistent"}, {"HOME": ""}])
-def test_no_home(here: Path, home: dict[str, str]) -> None:
+def test_no_home(here, home):
     assert dualball(here, "inspect", "run é.h5", "--plot", "home.svg", **home).returncode == 0
 
 
-def test_a_directory_in_which_nothing_can_be_written() -> None:
+def test_a_directory_in_which_nothing_can_be_written():
     """Not even by the superuser."""
     where = Path("/proc")
     assert dualball(where, "simulate", "--start", "omega_c=1e9", "--time", "0.05").returncode == 1
@@ -99,7 +99,7 @@ def test_a_directory_in_which_nothing_can_be_written() -> None:
         assert done.stderr.count(b"\n") == 1
 
 
-def test_names_beyond_ascii_in_the_c_locale(here: Path) -> None:
+def test_names_beyond_ascii_in_the_c_locale(here):
     (here / "Würfel.xml").write_text(SCENE, "utf-8")
     done = dualball(here, "forecast", "Würfel.xml", "-o", "Würfel.html", LC_ALL="C")
     assert done.returncode == 0, done.stderr

@@ -5,14 +5,12 @@ import json
 import math
 import re
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
 
 from compare.bench import contact_law, forecast, forecast_page
-from compare.bench.forecast import Forecast
 from compare.bench.settled import STILL, settle
 from compare.commands import cli
 from model import InputError
@@ -21,12 +19,12 @@ FLOOR = '<geom name="floor" type="plane" size="20 20 .1" {}/>'
 SLOPE = FLOOR.format('euler="0 15 0"')
 
 
-def box(place: str = ".013 0 .0525", angle: str = "0 15 0", name: str = "box") -> str:
+def box(place=".013 0 .0525", angle="0 15 0", name="box"):
     geom = f'<geom name="{name}" type="box" size=".05 .05 .05" mass="1"/>'
     return f'<body name="{name}" pos="{place}" euler="{angle}"><freejoint/>{geom}</body>'
 
 
-def mjcf(world: str, option: str = "", geom: str = 'friction=".6"', rest: str = "", flag: str = "") -> str:
+def mjcf(world, option="", geom='friction=".6"', rest="", flag=""):
     start = f"<mujoco><option {option}>{flag}</option><default><geom {geom}/></default>"
     return f"{start}<worldbody>{world}</worldbody>{rest}</mujoco>"
 
@@ -89,7 +87,7 @@ SCENES = {
 }
 
 
-def settled(text: str, keyframe: str | None = None, limit: float = 10.0) -> tuple[Any, Any, Forecast]:
+def settled(text, keyframe=None, limit=10.0):
     """A model, its state, and its forecast."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -99,7 +97,7 @@ def settled(text: str, keyframe: str | None = None, limit: float = 10.0) -> tupl
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_depth_creep_rebound_and_decay_are_as_predicted(scene: str) -> None:
+def test_depth_creep_rebound_and_decay_are_as_predicted(scene):
     model, data, found = settled(SCENES[scene])
     assert not found.settled.moving
     for pair in found.pairs:
@@ -138,7 +136,7 @@ SLIDING = {
 
 
 @pytest.mark.parametrize("name", SLIDING)
-def test_contact_is_lost_from_the_predicted_speed_on(name: str) -> None:
+def test_contact_is_lost_from_the_predicted_speed_on(name):
     option, geom, shape = SLIDING[name]
     rest = PAIR.format(".2 1") if name == "solreffriction" else ""
     floor = FLOOR.format('surfacevel="1e-12 0 0"')  # what doesn't move at the beginning never does
@@ -178,7 +176,7 @@ STEPS = {
 
 
 @pytest.mark.parametrize("scene", STEPS)
-def test_small_motions_grow_from_the_predicted_step_on(scene: str) -> None:
+def test_small_motions_grow_from_the_predicted_step_on(scene):
     model, data, found = settled(STEPS[scene])
     left = []
     for share in (1 / 1.1, 1.3):
@@ -206,7 +204,7 @@ ADVISED = [name for name in SCENES | DEEP if name != "slope, noslip"]
 
 
 @pytest.mark.parametrize("scene", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in ADVISED])
-def test_advice_does_what_it_says(scene: str) -> None:
+def test_advice_does_what_it_says(scene):
     model, data, found = settled((SCENES | DEEP)[scene])
     found, after, held = forecast.tried(model, data, found, 10.0)
     assert after
@@ -243,9 +241,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_what_has_no_forecast_gets_one_line(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_has_no_forecast_gets_one_line(text, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("scene.xml").write_text(text)
     code, said = REFUSED[text]
@@ -256,7 +252,7 @@ def test_what_has_no_forecast_gets_one_line(
     assert [each.name for each in tmp_path.iterdir()] == ["scene.xml"]
 
 
-def test_a_keyframe_that_does_not_exist_and_one_that_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_keyframe_that_does_not_exist_and_one_that_does(tmp_path, capsys):
     path = tmp_path / "scene.xml"
     path.write_text(SCENES["gripper"])
     assert cli.main(["forecast", str(path), "--keyframe", "dropped"]) == 2
@@ -266,7 +262,7 @@ def test_a_keyframe_that_does_not_exist_and_one_that_does(tmp_path: Path, capsys
     assert cli.main(["forecast", str(path), "--keyframe", "0", "--max-creep", "1e-3", "--max-depth", "1e-3"]) == 0
 
 
-def test_the_page_the_json_and_what_the_engine_replaces(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_page_the_json_and_what_the_engine_replaces(tmp_path, capsys):
     path, page = tmp_path / "scene.xml", tmp_path / "page.html"
     path.write_text(SCENES["hidden mix"].replace("<option ", '<option timestep=".008" '))
     assert cli.main(["forecast", str(path), "--try", "--json", "-o", str(page)]) == 0
@@ -278,7 +274,7 @@ def test_the_page_the_json_and_what_the_engine_replaces(tmp_path: Path, capsys: 
     assert "To paste: MJCF" in page.read_text("utf-8")
 
 
-def test_two_hundred_contacts_stay_readable() -> None:
+def test_two_hundred_contacts_stay_readable():
     _, _, found = settled(
         mjcf(FLOOR.format("") + "".join(box(f"{k / 5} 0 .0499", "0 0 0", f"box{k}") for k in range(50)))
     )
@@ -288,7 +284,7 @@ def test_two_hundred_contacts_stay_readable() -> None:
     assert list(forecast_page.sentences(found)) == ["Nothing needs to change."]
 
 
-def test_a_pair_that_no_joint_can_part_has_a_forecast_nevertheless() -> None:
+def test_a_pair_that_no_joint_can_part_has_a_forecast_nevertheless():
     turning = f'<body pos="0 0 .0499"><joint axis="0 0 1"/><geom name="box" {BLOCK} mass="1"/></body>'
     across = turning.replace("<joint ", '<joint type="slide" ').replace("0 0 1", "1 0 0")
     for body in (turning, across):
@@ -297,7 +293,7 @@ def test_a_pair_that_no_joint_can_part_has_a_forecast_nevertheless() -> None:
         assert any("No joint can part these" in line for line in forecast_page.sentences(found))
 
 
-def test_what_rattles_is_measured_by_means_and_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_rattles_is_measured_by_means_and_ends_with_1(tmp_path, capsys):
     path = tmp_path / "scene.xml"
     path.write_text(mjcf(LEVEL, geom='solref="-5000 0"'))
     assert cli.main(["forecast", str(path), "--settle", "1", "--json"]) == 1
@@ -309,7 +305,7 @@ def test_what_rattles_is_measured_by_means_and_ends_with_1(tmp_path: Path, capsy
     assert pair["creep_measured"] < STILL
 
 
-def test_what_sleeps_is_forecast_awake() -> None:
+def test_what_sleeps_is_forecast_awake():
     sleepy = mjcf(ON_SLOPE, 'cone="elliptic" sleep_tolerance=".01"', flag='<flag sleep="enable"/>')
     _, _, found = settled(sleepy)
     (pair,) = found.pairs
@@ -325,8 +321,8 @@ POLE = (
 HIP = '<actuator><motor name="hip" joint="hip" ctrlrange="-9 9"/></actuator>'
 
 
-def test_a_robot_that_falls_is_said_to_and_one_that_its_controller_holds_is_not() -> None:
-    def hold(model: Any, data: Any) -> None:
+def test_a_robot_that_falls_is_said_to_and_one_that_its_controller_holds_is_not():
+    def hold(model, data):
         data.ctrl[0] = -50 * data.qpos[0] - 5 * data.qvel[0]
 
     text = mjcf(FLOOR.format("") + POLE + LEVEL.removeprefix(FLOOR.format("")).replace('pos="0', 'pos="1'), rest=HIP)
@@ -340,13 +336,11 @@ def test_a_robot_that_falls_is_said_to_and_one_that_its_controller_holds_is_not(
     assert [pair.name for pair in held.pairs] == ["floor / box"]
 
 
-def test_controls_come_by_number_or_name_and_bad_ones_get_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_controls_come_by_number_or_name_and_bad_ones_get_one_line(tmp_path, capsys):
     path = tmp_path / "scene.xml"
     path.write_text(SCENES["gripper"].replace("<motor joint", '<motor name="{}" joint').format("l", "r"))
 
-    def pairs(*args: str) -> Any:
+    def pairs(*args):
         assert cli.main(["forecast", str(path), "--json", *args]) == 0
         return json.loads(capsys.readouterr().out)["before"]["pairs"]
 
@@ -365,7 +359,7 @@ def test_controls_come_by_number_or_name_and_bad_ones_get_one_line(
         assert error.count("\n") == 1
 
 
-def test_a_contact_counts_from_a_thousandth_of_the_lighter_bodys_weight() -> None:
+def test_a_contact_counts_from_a_thousandth_of_the_lighter_bodys_weight():
     wall = '<geom name="wall" type="plane" size="1 1 .1" euler="0 90 0"/>'
     leaning = (
         '<body pos=".05 0 1"><joint type="slide" axis="1 0 0" stiffness="1" damping="1" springref="{}"/>'
@@ -376,7 +370,7 @@ def test_a_contact_counts_from_a_thousandth_of_the_lighter_bodys_weight() -> Non
         settled(mjcf(wall + leaning.format(-0.005)))
 
 
-def test_where_no_option_helps_coulomb_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_where_no_option_helps_coulomb_does(tmp_path, capsys):
     path, page = tmp_path / "scene.xml", tmp_path / "page.html"
     path.write_text(SCENES["ball held by rolling friction, pyramidal"])
     assert cli.main(["forecast", str(path), "--try", "-o", str(page)]) == 0
@@ -388,7 +382,7 @@ def test_where_no_option_helps_coulomb_does(tmp_path: Path, capsys: pytest.Captu
     assert "<pre" in page.read_text("utf-8")
 
 
-def test_what_the_engine_replaces_takes_a_line_a_kind() -> None:
+def test_what_the_engine_replaces_takes_a_line_a_kind():
     boxes = "".join(box(f"{k / 5} 0 .0499", "0 0 0", f"box{k}") for k in range(20))
     _, _, found = settled(mjcf(FLOOR.format('solref=".03 1"') + boxes))
     (line,) = (line for line in forecast_page.sentences(found) if "replaces" in line)

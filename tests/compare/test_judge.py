@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -23,16 +22,16 @@ FINE = quantity("omega_c").resolves / 10
 """Relative uncertainty with which a check of omega_c resolves enough."""
 
 
-def measured(value: float, uncertainty: float, name: str = "omega_c") -> Records:
+def measured(value, uncertainty, name="omega_c"):
     return Records((tests.measured.measured("settled", name, value, uncertainty, P, "mine"),))
 
 
-def claim(bearing: Bearing | None = None) -> Claim:
+def claim(bearing=None):
     bearing = bearing or Bearing(protocol="settled", quantity="omega_c", predict=lambda m: m.parameters.omega_0)
     return Claim(id="it", section="Stationary states", source="(1)", statement="It goes round.", bearings=(bearing,))
 
 
-def outcome(of: Claim, records: Records) -> Outcome:
+def outcome(of, records):
     return judge([of], records)[0].outcome
 
 
@@ -46,11 +45,11 @@ def outcome(of: Claim, records: Records) -> Outcome:
         (math.nan, FINE, Outcome.REFUTED),
     ],
 )
-def test_a_verdict_is_computed_from_the_numbers(value: float, uncertainty: float, expected: Outcome) -> None:
+def test_a_verdict_is_computed_from_the_numbers(value, uncertainty, expected):
     assert outcome(claim(), measured(value, uncertainty)) is expected
 
 
-def test_without_measurements_it_was_not_run_and_the_reason_is_kept() -> None:
+def test_without_measurements_it_was_not_run_and_the_reason_is_kept():
     why, other = Missing("settled", "mine", "nothing settles"), Missing("other", "mine", "no matter")
     (verdict,) = judge([claim()], Records((), (why, other, why)))
     assert verdict.outcome is Outcome.NOT_RUN
@@ -60,7 +59,7 @@ def test_without_measurements_it_was_not_run_and_the_reason_is_kept() -> None:
 
 
 @pytest.mark.parametrize(("fine", "expected"), [(2, Outcome.CONFIRMED), (1, Outcome.INCONCLUSIVE)])
-def test_most_numbers_must_be_fine_enough_to_tell(fine: int, expected: Outcome) -> None:
+def test_most_numbers_must_be_fine_enough_to_tell(fine, expected):
     sure, coarse = measured(P.omega_0, FINE), measured(P.omega_0, 0.01 * P.omega_0)
     records = sum([sure] * fine + [coarse] * 2, Records())
     (verdict,) = judge([claim()], records)
@@ -68,7 +67,7 @@ def test_most_numbers_must_be_fine_enough_to_tell(fine: int, expected: Outcome) 
     assert verdict.resolving_power["omega_c"] < 1e-6
 
 
-def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only() -> None:
+def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only():
     predictions = (lambda m: {}["no such state"], lambda m: 1 / 0)
     claims = [claim(replace(claim().bearings[0], predict=predict)) for predict in predictions]
     unknown, broken, right = judge([*claims, claim()], measured(P.omega_0, FINE))
@@ -77,7 +76,7 @@ def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own
     assert "division by zero" in broken.error
 
 
-def test_bounds_hold_on_one_side_and_what_must_be_equal_has_no_tolerance() -> None:
+def test_bounds_hold_on_one_side_and_what_must_be_equal_has_no_tolerance():
     for relation, agrees in ((Relation.AT_MOST, -1), (Relation.AT_LEAST, 1)):
         of = claim(replace(claim().bearings[0], relation=relation))
         assert outcome(of, measured(P.omega_0 * (1 + agrees), FINE)) is Outcome.CONFIRMED
@@ -87,14 +86,14 @@ def test_bounds_hold_on_one_side_and_what_must_be_equal_has_no_tolerance() -> No
     assert outcome(of, measured(4.0, 0.0, "cases")) is Outcome.REFUTED
 
 
-def test_a_prediction_may_be_uncertain_itself() -> None:
+def test_a_prediction_may_be_uncertain_itself():
     of = claim(replace(claim().bearings[0], predict=lambda m: Measured(m.parameters.omega_0 + 1e-7, 1e-7)))
     (verdict,) = judge([of], measured(P.omega_0, FINE / 100))
     assert verdict.outcome is Outcome.CONFIRMED
     assert verdict.checks[0].tolerance == pytest.approx(COVERAGE * 1e-7, rel=1e-3)
 
 
-def test_resolving_power_is_the_error_of_theory_that_would_be_noticed() -> None:
+def test_resolving_power_is_the_error_of_theory_that_would_be_noticed():
     records = measured(P.omega_0, FINE)
     (verdict,) = judge([claim()], records)
     power = verdict.resolving_power["omega_c"]
@@ -103,7 +102,7 @@ def test_resolving_power_is_the_error_of_theory_that_would_be_noticed() -> None:
         assert outcome(claim(wrong), records) is noticed
 
 
-def test_predictions_are_forgotten_between_judgements() -> None:
+def test_predictions_are_forgotten_between_judgements():
     values = {"omega_c": P.omega_0}
     of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: theory(values.__getitem__, "omega_c")))
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.CONFIRMED
@@ -111,7 +110,7 @@ def test_predictions_are_forgotten_between_judgements() -> None:
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.REFUTED
 
 
-def test_claims_that_are_none_are_refused() -> None:
+def test_claims_that_are_none_are_refused():
     with pytest.raises(InputError, match="omega_c"):
         Bearing(protocol="settled", quantity="omega_cc", predict=lambda m: 0.0)
     assert Claim(id="it", section="", source="", statement="", algebra=lambda: []).text is Text.FORMAL
@@ -130,14 +129,14 @@ def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
     assert not judge([false], Records(tuple(of_the_study)))[0].passed
 
 
-def test_judging_a_claim_takes_no_longer_than_it_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_judging_a_claim_takes_no_longer_than_it_may(tmp_path, monkeypatch):
     """Whatever the files say; what is asked of theory afterwards comes too late as well."""
 
-    def endless() -> None:
+    def endless():
         while True:
             pass
 
-    def hear(of: Claim, testimony: object) -> None:
+    def hear(of, testimony):
         with pytest.raises(TimeoutError):
             endless()
         endless()

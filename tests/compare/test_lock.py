@@ -18,9 +18,7 @@ from tests.commands import refused
 HOLD = "import sys, time; from compare.kit.lock import Lock; lock = Lock(__import__('pathlib').Path(sys.argv[1]))"
 
 
-def test_a_second_program_is_refused_until_the_first_is_dead(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_second_program_is_refused_until_the_first_is_dead(tmp_path, capsys):
     command = f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch".split()
     program, here = f"{HOLD}; print(flush=True); time.sleep(600)", Path(__file__).parents[2]
     first = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], cwd=here, stdout=subprocess.PIPE)
@@ -37,7 +35,7 @@ def test_a_second_program_is_refused_until_the_first_is_dead(
     assert not list(tmp_path.glob(".*"))
 
 
-def test_a_lock_of_a_machine_that_is_gone_is_nobodys(tmp_path: Path) -> None:
+def test_a_lock_of_a_machine_that_is_gone_is_nobodys(tmp_path):
     for left in ("process 1 on elsewhere, since 2001-01-01 00:00 UTC", ""):
         (tmp_path / ".lock").write_text(left)
         with Campaign(tmp_path, workers=0):
@@ -45,14 +43,14 @@ def test_a_lock_of_a_machine_that_is_gone_is_nobodys(tmp_path: Path) -> None:
         assert not list(tmp_path.iterdir())
 
 
-def test_a_failed_campaign_lets_go(tmp_path: Path) -> None:
+def test_a_failed_campaign_lets_go(tmp_path):
     with pytest.raises(ZeroDivisionError), Campaign(tmp_path, workers=0):
         raise ZeroDivisionError
     Lock(tmp_path).release()
 
 
 @pytest.mark.parametrize("rounds", [20, pytest.param(400, marks=pytest.mark.slow)])
-def test_no_two_have_it_at_once(tmp_path: Path, rounds: int) -> None:
+def test_no_two_have_it_at_once(tmp_path, rounds):
     """Programs that take it and let go again, as fast as they can: each writes its name and finds it unchanged."""
     program = f"""
 {HOLD.partition("; lock")[0]}
@@ -78,10 +76,8 @@ while done < {rounds}:
     assert [each.wait(timeout=120) for each in several] == [0, 0, 0]
 
 
-def test_a_file_system_without_locks_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def none(*_: object) -> None:
+def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
+    def none(*_):
         raise OSError(38, "Function not implemented")
 
     monkeypatch.setattr("compare.kit.lock.fcntl.flock", none)

@@ -23,22 +23,22 @@ WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 
 FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
 
 
-def mjcf(world: str, rest: str = "") -> str:
+def mjcf(world, rest = ""):
     return f"<mujoco>{rest}<worldbody>{world}</worldbody></mujoco>"
 
 
 @pytest.fixture
-def read(tmp_path: Path) -> Callable[[str], Native]:
+def read(tmp_path):
     """Settings read from a file with this text."""
 
-    def read(text: str) -> Native:
+    def read(text):
         (tmp_path / "scene.xml").write_text(text)
         return native.read(tmp_path / "scene.xml")
 
     return read
 
 
-def test_the_league_takes_the_settings_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_league_takes_the_settings_of_a_file(tmp_path, capsys):
     """A block on a slope creeps with a pyramid and holds with a cone; the step is that of the file."""
     text = '<option timestep="0.001" cone="{}" impratio="100"/>'
     for cone in ("elliptic", "pyramidal"):
@@ -64,7 +64,7 @@ def test_the_league_takes_the_settings_of_a_file(tmp_path: Path, capsys: pytest.
     assert errors["elliptic"] < errors["pyramidal"] / 30
 
 
-def test_settings_come_through_to_the_engine(read: Callable[[str], Native]) -> None:
+def test_settings_come_through_to_the_engine(read):
     text = (
         '<option integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" tolerance="1e-5" '
         'noslip_iterations="2"/>'
@@ -85,7 +85,7 @@ def test_settings_come_through_to_the_engine(read: Callable[[str], Native]) -> N
     assert body.model.pair_solimp[wall].tolist() == [0.2, 0.3, 0.01, 0.4, 3]
 
 
-def test_a_scene_of_our_own_is_read_back(read: Callable[[str], Native]) -> None:
+def test_a_scene_of_our_own_is_read_back(read):
     settings = ContactSettings.at(5e-4)
     of_scene = read(scene.build(Parameters.named("reference"), settings)[1])
     read_back = (of_scene.option[name] for name in ("timestep", "cone", "impratio"))
@@ -95,7 +95,7 @@ def test_a_scene_of_our_own_is_read_back(read: Callable[[str], Native]) -> None:
         assert pair.solreffriction[0] == settings.solreffriction
 
 
-def test_geoms_are_mixed_as_the_engine_does(read: Callable[[str], Native]) -> None:
+def test_geoms_are_mixed_as_the_engine_does(read):
     """Against the contact that MuJoCo itself makes."""
     text = mjcf(
         '<geom name="floor" type="plane" size="1 1 1" solref="0.01 0.9" solmix="3" margin="0.001"/>'
@@ -114,7 +114,7 @@ def test_geoms_are_mixed_as_the_engine_does(read: Callable[[str], Native]) -> No
 
 
 @pytest.mark.parametrize("depth", [0.0, 2e-4, 6e-4, 2e-3])
-def test_impedance_is_the_engines(depth: float) -> None:
+def test_impedance_is_the_engines(depth):
     ball = f'<body pos="0 0 {0.01 - depth}"><freejoint/><geom type="sphere" size="0.01"/></body>'
     model = mujoco.MjModel.from_xml_string(mjcf(FLOOR + ball))
     data = mujoco.MjData(model)
@@ -143,7 +143,7 @@ def test_impedance_is_the_engines(depth: float) -> None:
         (mjcf(FLOOR + BALL, '<option tolerance="-1"/>'), "tolerance = -1 is out of range: must be >= 0"),
     ],
 )
-def test_files_without_such_contacts(read: Callable[[str], Native], text: str, message: str) -> None:
+def test_files_without_such_contacts(read, text, message):
     with pytest.raises(InputError, match=message) as refused:
         read(text)
     assert "\n" not in str(refused.value)
@@ -157,7 +157,7 @@ def test_files_without_such_contacts(read: Callable[[str], Native], text: str, m
         (FLOOR + WALL + BALL, "^$"),
     ],
 )
-def test_what_stands_for_what_is_missing(read: Callable[[str], Native], world: str, lacks: str) -> None:
+def test_what_stands_for_what_is_missing(read, world, lacks):
     of_scene = read(mjcf(world))
     assert re.search(lacks, of_scene.note)
     assert "\n" not in of_scene.note

@@ -18,7 +18,6 @@ from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
 from compare.kit.settling import PRESSES, lasting, named_start
 from compare.kit.statistics import Measured
-from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure import thresholds
 from compare.subjects.thresholds.measure.basins import Edge, ends_slipping
 from compare.subjects.thresholds.measure.thresholds import DISTANCES, TURNS, settles
@@ -177,21 +176,6 @@ def _thick(lab):
     sets_of_one = {name: p for name, p in sets(Level.QUICK).items() if name == "thick-fluid"}
     known = (row for name, p in sets_of_one.items() for row in _settled(name, p, (0.6, 1.4, 2.5)))
     return Records.of(thresholds.measure(lab, sets_of_one, Records(tuple(known))))
-
-
-def test_protocol_on_a_set_without_fold(lab):
-    """No flow of the settled states is beyond the end of slipping."""
-    records = _thick(lab)
-    kinds = {(m.quantity, m.conditions.get("by")) for m in records.measurements}
-    assert len(kinds) == 7
-    assert {quantity for quantity, _ in kinds} == {"omega_01", "omega_02", "lifts", "folds"}
-    assert not records.missing
-    verdicts = {v.claim.id: v for v in judge(bifurcations.CLAIMS, records)}
-    for claim in ("table-5-P3", "table-5-P2", "table-5-F", "eta-critical"):
-        assert all(check.agrees for check in verdicts[claim].checks), claim
-    # That there is no fold bears on the fold, too; its flow was not measured.
-    assert [check.measurement.quantity for check in verdicts["table-5-F"].checks] == ["folds"]
-    assert verdicts["table-5-NF2"].outcome is Outcome.NOT_RUN
 
 
 def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):

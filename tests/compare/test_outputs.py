@@ -2,7 +2,6 @@
 
 import resource
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,7 +17,7 @@ from tests.commands import COMMANDS, NEEDED, parser_of, refused
 P = Parameters.named("reference")
 
 
-def outputs() -> Iterator[tuple[str, str, options.Output]]:
+def outputs():
     """Every command with each of its options that names a file to be written."""
     for command in COMMANDS:
         for action in parser_of(command)._actions:
@@ -26,7 +25,7 @@ def outputs() -> Iterator[tuple[str, str, options.Output]]:
                 yield command, action.option_strings[-1], action.type
 
 
-def reading(command: str, file: Path) -> list[str]:
+def reading(command, file):
     """A command line that reads a file."""
     dests = [action.dest for action in parser_of(command)._actions]
     for option in ("kept", "parameters"):
@@ -39,9 +38,7 @@ OUTPUTS = pytest.mark.parametrize(("command", "option", "kind"), list(outputs())
 
 
 @OUTPUTS
-def test_an_output_that_is_read_is_refused(
-    command: str, option: str, kind: options.Output, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_output_that_is_read_is_refused(command, option, kind, tmp_path, capsys):
     """By its own name, by one that leads elsewhere, or by a link."""
     for suffix in kind.suffixes:
         mine, soft, hard = (tmp_path / f"{name}{suffix}" for name in ("mine", "soft", "hard"))
@@ -55,9 +52,7 @@ def test_an_output_that_is_read_is_refused(
 
 
 @OUTPUTS
-def test_an_output_whose_name_promises_something_else_is_refused(
-    command: str, option: str, kind: options.Output, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_output_whose_name_promises_something_else_is_refused(command, option, kind, tmp_path, capsys):
     """A model, a set, a program, or what another option writes."""
     names = {f"mine{suffix}" for suffix in {".xml", ".toml", ".csv", ".py", "", *options.SUFFIXES} - {*kind.suffixes}}
     for name in names:
@@ -69,7 +64,7 @@ def test_an_output_whose_name_promises_something_else_is_refused(
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     """A directory with a run, and one of two runs."""
     made = tmp_path_factory.mktemp("whole")
     storage.save(analytic.simulate(P, [0] * 6, 0.1), made / "run.h5")
@@ -93,9 +88,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "sweep --vary eta=0.1,0.2 --time 0.01 --workers 0 --quiet -o new/runs",
     ],
 )
-def test_a_full_disk_leaves_nothing_behind(
-    words: str, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_full_disk_leaves_nothing_behind(words, whole, tmp_path, monkeypatch, capsys):
     """Nor does it touch what was there; a limit on the size of files plays the disk that is full."""
     monkeypatch.chdir(shutil.copytree(whole, tmp_path / "here"))
     Path("run.svg").write_text("mine")
@@ -109,7 +102,7 @@ def test_a_full_disk_leaves_nothing_behind(
     assert {path: path.is_file() and path.read_bytes() for path in Path().rglob("*")} == before
 
 
-def test_runs_are_not_gathered_into_one_of_themselves(whole: Path, tmp_path: Path) -> None:
+def test_runs_are_not_gathered_into_one_of_themselves(whole, tmp_path):
     runs = shutil.copytree(whole / "runs", tmp_path / "runs")
     one, link = min(runs.glob("*.h5")), tmp_path / "link.h5"
     before = one.read_bytes()
@@ -124,15 +117,13 @@ def test_runs_are_not_gathered_into_one_of_themselves(whole: Path, tmp_path: Pat
     ("command", "name"),
     [("cases", "README.md"), ("league --engine event --workers 1", "league.html"), ("validate", "report.html")],
 )
-def test_a_page_of_somebody_else_is_left_alone(
-    command: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_page_of_somebody_else_is_left_alone(command, name, tmp_path, capsys):
     (tmp_path / name).write_text("mine")
     assert f"{name} is not of this program" in refused(capsys, *command.split(), "-o", tmp_path)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
-def test_cases_are_written_again(tmp_path: Path) -> None:
+def test_cases_are_written_again(tmp_path):
     for _ in range(2):
         assert cli.main(["cases", "-o", str(tmp_path)]) == 0
     assert (tmp_path / "README.md").exists()

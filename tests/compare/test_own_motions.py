@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -11,29 +10,29 @@ import pytest
 import analytic
 from compare.commands import cli
 from compare.testing import assert_settles, assert_tracks, difference, read
-from model import InputError, Parameters, Trajectory, storage
+from model import InputError, Parameters, storage
 
 P = Parameters.named("reference").replace(omega_0=25.0)
 
 
 @pytest.fixture(scope="module")
-def theory() -> Trajectory:
+def theory():
     return analytic.simulate(P, [0.0] * 6, 12.0)
 
 
-def wrong(run: Trajectory, error: float) -> tuple[Any, Any]:
+def wrong(run, error):
     """The motion, some percent too slow."""
     return run.time[::3], run.omega_c[::3] * (1 - error)
 
 
 @pytest.mark.parametrize("case", [None, "SS"])
-def test_a_ball_that_settles(theory: Trajectory, case: str | None) -> None:
+def test_a_ball_that_settles(theory, case):
     assert_settles(*wrong(theory, 0.9e-3), P, case=case, rtol=1e-3)
     with pytest.raises(AssertionError, match=r"does not settle in SS.* within 0\.001 of 13\.85"):
         assert_settles(*wrong(theory, 1.1e-3), P, case=case, rtol=1e-3)
 
 
-def test_where_it_settles_instead() -> None:
+def test_where_it_settles_instead():
     with pytest.raises(AssertionError, match=r"does not settle in SS: .*; it settles in NS"):
         assert_settles(np.linspace(0, 60, 500), np.full(500, 25.0), P, rtol=1e-3)
 
@@ -50,14 +49,14 @@ def test_where_it_settles_instead() -> None:
         ({"spoilt": np.nan}, "omega_c is nan in sample 7, at t = "),
     ],
 )
-def test_what_cannot_be_judged(theory: Trajectory, given: dict[str, Any], message: str) -> None:
+def test_what_cannot_be_judged(theory, given, message):
     part, spoilt, w = given.pop("part", slice(None)), given.pop("spoilt", 0.0), theory.omega_c.copy()
     w[7] += spoilt
     with pytest.raises(InputError, match=message):
         assert_settles(theory.time[part], w[part], **{"p": P, "rtol": 1e-3} | given)
 
 
-def test_tracking(theory: Trajectory) -> None:
+def test_tracking(theory):
     assert_tracks(wrong(theory, 0.9e-3), theory, rms=1e-3)
     with pytest.raises(AssertionError, match=r"does not track event: rms .*e-03 > 0.001 .*; farthest off at t = "):
         assert_tracks(wrong(theory, 1.1e-3), theory, rms=1e-3)
@@ -73,7 +72,7 @@ def test_tracking(theory: Trajectory) -> None:
         assert_tracks(theory, theory, quantity="omega_x", rms=1.0)
 
 
-def test_the_doubt_is_what_interpolation_adds(theory: Trajectory) -> None:
+def test_the_doubt_is_what_interpolation_adds(theory):
     """Both are the same motion: all that there is comes from interpolation."""
     late = slice(300, None)  # after the kinks
     here = (theory.time[late][::4], theory.omega_c[late][::4])
@@ -81,7 +80,7 @@ def test_the_doubt_is_what_interpolation_adds(theory: Trajectory) -> None:
     assert 0 < off.rms < 2 * off.doubt < 20 * off.rms
 
 
-def test_motions_in_files(theory: Trajectory, tmp_path: Path) -> None:
+def test_motions_in_files(theory, tmp_path):
     own, foreign, table, bare = (tmp_path / name for name in ("own.h5", "foreign.h5", "table.csv", "bare.csv"))
     storage.save(theory, own)
     with h5py.File(foreign, "w") as file:
@@ -108,7 +107,7 @@ def test_motions_in_files(theory: Trajectory, tmp_path: Path) -> None:
         ("none.h5", None, "there is no such file"),
     ],
 )
-def test_files_that_hold_no_motion(tmp_path: Path, name: str, content: Any, message: str) -> None:
+def test_files_that_hold_no_motion(tmp_path, name, content, message):
     if isinstance(content, dict):
         with h5py.File(tmp_path / name, "w") as file:
             file.attrs.update(content)
@@ -118,7 +117,7 @@ def test_files_that_hold_no_motion(tmp_path: Path, name: str, content: Any, mess
         read(tmp_path / name)
 
 
-def test_two_runs_side_by_side(theory: Trajectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_runs_side_by_side(theory, tmp_path, capsys):
     a, b, partial, picture = (str(tmp_path / name) for name in ("a.h5", "b.h5", "c.csv", "d.png"))
     storage.save(theory, a)
     storage.save(analytic.simulate(P.replace(omega_0=24.0), [0.0] * 6, 9.0), b)

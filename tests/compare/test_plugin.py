@@ -28,7 +28,7 @@ INSTALLED = ("-p", "compare", "-p", "no:cacheprovider")
 """Where dualball is installed an entry point names the package `compare`."""
 
 
-def test_an_engine_on_the_exact_cases(pytester: pytest.Pytester) -> None:
+def test_an_engine_on_the_exact_cases(pytester):
     pytester.makepyfile(adapter=ADAPTER, test_mine="def test_mine(): assert True")
     known = pytester.makefile(".txt", known="# ours\ncylinder   it has no wall\nblock-rests\n")
     given = "test_mine.py", "--dualball-engine", "adapter", "--dualball-known", str(known), "-rx", "-n", "1"
@@ -51,7 +51,7 @@ def test_an_engine_on_the_exact_cases(pytester: pytest.Pytester) -> None:
         (["--dualball-engine", "half", "--dualball-known", "none"], "*cannot read none*"),
     ],
 )
-def test_what_cannot_be_tested(pytester: pytest.Pytester, args: list[str], message: str) -> None:
+def test_what_cannot_be_tested(pytester, args, message):
     """Unless files are named nothing but the cases is collected."""
     pytester.makepyfile(half="build = step = print", test_mine="def test_mine(): assert True")
     found = pytester.runpytest_inprocess(*INSTALLED, *args)
@@ -60,7 +60,7 @@ def test_what_cannot_be_tested(pytester: pytest.Pytester, args: list[str], messa
     assert found.parseoutcomes().get("passed", 0) == 0
 
 
-def test_fixtures(pytester: pytest.Pytester) -> None:
+def test_fixtures(pytester):
     pytester.makepyfile(
         """
         from model import Parameters
@@ -78,7 +78,7 @@ def test_fixtures(pytester: pytest.Pytester) -> None:
 
 
 @pytest.mark.parametrize("foreign", ["", "compare", "model"])
-def test_runs_that_do_not_use_it(pytester: pytest.Pytester, foreign: str) -> None:
+def test_runs_that_do_not_use_it(pytester, foreign):
     """They load nothing, and modules of somebody else with our names are no harm."""
     if foreign:
         pytester.makepyfile(**{foreign: "x = 1"})

@@ -1,35 +1,27 @@
 """Whole spectra from pushes: exact on linear motions, honest on bent ones, and judged."""
 
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm
 
-from compare.claim import Outcome
-from compare.judge import judge
 from compare.kit.fits import exponents, matched, propagator
-from compare.kit.lab import Lab, coarse_step, time_unit
-from compare.kit.record import Records
+from compare.kit.lab import coarse_step
 from compare.kit.trials import Start
-from compare.subjects.stability import claims as stability
 from compare.subjects.stability import measure as rates
 from model import Case, Parameters
-from model.arrays import Array
-from model.kinematics import VARIABLES
-from tests.measured import measured
 
 P = Parameters.named("reference")
 EPS = float(np.finfo(float).eps)
 
 
-def linear(J: Array, interval: float, count: int = 200) -> Array:
+def linear(J, interval, count=200):
     """D(t) = exp(J t) at `count` samples."""
     return np.stack([expm(J * interval * k) for k in range(count)])
 
 
-def mixed(*values: complex) -> Array:
+def mixed(*values):
     """A matrix with these eigenvalues, none of its variables by itself; of a pair, one is given."""
     blocks = [[[v.real, v.imag], [-v.imag, v.real]] if v.imag else [[v.real]] for v in map(complex, values)]
     J = block_diag(*blocks)
@@ -40,7 +32,7 @@ def mixed(*values: complex) -> Array:
 @pytest.mark.parametrize(
     "values", [(-0.5,), (0.0, -0.7), (-400.0, -30.0, -0.3 + 7j), (0.0, 20j, -0.2, -1.0, -6.0), (3.0, -1.0)]
 )
-def test_all_exponents_of_a_linear_motion_are_measured(values: tuple[complex, ...]) -> None:
+def test_all_exponents_of_a_linear_motion_are_measured(values):
     J, interval = mixed(*values), 1e-3
     D = linear(J, interval)
     rates = exponents(lambda lag: propagator(D, lag), interval, len(D) // 3)
@@ -50,21 +42,21 @@ def test_all_exponents_of_a_linear_motion_are_measured(values: tuple[complex, ..
     assert np.abs(matched(wanted, rates) - rates).max() <= 10 * rounding
 
 
-def test_a_long_lag_makes_slow_exponents_sharper() -> None:
+def test_a_long_lag_makes_slow_exponents_sharper():
     D = linear(mixed(-0.5, -20.0), 1e-3, 400)
     D = D + 1e-7 * np.random.default_rng(2).normal(size=D.shape)
     short, long = (np.abs(exponents(lambda lag: propagator(D, lag), 1e-3, k) + 0.5).min() for k in (1, 128))
     assert long < short
 
 
-def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated() -> None:
+def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated():
     leaning = rates.Pushed(Start("mine", P, "settled", np.zeros(8)), Case.SR)
     lasts, samples = rates.RECORD
     interval, step = lasts * coarse_step(P) / samples, coarse_step(P) / 16
     J, other = mixed(-1.0, -5.0), mixed(2.0, 1.0)
     bent = 0.05
 
-    def answer(size: float, h: float) -> Array:
+    def answer(size, h):
         return linear(J + (bent * size + (5.0 * h) ** 2) * other, interval)
 
     coarse, large, small = (answer(size, h) for size, h in zip((0.05, 0.1, 0.05), (2 * step, step, step), strict=True))
@@ -75,7 +67,7 @@ def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated() 
     assert np.abs(values - wanted).max() < np.abs(matched(plain, values) - wanted).max() / 10
 
 
-def test_a_run_counts_up_to_where_the_ball_leaves_the_case(lab: Lab) -> None:
+def test_a_run_counts_up_to_where_the_ball_leaves_the_case(lab):
     slow = P.replace(omega_0=1.0)
     (run,) = lab.campaign.run([lab.task(slow, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, P.R / 2, -0.5], 0.2, 1e-3)])
     first = run.cases[1]
@@ -85,21 +77,8 @@ def test_a_run_counts_up_to_where_the_ball_leaves_the_case(lab: Lab) -> None:
     assert run.cases[rates.stays(run, first)] is not first
 
 
-def test_a_ball_that_bounces_on_an_unloaded_floor_has_left_it() -> None:
+def test_a_ball_that_bounces_on_an_unloaded_floor_has_left_it():
     floor = np.zeros((6, 3))
     floor[:, 1] = 1.0, 1.0, 0.5, 0.0, 0.8, 0.0
-    run: Any = SimpleNamespace(case=np.full(6, int(Case.SR)), force_A=floor)
+    run = SimpleNamespace(case=np.full(6, int(Case.SR)), force_A=floor)
     assert rates.stays(run, Case.SR) == 3
-
-
-def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(lab: Lab) -> None:
-    p = P.replace(omega_0=0.6 / time_unit(P))
-    values = {name: p.omega_0 if name == "omega_c" else 0.0 for name in VARIABLES[1:6]}
-    before = [measured("settled", name, w, p=p, set="mine", case="RR", start="rest") for name, w in values.items()]
-    records = Records.of(rates.measure(lab, {"mine": P}, Records(tuple(before))))
-    verdicts = {verdict.claim.id: verdict for verdict in judge(stability.CLAIMS, records)}
-    for name, quantities in (("prop-1-rate", 5), ("prop-2", 10)):
-        assert verdicts[name].outcome is Outcome.CONFIRMED
-        assert len(verdicts[name].checks) == quantities
-    assert verdicts["prop-4-rate"].outcome is Outcome.NOT_RUN
-    assert any("SS" in each.reason for each in verdicts["prop-4-rate"].missing)

@@ -1,7 +1,6 @@
 """Measurements come back from their files as they were, and a file that was touched is refused by name."""
 
 import dataclasses
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 import xarray
 
 from compare.kit import record
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Missing, Records
 from model import InputError, Parameters, StorageError
 from model.hdf5 import seal
 from tests.measured import measured
@@ -18,7 +17,7 @@ P = Parameters.named("reference")
 BLUNT = P.replace(drag="quadratic", nu_f=1e-6, C_D=0.5, density_ratio=0.125)
 
 
-def measurement(quantity: str = "omega_c", value: float = 11.9, **conditions: record.Condition) -> Measurement:
+def measurement(quantity="omega_c", value=11.9, **conditions):
     made = measured("settled", quantity, value, 1e-9, **conditions)
     return dataclasses.replace(made, runs=("runs/a.h5", "runs/b.h5"))
 
@@ -35,13 +34,13 @@ RECORDS = Records(
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     """A file of those."""
     record.save(RECORDS, tmp_path / "settled.h5", {})
     return tmp_path / "settled.h5"
 
 
-def test_a_file_gives_back_what_was_saved(tmp_path: Path) -> None:
+def test_a_file_gives_back_what_was_saved(tmp_path):
     other = dataclasses.replace(RECORDS.measurements[0], parameters=BLUNT)
     for rows in ((*RECORDS.measurements, other), ()):
         records = Records(rows, RECORDS.missing)
@@ -49,7 +48,7 @@ def test_a_file_gives_back_what_was_saved(tmp_path: Path) -> None:
         assert record.load(tmp_path / "settled.h5") == records
 
 
-def test_files_without_the_law_of_drag_are_stokes(path: Path) -> None:
+def test_files_without_the_law_of_drag_are_stokes(path):
     with h5py.File(path, "r+") as older:
         for name in ("drag", "nu_f", "C_D", "density_ratio"):
             del older[name]
@@ -58,7 +57,7 @@ def test_files_without_the_law_of_drag_are_stokes(path: Path) -> None:
     assert record.load(path) == RECORDS
 
 
-def test_xarray_reads_it_as_a_table(path: Path) -> None:
+def test_xarray_reads_it_as_a_table(path):
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         table = data.to_dataframe()
     assert list(table.quantity) == ["omega_c", "force_Ay", "case", "slip_x"]
@@ -67,14 +66,14 @@ def test_xarray_reads_it_as_a_table(path: Path) -> None:
     assert np.isnan(table.at_y[0])
 
 
-def test_a_missing_file_is_named_and_an_unknown_quantity_refused(tmp_path: Path) -> None:
+def test_a_missing_file_is_named_and_an_unknown_quantity_refused(tmp_path):
     with pytest.raises(StorageError, match="no such file"):
         record.load(tmp_path / "nothing.h5")
     with pytest.raises(InputError, match="omega_c"):
         measurement("omega_d")
 
 
-def test_select() -> None:
+def test_select():
     assert [m.quantity for m in RECORDS.select("settled")] == ["omega_c", "force_Ay", "case", "slip_x"]
     assert [m.value for m in RECORDS.select("settled", "force_Ay")] == [0.1]
     assert not list(RECORDS.select("settled", where=lambda m: m.value > 100))

@@ -40,7 +40,7 @@ LONG = {
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     """A directory with what commands read."""
     made = tmp_path_factory.mktemp("whole")
     for name in ("runs", "results/measurements"):
@@ -56,7 +56,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-def catches(process: subprocess.Popen[str], number: int) -> bool:
+def catches(process, number):
     """Whether it has a handler for a signal, or has ended."""
     try:
         status = Path(f"/proc/{process.pid}/status").read_text()
@@ -66,7 +66,7 @@ def catches(process: subprocess.Popen[str], number: int) -> bool:
     return bool(int(caught, 16) >> (number - 1) & 1)
 
 
-def end(command: str, number: signal.Signals, after: float, here: Path) -> None:
+def end(command, number, after, here):
     """Send a signal so many seconds after the first moment at which the program can answer.
 
     To all that belongs to it, as a terminal and a cluster do; but to it alone while it may be importing MuJoCo, whose
@@ -109,7 +109,7 @@ BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 
 
 @BOTH
-def test_every_command_ends_while_it_begins(whole: Path, tmp_path: Path, number: signal.Signals) -> None:
+def test_every_command_ends_while_it_begins(whole, tmp_path, number):
     """Python and packages are being loaded: no traceback of theirs."""
     here = shutil.copytree(whole, tmp_path / "here")
     for command in COMMANDS:
@@ -118,7 +118,7 @@ def test_every_command_ends_while_it_begins(whole: Path, tmp_path: Path, number:
 
 @BOTH
 @pytest.mark.parametrize("command", ["attractors", "basins"])
-def test_work_ends(whole: Path, tmp_path: Path, command: str, number: signal.Signals) -> None:
+def test_work_ends(whole, tmp_path, command, number):
     end(command, number, 3.0, shutil.copytree(whole, tmp_path / "here"))
 
 
@@ -127,6 +127,6 @@ def test_work_ends(whole: Path, tmp_path: Path, command: str, number: signal.Sig
 @pytest.mark.parametrize("after", [0.2, 0.5, 1.5, 4.0, 10.0])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_ends_at_any_moment(
-    whole: Path, tmp_path: Path, command: str, after: float, number: signal.Signals
-) -> None:
+    whole, tmp_path, command, after, number
+):
     end(command, number, after, shutil.copytree(whole, tmp_path / "here"))

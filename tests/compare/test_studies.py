@@ -20,7 +20,7 @@ ROUNDED = 0.05 + 0.1 / math.log(2)
 STEP = 4e-3
 
 
-def test_a_table_is_put_in_its_place(tmp_path: Path) -> None:
+def test_a_table_is_put_in_its_place(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- begin: x -->\nold\n<!-- end: x -->\nafter <!-- begin: y --><!-- end: y -->\n")
     for _ in range(2):
@@ -34,7 +34,7 @@ def test_a_table_is_put_in_its_place(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", tables.PAGES)
-def test_the_page_has_a_place_for_every_table(name: str, tmp_path: Path) -> None:
+def test_the_page_has_a_place_for_every_table(name, tmp_path):
     page, (_, named) = tmp_path / name, tables.PAGES[name]
     page.write_text(({"README.md": DOCS.parent}.get(name, DOCS) / name).read_text("utf-8"), "utf-8")
     for table in named:
@@ -42,7 +42,7 @@ def test_the_page_has_a_place_for_every_table(name: str, tmp_path: Path) -> None
     assert page.read_text("utf-8").count(pages.markdown(ROWS)) == len(named)
 
 
-def test_formulas_are_what_mujoco_does_and_one_that_is_off_is_noticed() -> None:
+def test_formulas_are_what_mujoco_does_and_one_that_is_off_is_noticed():
     rows = confirmation.rows()
     assert len({row.what for row in rows}) == len(rows)
     assert not [row for row in rows if not row.agrees]
@@ -51,7 +51,7 @@ def test_formulas_are_what_mujoco_does_and_one_that_is_off_is_noticed() -> None:
         assert row.agrees is agrees
 
 
-def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time() -> None:
+def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time():
     rungs = list(settings.rungs(1e-3).values())
     assert rungs[-1] == ContactSettings()
     contact = {"solref", "solreffriction", "solimp", "impratio"}  # one thing: what makes it stiff and continuous

@@ -3,19 +3,17 @@
 import dataclasses
 import json
 import threading
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator
 
 import pytest
 
 from compare import validation
-from compare.claim import Bearing, Claim, Outcome, Verdict
+from compare.claim import Bearing, Claim, Outcome
 from compare.commands import cli
 from compare.kit import programme
 from compare.kit.engines import EVENT, MUJOCO
-from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.programme import UNDAMPED, Measure, Protocol
+from compare.kit.programme import UNDAMPED, Protocol
 from compare.kit.record import Measurement, Missing, Records
 from compare.report import results
 from model import Parameters, StorageError
@@ -26,35 +24,35 @@ SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("ref
 Rows = Iterator[Measurement | Missing]
 
 
-def going_round(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+def going_round(lab, sets, records):
     """A measurement of every set, made up."""
     for name, p in sets.items():
         yield dataclasses.replace(measured("round", "omega_c", p.omega_0, 1e-9, p, name), engine=lab.engine.name)
 
 
-def after(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+def after(lab, sets, records):
     """Goes out from what was measured before."""
     for m in records.select("round"):
         yield Missing("after", m.set, f"nothing comes after {m.value:g} rad/s")
 
 
-def broken(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+def broken(lab, sets, records):
     raise ArithmeticError("it can't be done")
     yield
 
 
-def claim(name: str, protocol: str) -> Claim:
+def claim(name, protocol):
     bearing = Bearing(protocol=protocol, quantity="omega_c", predict=lambda m: m.parameters.omega_0)
     return Claim(id=name, section="Stationary states", source="(1)", statement="So it is.", bearings=(bearing,))
 
 
 @pytest.fixture
-def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def counted(monkeypatch):
     """Three protocols and their claims in the place of the real ones; the names of those that were carried out."""
-    done: list[str] = []
+    done = []
 
-    def counting(name: str, measure: Measure) -> Protocol:
-        def carried_out(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+    def counting(name, measure):
+        def carried_out(lab, sets, records):
             done.append(name)
             yield from measure(lab, sets, records)
 
@@ -66,14 +64,12 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return done
 
 
-def run(directory: Path, **how: object) -> dict[str, Outcome]:
+def run(directory, **how):
     verdicts = validation.validate(directory, level=Level.QUICK, sets=SETS, workers=0, **how)  # type: ignore[arg-type]
     return {verdict.claim.id: verdict.outcome for verdict in verdicts}
 
 
-def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_named(
-    tmp_path: Path, counted: list[str]
-) -> None:
+def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_named(tmp_path, counted):
     verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0)
     assert [verdict.outcome for verdict in verdicts] == ["confirmed", "error", "not run"]
     assert (tmp_path / results.REPORT).exists()
@@ -81,7 +77,7 @@ def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_na
     assert {check.measurement.set for check in verdicts[0].checks} == {"mine"}
 
 
-def test_an_engine_that_is_named_is_heard_alone(tmp_path: Path, counted: list[str]) -> None:
+def test_an_engine_that_is_named_is_heard_alone(tmp_path, counted):
     for engine, heard in ((None, ["mujoco", "mujoco-plain", "mujoco-defaults"]), (MUJOCO, ["mujoco"])):
         (said,) = validation.validate(
             tmp_path, level=Level.QUICK, sets=SETS, workers=0, engine=engine, claims=["of-round"]
@@ -89,9 +85,7 @@ def test_an_engine_that_is_named_is_heard_alone(tmp_path: Path, counted: list[st
         assert [witness.engine for witness in said.witnesses] == heard
 
 
-def test_what_needs_a_broken_protocol_is_not_measured_without_it(
-    tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_needs_a_broken_protocol_is_not_measured_without_it(tmp_path, counted, monkeypatch):
     """Else what it measured would be kept, and taken for whole once the other is mended."""
     monkeypatch.setattr(validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("next", going_round, ("broken",))))
     monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, claim("of-next", "next")))
@@ -99,7 +93,7 @@ def test_what_needs_a_broken_protocol_is_not_measured_without_it(
     assert not [*tmp_path.glob("measurements/*/next.h5")]
 
 
-def test_only_what_a_claim_needs_and_what_is_new_is_measured(tmp_path: Path, counted: list[str]) -> None:
+def test_only_what_a_claim_needs_and_what_is_new_is_measured(tmp_path, counted):
     assert run(tmp_path, claims=["of-after"]) == {"of-after": "not run"}
     assert counted == ["round", "after"]
     run(tmp_path)
@@ -107,18 +101,16 @@ def test_only_what_a_claim_needs_and_what_is_new_is_measured(tmp_path: Path, cou
     assert counted == ["round", "after", "broken", "broken"]
 
 
-def test_verdicts_are_announced_as_they_come(
-    tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
     """Each as soon as its protocols have measured, while others measure."""
-    seen: list[str] = []
+    seen = []
     first = threading.Event()
 
-    def announce(verdict: Verdict) -> None:
+    def announce(verdict):
         seen.append(verdict.claim.id)
         first.set()
 
-    def waiting(lab: Lab, sets: Mapping[str, Parameters], before: Records) -> Rows:
+    def waiting(lab, sets, before):
         assert first.wait(30)
         yield from ()
 
@@ -130,10 +122,10 @@ def test_verdicts_are_announced_as_they_come(
     assert seen[0] != "of-waiting"
 
 
-def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path: Path, lab: Lab) -> None:
-    seen: list[str] = []
+def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab):
+    seen = []
 
-    def measure(lab: Lab, sets: Mapping[str, Parameters], before: Records) -> Rows:
+    def measure(lab, sets, before):
         seen.extend(sets)
         yield from ()
 
@@ -146,9 +138,7 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path: Path, lab: Lab) 
     assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
-def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
-    tmp_path: Path, lab: Lab
-) -> None:
+def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(tmp_path, lab):
     for engine in (None, EVENT):  # what one measured is not taken for the other's
         protocol = Protocol("round", going_round, engine=engine)
         (row,) = programme.carry_out(protocol, lab, {"mine": SETS["mine"]}, Records(), tmp_path).measurements
@@ -159,7 +149,7 @@ def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing
         assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
 
 
-def test_stored_measurements_are_judged_again_those_of_other_sets_apart(tmp_path: Path, counted: list[str]) -> None:
+def test_stored_measurements_are_judged_again_those_of_other_sets_apart(tmp_path, counted):
     """A file that was touched, or is gone, is named."""
     run(tmp_path)
     (tmp_path / results.REPORT).unlink()
@@ -180,7 +170,7 @@ def test_stored_measurements_are_judged_again_those_of_other_sets_apart(tmp_path
 
 
 @pytest.mark.parametrize("command", ["validate", "judge"])
-def test_the_command_line(command: str, tmp_path: Path, counted: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line(command, tmp_path, counted, capsys):
     validate = ["validate", "--quick", "-o", str(tmp_path), "--workers", "0", "--set", "reference"]
     assert cli.main([*validate, "--quiet"]) == 1
     shown = capsys.readouterr().out

@@ -19,7 +19,7 @@ from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
 from compare.witnesses import CEILING, COARSEST, _limit, extrapolated, hear
 from model import Parameters
-from tests.mutants.exchange import Fault, WrongTheory, answer, believed, entries, scaled, times
+from tests.mutants.exchange import WrongTheory, answer, believed, entries, scaled, times
 
 P = Parameters.named("reference")
 RATIOS = 1 / np.array([1.0, 2.0, 3.0, 4.0])
@@ -33,7 +33,7 @@ CLAIM = Claim(
 )
 
 
-def seen(error: float, engine: str, **conditions: float) -> Records:
+def seen(error, engine, **conditions):
     """A measurement of omega_c with a relative error."""
     m = tests.measured.measured("settled", "omega_c", P.omega_0 * (1 + error), 1e-12, P, "mine", **conditions)
     return Records((replace(m, engine=engine),))
@@ -150,7 +150,7 @@ def test_who_was_asked_and_measured_nothing_is_undecided_and_says_why():
 
 
 @pytest.mark.parametrize(("near", "outcome"), [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE)])
-def test_what_has_no_limit_counts_as_too_coarse(near: int, outcome: Outcome) -> None:
+def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
     """Of three states, one or two so near a threshold that the step may decide on their case."""
     ends = Records((tests.measured.measured("thresholds", "omega_01", 2 * P.omega_0, 1e-6, P, "mine"),))
     flows = [P.omega_0] * (3 - near) + [2 * P.omega_0] * near
@@ -166,7 +166,7 @@ def test_what_has_no_limit_counts_as_too_coarse(near: int, outcome: Outcome) -> 
 @pytest.mark.parametrize(
     ("lost", "outcome"), [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE), (3, Outcome.INCONCLUSIVE)]
 )
-def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost: int, outcome: Outcome) -> None:
+def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost, outcome):
     """The engine on trial has a count and a flow on three sets, the witness all counts, but not all flows."""
     flow = Bearing("thresholds", "omega_03", lambda m: m.parameters.omega_0)
     claim = replace(CLAIM, bearings=(Bearing("thresholds", "lifts", lambda m: 1.0), flow))
@@ -183,7 +183,7 @@ SETS = {name: Parameters.named(name).replace(omega_0=1.0) for name in ("referenc
 FLOWS = "omega_01", "omega_02", "omega_03", "omega_04"
 
 
-def flows(engine: str, error: float, *lost: str) -> Records:
+def flows(engine, error, *lost):
     """Thresholds of two sets, of which one lifts off, and of the first the drag at which its fold is born."""
     rows = [
         tests.measured.measured("birth", "critical_drag", critical_drag(SETS["reference"]), 1e-6, SETS["reference"])
@@ -212,9 +212,7 @@ def flows(engine: str, error: float, *lost: str) -> Records:
     ],
     ids=["ω₀₃ doubled", "ω₀₄ doubled", "ω₀₂ + 1 %", "η_cr × 4"],
 )
-def test_no_claim_that_a_fault_refutes_stays_confirmed_by_a_witness(
-    function: str, wrong: Fault, lost: str, named: str
-) -> None:
+def test_no_claim_that_a_fault_refutes_stays_confirmed_by_a_witness(function, wrong, lost, named):
     """Whether it measured what the fault is about, with errors of first order in the step, or not."""
     trial, steps = {"mujoco": {1: flows("mujoco", 0.0)}}, (1, 2, 3, 4)
     whole = trial | {"mujoco-plain": {n: flows("mujoco-plain", 1e-3 / n) for n in steps}}

@@ -1,8 +1,6 @@
 """Flows, and the longest step of a problem."""
 
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +18,7 @@ FLOWS = [
 ]
 
 
-def test_values() -> None:
+def test_values():
     steady, ramp, stairs, sampled, sine, sines = FLOWS
     np.testing.assert_array_equal(steady([0, 1e9]), [-3, -3])
     np.testing.assert_allclose(ramp([0, 1, 3.5, 6, 100]), [10, 10, 20, 30, 30], rtol=1e-15)
@@ -37,7 +35,7 @@ def test_values() -> None:
 
 
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda f: f.kind)
-def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
+def test_a_mapping_holds_all_of_it(flow):
     back = Flow.from_mapping(flow.to_mapping())
     t = np.linspace(0, 10, 101)
     np.testing.assert_array_equal(back(t), flow(t))
@@ -71,7 +69,7 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
         (lambda: Flow.from_mapping({"kind": "x", "start": [0], "value": [1], "slope": [math.nan]}), "not a flow"),
     ],
 )
-def test_bad_flows(make, says: str) -> None:
+def test_bad_flows(make, says):
     with pytest.raises(InputError, match=says):
         make()
 
@@ -89,7 +87,7 @@ def test_bad_flows(make, says: str) -> None:
     ],
     ids=["plain", "semicolons", "white space", "spreadsheet", "turned round", "decimal commas", "tabs"],
 )
-def test_measured(tmp_path: Path, text: str) -> None:
+def test_measured(tmp_path, text):
     (tmp_path / "flow.csv").write_text(text, "utf-8")
     measured, sampled = Flow.from_csv(tmp_path / "flow.csv").to_mapping(), FLOWS[3].to_mapping()
     assert measured == sampled | {"kind": "measured"}
@@ -120,13 +118,13 @@ def test_measured(tmp_path: Path, text: str) -> None:
         ("", "no line with a time"),
     ],
 )
-def test_bad_measurements(tmp_path: Path, text: str, says: str) -> None:
+def test_bad_measurements(tmp_path, text, says):
     (tmp_path / "flow.csv").write_text(text)
     with pytest.raises(InputError, match=says):
         Flow.from_csv(tmp_path / "flow.csv")
 
 
-def test_a_gap_that_is_accepted(tmp_path: Path) -> None:
+def test_a_gap_that_is_accepted(tmp_path):
     path = tmp_path / "flow.csv"
     path.write_text("0,5\n1,6\n2,7\n13,18\n")
     assert Flow.from_csv(path, longest_interval=11)(12.0) == 17
@@ -138,7 +136,7 @@ def test_a_gap_that_is_accepted(tmp_path: Path) -> None:
     assert Flow.from_csv(path)(10.0) == 15  # nine usual intervals
 
 
-def test_unreadable_measurements(tmp_path: Path) -> None:
+def test_unreadable_measurements(tmp_path):
     with pytest.raises(StorageError, match=r"cannot read the flow from .*: No such file"):
         Flow.from_csv(tmp_path / "flow.csv")
     (tmp_path / "flow.csv").write_bytes(b"\xff\x00\x01")
@@ -150,8 +148,8 @@ def test_unreadable_measurements(tmp_path: Path) -> None:
 
 
 P = Parameters.named("reference")
-SLOW: dict[str, Any] = {"omega_0": 1.0, "c": 1.0}
-QUADRATIC: dict[str, Any] = {"drag": "quadratic", "nu_f": 1e-6}
+SLOW = {"omega_0": 1.0, "c": 1.0}
+QUADRATIC = {"drag": "quadratic", "nu_f": 1e-6}
 
 
 @pytest.mark.parametrize(
@@ -168,9 +166,7 @@ QUADRATIC: dict[str, Any] = {"drag": "quadratic", "nu_f": 1e-6}
         (SLOW | QUADRATIC, None, 1 / (2 * 700 * P.R), r"1/\(2 c\(R omega_0\)\)"),
     ],
 )
-def test_a_step_too_large_for_the_problem_is_refused(
-    changes: dict[str, Any], flow: Flow | None, shortest: float, name: str
-) -> None:
+def test_a_step_too_large_for_the_problem_is_refused(changes, flow, shortest, name):
     p = P.replace(**changes)
     problem = p, flow or Flow.steady(p.omega_0), 0.1, lambda speed: 700 * speed
     words = rf"timestep = .* s is out of range: must be <= .* s, half of {name}, the shortest time of the problem"

@@ -31,7 +31,7 @@ angles = st.floats(-3.1, 3.1)
 
 
 @given(states, angles)
-def test_to_the_world_and_back(x: np.ndarray, theta: float) -> None:
+def test_to_the_world_and_back(x, theta):
     back, angle = from_world(to_world(x, theta, P), P)
     # Each entry is a sum of terms no larger than this scale; a dozen operations lose at most that many ulps of it,
     # and dividing by the orbit's radius (>= R/10) magnifies the tangential velocity's error.
@@ -41,7 +41,7 @@ def test_to_the_world_and_back(x: np.ndarray, theta: float) -> None:
 
 
 @given(st.tuples(speeds, speeds, speeds), st.tuples(speeds, speeds, speeds, st.floats(1, 2)))
-def test_rotation_by_a_quaternion(vector: tuple[float, ...], q: tuple[float, ...]) -> None:
+def test_rotation_by_a_quaternion(vector, q):
     quaternion = np.roll(q, 1) / np.linalg.norm(q)
     expected = Rotation.from_quat(quaternion, scalar_first=True).apply(vector)
     np.testing.assert_allclose(
@@ -50,7 +50,7 @@ def test_rotation_by_a_quaternion(vector: tuple[float, ...], q: tuple[float, ...
 
 
 @given(states, angles)
-def test_slip_is_the_velocity_of_the_material_point(x: np.ndarray, theta: float) -> None:
+def test_slip_is_the_velocity_of_the_material_point(x, theta):
     """(6) by rigid-body kinematics in the world frame: v = v_C + omega x r."""
     world, axes = to_world(x, theta, P), frame(theta)
     scale = 1 + np.abs(world.velocity).max() + P.r * np.abs(world.spin).max()
@@ -59,7 +59,7 @@ def test_slip_is_the_velocity_of_the_material_point(x: np.ndarray, theta: float)
         np.testing.assert_allclose(v, expected, atol=64 * EPS * scale)
 
 
-def test_slip_speeds_and_directions_are_7_and_8() -> None:
+def test_slip_speeds_and_directions_are_7_and_8():
     x = np.array([0, 0, 5.0, 3.0, -2.0, 4.0])
     assert slip_speeds(x, P) == pytest.approx((P.r * 5, P.r * np.sqrt(20)))
     assert slip_directions(x, P) == pytest.approx((np.arctan2(3, 4), np.arctan2(-2, 4)))
@@ -69,7 +69,7 @@ def test_slip_speeds_and_directions_are_7_and_8() -> None:
     np.testing.assert_allclose(angular_velocity(x, P), [P.R / P.r * 7, -P.R / P.r * 7, 0])
 
 
-def test_arrays_of_states_are_the_states_one_by_one() -> None:
+def test_arrays_of_states_are_the_states_one_by_one():
     rng = np.random.default_rng(1)
     x, theta = rng.uniform(0, 0.04, (5, 3, 8)), rng.uniform(-3, 3, (5, 3))
     many, angle = from_world(to_world(x, theta, P), P)
@@ -93,12 +93,12 @@ def test_arrays_of_states_are_the_states_one_by_one() -> None:
         ([0, np.inf, 0, 0, 0, 0, 0, 0], "v_y = inf m s-1 must be finite"),
     ],
 )
-def test_a_state_that_is_none_is_refused(x: object, says: str) -> None:
+def test_a_state_that_is_none_is_refused(x, says):
     with pytest.raises(InputError, match=says):
         full_state(x)
 
 
-def test_a_state_of_many_keeps_its_columns() -> None:
+def test_a_state_of_many_keeps_its_columns():
     columns = State.of(np.arange(24.0).reshape(3, 8))
     assert State.of(columns) is columns
     np.testing.assert_array_equal(columns.stacked(), np.arange(24.0).reshape(3, 8))
@@ -108,7 +108,7 @@ def test_a_state_of_many_keeps_its_columns() -> None:
         State.one(State(omega_c=np.nan))
 
 
-def test_cases() -> None:
+def test_cases():
     """Active variables and constraints fill the state space; a case is its two contacts."""
     for case in Case:
         assert len(TRAITS[case].constraints) + TRAITS[case].dimension == 8

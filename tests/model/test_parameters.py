@@ -16,7 +16,7 @@ FIELDS = [f.name for f in Parameters.quantities()]
 positive = st.floats(1e-9, 1e9)
 
 
-def zero_or(most: float) -> st.SearchStrategy[float]:
+def zero_or(most):
     return st.just(0.0) | st.floats(1e-9, most)
 
 
@@ -39,7 +39,7 @@ valid = st.builds(
 )
 
 
-def test_named_sets() -> None:
+def test_named_sets():
     """All load; the reference sets are those of the study; steel in water has the drag that the paper names."""
     assert all(Parameters.named(name).m > 0 for name in Parameters.names())
     expected = {"R": 0.05, "r": 0.01, "j": 0.4, "m": 0.03, "g": 9.81, "mu": 0.2, "eta": 0.2, "c": 1.0}
@@ -54,7 +54,7 @@ def test_named_sets() -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_law_of_drag_beside_a_fluid(tmp_path: Path, law: str) -> None:
+def test_a_law_of_drag_beside_a_fluid(tmp_path, law):
     (tmp_path / "p.toml").write_text(
         f'r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\ndrag = "{law}"\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 4.0'
     )
@@ -64,7 +64,7 @@ def test_a_law_of_drag_beside_a_fluid(tmp_path: Path, law: str) -> None:
     assert Parameters.load(tmp_path / "again.toml") == p
 
 
-def test_a_law_needs_the_viscosity_and_a_ball_must_sink(reference: Parameters) -> None:
+def test_a_law_needs_the_viscosity_and_a_ball_must_sink(reference):
     for law in LAWS[1:]:
         with pytest.raises(InputError, match=f"^drag = '{law}' needs the Reynolds number: nu_f in m2 s-1 "):
             reference.replace(drag=law)
@@ -74,7 +74,7 @@ def test_a_law_needs_the_viscosity_and_a_ball_must_sink(reference: Parameters) -
         reference.replace(density_ratio=1.5)
 
 
-def test_drag_and_gravity_follow_from_the_fluid() -> None:
+def test_drag_and_gravity_follow_from_the_fluid():
     nu, rho_f, rho_b, r = 1e-6, 1000.0, 8000.0, 0.002
     p = Parameters.from_fluid(nu_f=nu, rho_f=rho_f, rho_b=rho_b, r=r, R=0.02, mu=0.1, eta=0.1, gravity=9.8)
     # Stokes: F = 6 pi rho_f nu r v = m c v.
@@ -84,7 +84,7 @@ def test_drag_and_gravity_follow_from_the_fluid() -> None:
 
 
 @given(valid)
-def test_toml_keeps_every_digit(p: Parameters) -> None:
+def test_toml_keeps_every_digit(p):
     """In a plain file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "p.toml"
@@ -94,7 +94,7 @@ def test_toml_keeps_every_digit(p: Parameters) -> None:
 
 
 @given(valid, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
-def test_dimensionless_groups_do_not_depend_on_units(p: Parameters, length: float, time: float) -> None:
+def test_dimensionless_groups_do_not_depend_on_units(p, length, time):
     q = p.replace(R=p.R * length, g=p.g * length / time**2, c=p.c / time, omega_0=p.omega_0 / time)
     assert q.kappa == pytest.approx(p.kappa, rel=1e-12)
     assert q.Omega_0 == pytest.approx(p.Omega_0, rel=1e-12)
@@ -118,7 +118,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_a_bad_value_is_named_with_unit_and_range(name: str, reference: Parameters) -> None:
+def test_a_bad_value_is_named_with_unit_and_range(name, reference):
     field = Parameters.__dataclass_fields__[name]
     for value in BAD[name]:
         with pytest.raises(InputError) as caught:
@@ -147,7 +147,7 @@ def test_a_bad_value_is_named_with_unit_and_range(name: str, reference: Paramete
         (Range(whole=True), [-3], [0.5], "a whole number"),
     ],
 )
-def test_ranges(allowed: Range, inside: list[float], outside: list[float], words: str) -> None:
+def test_ranges(allowed, inside, outside, words):
     assert str(allowed) == words
     for number in inside:
         assert check_number("x", number, "m", allowed) == number
@@ -176,7 +176,7 @@ def test_ranges(allowed: Range, inside: list[float], outside: list[float], words
         ("r = 0.01\nR = '5 cm'\nm = 1\nj = 0.4\nmu = 0.2\neta = 0.2\ng = 9.8\nc = 1\nomega_0 = 1", "R = '5 cm'"),
     ],
 )
-def test_a_bad_file_is_one_clear_line(tmp_path: Path, text: str, says: str) -> None:
+def test_a_bad_file_is_one_clear_line(tmp_path, text, says):
     path = tmp_path / "mine.toml"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
@@ -186,7 +186,7 @@ def test_a_bad_file_is_one_clear_line(tmp_path: Path, text: str, says: str) -> N
     assert "\n" not in str(caught.value)
 
 
-def test_files_that_cannot_be_read_or_written(tmp_path: Path, reference: Parameters) -> None:
+def test_files_that_cannot_be_read_or_written(tmp_path, reference):
     with pytest.raises(StorageError, match="No such file"):
         Parameters.load(tmp_path / "absent.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")

@@ -16,7 +16,7 @@ from model.hdf5 import seal
 from model.trajectory import SAMPLE, columns
 
 
-def make(n: int = 50, events: int = 2, failure: str = "") -> Trajectory:
+def make(n=50, events=2, failure=""):
     rng = np.random.default_rng(0)
     samples = np.empty(n, SAMPLE)
     for name in columns(Trajectory):
@@ -40,7 +40,7 @@ def make(n: int = 50, events: int = 2, failure: str = "") -> Trajectory:
     return Trajectory.from_blocks(header, [samples[: n // 3], samples[n // 3 :]], happened)
 
 
-def assert_same(a: Trajectory, b: Trajectory) -> None:
+def assert_same(a, b):
     for name in columns(Trajectory):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
     for name in columns(Events):
@@ -51,14 +51,14 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     """A file of a run."""
     storage.save(make(), tmp_path / "run.h5")
     return tmp_path / "run.h5"
 
 
 @pytest.mark.parametrize(("n", "events"), [(50, 2), (0, 0), (1, 0), (5000, 7)])
-def test_what_is_saved_is_loaded(tmp_path: Path, n: int, events: int) -> None:
+def test_what_is_saved_is_loaded(tmp_path, n, events):
     trajectory = make(n, events)
     storage.save(trajectory, tmp_path / "run.h5")
     assert_same(storage.load(tmp_path / "run.h5"), trajectory)
@@ -68,7 +68,7 @@ def test_what_is_saved_is_loaded(tmp_path: Path, n: int, events: int) -> None:
     assert_same(storage.load_runs(tmp_path / "run.h5")[""], trajectory)
 
 
-def test_xarray_opens_it_with_axes_units_and_cases(tmp_path: Path) -> None:
+def test_xarray_opens_it_with_axes_units_and_cases(tmp_path):
     trajectory = make()
     storage.save(trajectory, tmp_path / "run.h5")
     with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
@@ -92,7 +92,7 @@ def test_xarray_opens_it_with_axes_units_and_cases(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("n", "events", "failure"), [(50, 2, ""), (0, 0, "diverged"), (1, 0, "")])
-def test_in_memory_xarray_sees_what_it_reads_from_the_file(tmp_path: Path, n: int, events: int, failure: str) -> None:
+def test_in_memory_xarray_sees_what_it_reads_from_the_file(tmp_path, n, events, failure):
     trajectory = make(n, events, failure)
     storage.save(trajectory, tmp_path / "run.h5")
     with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as stored:
@@ -100,13 +100,13 @@ def test_in_memory_xarray_sees_what_it_reads_from_the_file(tmp_path: Path, n: in
     np.testing.assert_array_equal(trajectory.to_xarray().force_B.sel(axis="y"), trajectory.force_B[:, 1])
 
 
-def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_xarray_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(InputError, match="pip install xarray h5netcdf"):
         make().to_xarray()
 
 
-def test_a_table_for_pandas_has_a_row_for_each_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_for_pandas_has_a_row_for_each_sample(monkeypatch):
     trajectory = make(50, 2)
     table = trajectory.to_pandas()
     assert len(table) == 50
@@ -120,7 +120,7 @@ def test_a_table_for_pandas_has_a_row_for_each_sample(monkeypatch: pytest.Monkey
         trajectory.to_pandas()
 
 
-def test_chunks_arrive_while_the_run_goes_on(tmp_path: Path) -> None:
+def test_chunks_arrive_while_the_run_goes_on(tmp_path):
     trajectory = make(300)
     samples = np.empty(300, SAMPLE)
     for name in columns(Trajectory):
@@ -134,8 +134,8 @@ def test_chunks_arrive_while_the_run_goes_on(tmp_path: Path) -> None:
     assert_same(storage.load(path), trajectory)
 
 
-def test_a_run_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
-    def break_off() -> None:
+def test_a_run_that_breaks_off_leaves_nothing(tmp_path):
+    def break_off():
         with storage.TrajectoryWriter(tmp_path / "run.h5", make().header) as writer:
             writer.append(np.zeros(10, SAMPLE))
             raise ZeroDivisionError
@@ -160,7 +160,7 @@ for size in (0, 40, 900, 3000, 20_000, 60_000, 90_000):
 """
 
 
-def test_a_disk_that_fills_at_any_moment(tmp_path: Path) -> None:
+def test_a_disk_that_fills_at_any_moment(tmp_path):
     """In a process of its own, since HDF5 might crash it; a limit on the size of files plays the disk."""
     program, here = [sys.executable, "-c", FULL, str(tmp_path / "run.h5")], Path(__file__).parents[2]
     answer = subprocess.run(program, cwd=here, capture_output=True, text=True, check=True)
@@ -169,14 +169,14 @@ def test_a_disk_that_fills_at_any_moment(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_no_directory_to_write_to(tmp_path: Path) -> None:
+def test_no_directory_to_write_to(tmp_path):
     with pytest.raises(StorageError, match=r"^cannot write .*: No such file or directory$"):
         storage.save(make(), tmp_path / "absent" / "run.h5")
     with pytest.raises(StorageError, match=r"^cannot read .*: there is no such file$"):
         storage.load(tmp_path / "absent.h5")
 
 
-def edit(path: Path, change) -> None:
+def edit(path, change):
     """Change what a file holds, and give it a checksum that fits."""
     with h5py.File(path, "r+") as file:
         change(file)
@@ -184,13 +184,13 @@ def edit(path: Path, change) -> None:
         seal(content)
 
 
-def replace(file: h5py.File, name: str, value: object) -> None:
+def replace(file, name, value):
     del file[name]
     file[name] = value
 
 
-def test_a_file_from_before_the_flow_was_a_column_is_read(path: Path) -> None:
-    def age(file: h5py.File) -> None:
+def test_a_file_from_before_the_flow_was_a_column_is_read(path):
+    def age(file):
         del file["omega_0"], file.attrs["Conventions"], file.attrs["title"], file.attrs["mu"]
 
     edit(path, age)
@@ -198,7 +198,7 @@ def test_a_file_from_before_the_flow_was_a_column_is_read(path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [1, 7, 50, 51])
-def test_a_run_is_read_in_parts(tmp_path: Path, size: int) -> None:
+def test_a_run_is_read_in_parts(tmp_path, size):
     trajectory = make(50, 2)
     storage.save(trajectory, tmp_path / "run.h5")
     parts = list(storage.parts(tmp_path / "run.h5", size))
@@ -227,7 +227,7 @@ def test_a_run_is_read_in_parts(tmp_path: Path, size: int) -> None:
         (lambda f: replace(f, "case", np.full(50, 9, np.int8)), "case that does not exist"),
     ],
 )
-def test_a_foreign_or_damaged_file_is_refused(path: Path, change, says: str) -> None:
+def test_a_foreign_or_damaged_file_is_refused(path, change, says):
     edit(path, change)
     with pytest.raises(StorageError, match=says) as caught:
         storage.load(path)
@@ -238,7 +238,7 @@ def test_a_foreign_or_damaged_file_is_refused(path: Path, change, says: str) -> 
 BATCH = {"a": make(50, 2), "b": make(0, 0, "diverged"), "c": make(7, 9)}
 
 
-def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
+def test_the_runs_of_a_batch_are_one_file(tmp_path):
     """Of any numbers of samples and events; each is read as if it had a file of its own."""
     path = tmp_path / "batch.h5"
     storage.save_batch(BATCH, path)
@@ -268,7 +268,7 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
         (lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
     ],
 )
-def test_a_foreign_or_damaged_batch_is_refused(tmp_path: Path, change, says: str) -> None:
+def test_a_foreign_or_damaged_batch_is_refused(tmp_path, change, says):
     path = tmp_path / "batch.h5"
     storage.save_batch(BATCH, path)
     with pytest.raises(StorageError, match="name one of them, as FILE/NAME"):
@@ -282,7 +282,7 @@ def test_a_foreign_or_damaged_batch_is_refused(tmp_path: Path, change, says: str
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_no_file_is_not_replaced(tmp_path: Path) -> None:
+def test_what_is_no_file_is_not_replaced(tmp_path):
     """As the superuser, renaming a whole file to /dev/null would take it from everyone."""
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(StorageError, match="pipe: it is not a file"):

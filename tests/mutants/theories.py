@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +12,8 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.mechanics import drag, rolling_forces
 from analytic.orbits.orbit_branch import Place
+from analytic.simulation import equations
+from analytic.slipping import slip_bounds
 from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
 from model.drag import STOKES
@@ -31,6 +33,7 @@ from tests.mutants.exchange import (
     swapped,
     times,
     where,
+    writing,
 )
 
 
@@ -129,12 +132,86 @@ def _leads(right: Function) -> Function:
     return function
 
 
+def _shared(entry: int) -> Fault:
+    """An answer without the factor 1 + j in one of its entries."""
+    return lambda right: lambda x, p, *rest: times(1 / (1 + p.j), entry)(right(x, p, *rest))
+
+
+def _rolls_for_ever(right: Function) -> Function:
+    """A plane with RR at every flow on walls rougher than j."""
+
+    def function(p: Parameters, mu: Any, eta: Any, omega_0: Any) -> Any:
+        plane = right(p, mu, eta, omega_0)
+        return np.where((np.asarray(eta) > p.j)[:, None], plane | np.uint8(Exists.RR), plane)
+
+    return function
+
+
+def _backwards(right: Function) -> Function:
+    """Directions of slip at the end of RR that don't turn with the sense of the orbit."""
+
+    def function(at: Any, p: Parameters, omega_0: float) -> Any:
+        case, after = right(at, p, omega_0)
+        return case, after._replace(alpha=-after.alpha, beta=-after.beta) if at.x.omega_c < 0 else after
+
+    return function
+
+
+def _guard(number: int) -> Callable[[Any, Any], None]:
+    """A guard that never falls."""
+
+    def change(motion: Any, out: Any) -> None:
+        out[number] = 1.0
+
+    return change
+
+
+def _by_weight(right: Function) -> Function:
+    """NR that slips once B_y alone exceeds friction."""
+
+    def function(t: float, z: Any, k: Any, out: Any) -> None:
+        right(t, z, k, out)
+        if k.case == Case.NR:
+            omega_c, v_y, w_x, *_ = equations._at_wall(z, k)
+            c = equations.resistance(0.0, v_y, k.R * (omega_c - equations.fluid(t, k)), k)
+            forces = equations._forces(omega_c, v_y, w_x, c, 0.0, 0.0, 0.0, 0.0, 0.0, k)
+            out[1] = (k.eta * forces[3] - abs(forces[4])) / (k.m * k.g)
+
+    return function
+
+
+def _blocks(right: Function) -> Function:
+    """RN whose friction takes all of the drag, as that of a block that doesn't turn."""
+
+    def change(k: Any, out: Any) -> None:
+        out[0] = k.mu - (k.mu - out[0]) * (1 + k.j) / k.j
+
+    return writing(change, Case.RN)(right)
+
+
+def _light_wall(right: Function) -> Function:
+    """The forces of RS with m R omega_c^2 at the wall."""
+
+    def function(*given: Any) -> Any:
+        A_x, A_y, A_z, B_x, B_y, B_z = right(*given)
+        k = given[-1]
+        return (A_x, A_y, A_z, B_x / (1 + k.j), B_y, B_z) if k.case == Case.RS else (A_x, A_y, A_z, B_x, B_y, B_z)
+
+    return function
+
+
+def _one_cone(p: Parameters) -> float:
+    """The amplitude of a fast pulsation at which the cone of wall or floor alone is full."""
+    return min(abs(bound(p, p.omega_0, 1).zero - p.omega_0) for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr))
+
+
 _FAULTS: dict[str, dict[str, Fault]] = {
     # Forces and equations of motion, (20)-(29)
     "mechanics.dynamics._rs": {
         "B_x of RS 1 % large": scaled(1.01, 3),
         "A_z of RS 2 % large": scaled(1.02, 2),
         "B_z of RS with the wrong sign": scaled(-1.0, 5),
+        "the wall of RS doesn't turn the spin axis": _shared(3),
     },
     "mechanics.dynamics._sr": {"A_y of SR 1 % large": scaled(1.01, 1), "B_z of SR 2 % large": scaled(1.02, 5)},
     "mechanics.dynamics._ss": {
@@ -158,6 +235,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "row of ω̃_z of SS 1 % large": in_case(Case.SS, scaled(1.01, 5)),
         "row of ω̃_y of SN 2 % large": in_case(Case.SN, scaled(1.02, 4)),
         "row of ω_c of NN 2 % large": in_case(Case.NN, scaled(1.02, 2)),
+        "row of ω̃_z of RN 2 % large": in_case(Case.RN, scaled(1.02, 5)),
         "no drag on the vertical motion": _without_drag_on_y,
     },
     # Stationary solutions, Propositions 1-6
@@ -199,6 +277,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "leaning and the orbit exchange their directions": answer(lambda modes: (modes[0], modes[1][::-1])),
         "leaning modes in the other order": answer(lambda modes: (modes[0][::-1], modes[1][::-1])),
         "leaning mirrored": answer(lambda modes: (modes[0], modes[1] * [1, -1])),
+        "leaning at half the slope": answer(lambda modes: (modes[0], modes[1] * [1, 0.5])),
     },
     "mechanics.dynamics.jacobian": {"Jacobians transposed": answer(lambda matrix: np.swapaxes(matrix, -1, -2))},
     "stationary.solutions._rr": {"RR exists at any flow": answer(_everywhere)},
@@ -206,6 +285,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "RS in a fluid that moves": lambda right: lambda p: right(p.replace(omega_0=0.0)),
     },
     "stationary.solutions._nr": {"NR at any flow": answer(_everywhere)},
+    "stationary.solutions._sr": {
+        "on a smooth floor the ball lags by 1 %": where(lambda p: p.mu == 0, _of(Case.SR, fields(x=times(0.99, 2))))
+    },
     "stationary.slipping_branch.points_at": {"SS beyond the fold for that before it": answer(lambda s: s[::-1])},
     "stationary.slipping_branch.fold": {"the fold a little further along the branch": answer(lambda s: s + 0.5)},
     "stationary.slipping_branch.light_drag": {"a slight lag's drag 3 % large": scaled(1.03)},
@@ -226,18 +308,31 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "regions without SS beyond the fold": _without(Exists.SS_BEYOND_FOLD),
         "regions without SR": _without(Exists.SR),
         "regions in which the ball sinks at any flow": answer(lambda plane: plane | Exists.NS),
+        "regions in which RR never ends for η > j": _rolls_for_ever,
     },
     "bifurcation.diagram.double_points": {
         "the fold is born at 5 % more η": answer(lambda points: [replace(x, eta=1.05 * x.eta) for x in points]),
         "double points at 1 % more flow": answer(lambda points: [replace(x, omega_0=1.01 * x.omega_0) for x in points]),
+        "for equal friction the fold is born at η_cr of the set": lambda right: (
+            lambda p, equal=False: right(p)[:1] + right(p, equal)[1:]
+        ),
     },
     "bifurcation.diagram.thresholds_with_inertia": {
         "the fluid's inertia leaves j as it is": lambda right: (
             lambda p: {name: w / np.sqrt(1 - p.density_ratio) for name, w in vars(bifurcation.thresholds(p)).items()}
         )
     },
-    "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04), "η_cr four times as large": scaled(4.0)},
+    "stationary.slipping_branch.eta_critical": {
+        "η_cr 4 % high": scaled(1.04),
+        "η_cr four times as large": scaled(4.0),
+        "η_cr of the quadratic law as under Stokes' drag": lambda right: lambda mu, p: right(mu, _by_stokes(p)),
+    },
     "bifurcation.diagram.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
+    "bifurcation.diagram.inertia_shifts": {
+        "the fluid adds all of the displaced mass": lambda right: (
+            lambda p: right(p) | {"rolling_rate": 1 / (1 + p.density_ratio / (1 + 2 * p.j)) - 1}
+        )
+    },
     "bifurcation.diagram.wall_spin": {
         "spin on the wall about the ball's own radius": lambda right: lambda x, p: right(x, p) - x.omega_c,
     },
@@ -284,7 +379,10 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "slipping.slip_bounds.rr_to_sr_stationary": {"(74) with 3 % more inertia": given(other(j=1.03))},
     "slipping.slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
     "slipping.slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
-    "flowmeter.real_fluid.torque_rate": {"the fluid's torque 2 % strong": scaled(1.02)},
+    "flowmeter.real_fluid.torque_rate": {
+        "the fluid's torque 2 % strong": scaled(1.02),
+        "the fluid's torque as in creeping flow": lambda right: lambda spin, p, layer=True: right(spin, p, False),
+    },
     "mechanics.drag.fall": {"flight with 2 % more drag on the fall": given(other(c=1.02))},
     # Laws of drag
     "mechanics.drag.sinking_speed": {"(10) 1 % large": scaled(1.01)},
@@ -369,8 +467,22 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "rebounds with nine tenths of the restitution": lambda right: (
             lambda at, p, w, e, *rest: right(at, p, w, 0.9 * e, *rest)
         ),
+        "landings on the wall with 5 % more friction": where(lambda at: at.x.h == 0, given(other(eta=1.05))),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
+    "simulation.transitions.leave": {"against the clock slip begins in the mirrored direction": _backwards},
+    "simulation.transitions._contact": {
+        "a contact without load stays closed": lambda right: (
+            lambda contact, load, *rest: right(contact, max(load, 1e-300), *rest)
+        )
+    },
+    "simulation.equations._guards_at_wall": {
+        "the wall never opens while the ball slips at both": writing(_guard(3), Case.SS),
+        "the floor never lets go": writing(_guard(2), Case.SR, Case.SS),
+        "rolling on the wall needs no friction along the orbit": _by_weight,
+    },
+    "simulation.equations._guards_away": {"off the wall rolling needs the friction of a block": _blocks},
+    "simulation.equations._forces": {"the wall needn't turn the spin axis in RS": _light_wall},
     "simulation.charts._at_wall": {
         "motions at the wall have 2 % more inertia": given(other(j=1.02)),
         "one contact slips with 3 % more floor friction": where(
@@ -419,8 +531,14 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "slip begins 3 % late in a pulsation": scaled(1.03),
         "slip begins 3 % early in a pulsation": scaled(0.97),
     },
-    "flowmeter.pulsation.slow_onset": {"slow pulsations make it slip 0.1 % late": scaled(1.001)},
-    "flowmeter.pulsation.fast_onset": {"fast pulsations make it slip 0.1 % late": scaled(1.001)},
+    "flowmeter.pulsation.slow_onset": {
+        "slow pulsations make it slip 0.1 % late": scaled(1.001),
+        "a slow pulsation never falls to rest": lambda right: lambda p: _rolls_up_to(p) - abs(p.omega_0),
+    },
+    "flowmeter.pulsation.fast_onset": {
+        "fast pulsations make it slip 0.1 % late": scaled(1.001),
+        "a fast pulsation never fills both cones": lambda right: _one_cone,
+    },
     "flowmeter.pulsation.mean_error": {
         "mean reading of a pulsation with 2 % more floor friction": given(other(mu=1.02))
     },
