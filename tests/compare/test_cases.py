@@ -161,6 +161,20 @@ def test_integrated_in_world_axes_the_motion_is_the_same(case):
     assert checked >= 2 or not np.any(case.exact[-1, 3:])
 
 
+@pytest.mark.parametrize(
+    ("name", "share"), [("block-rests", 0.9), ("block-slides", 1.25), ("pinched-block", 0.5), ("groove-rests", 0.9)]
+)
+def test_what_is_to_rest_needs_the_share_of_friction_that_is_said(name, share):
+    """Statics: normal forces balance what acts across the surfaces, and friction what is left."""
+    (case,) = (case for case in cases() if case.name == name)
+    body, normals = case.body, np.array([surface.normal for surface in case.surfaces])
+    acts = np.array(case.force(0.0, np.array(body.position), np.zeros(3))) - case.g * body.mass * UP
+    loads = -np.linalg.lstsq(normals.T, acts)[0]
+    assert (loads > 0).all()
+    limit = sum(surface.friction * load for surface, load in zip(case.surfaces, loads, strict=True))
+    assert np.linalg.norm(acts + loads @ normals) / limit == pytest.approx(share, rel=1e-12)
+
+
 @IN_THE_VESSEL
 def test_no_sample_is_near_an_impact(case):
     """Where an engine is late by a step, it is not to be wrong by the whole jump."""

@@ -3,8 +3,6 @@
 import dataclasses
 import json
 import re
-from collections.abc import Callable
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -13,7 +11,7 @@ import pytest
 from compare.adapters.mujoco_free import Bodies
 from compare.bench import cases, native
 from compare.bench.contact_law import impedance
-from compare.bench.native import Native, Pair
+from compare.bench.native import Pair
 from compare.commands import cli
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters
@@ -23,7 +21,7 @@ WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 
 FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
 
 
-def mjcf(world, rest = ""):
+def mjcf(world, rest=""):
     return f"<mujoco>{rest}<worldbody>{world}</worldbody></mujoco>"
 
 

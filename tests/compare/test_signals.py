@@ -126,7 +126,5 @@ def test_work_ends(whole, tmp_path, command, number):
 @BOTH
 @pytest.mark.parametrize("after", [0.2, 0.5, 1.5, 4.0, 10.0])
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_ends_at_any_moment(
-    whole, tmp_path, command, after, number
-):
+def test_every_command_ends_at_any_moment(whole, tmp_path, command, after, number):
     end(command, number, after, shutil.copytree(whole, tmp_path / "here"))

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from analytic.simulation import equations, integrator
 from compare.kit.levels import Level
 from model import Case, Parameters
 
@@ -44,15 +43,11 @@ def believed(wrong: WrongTheory) -> Iterator[None]:
     """Believe a wrong theory: every name and table entry of the right function stands for the wrong one."""
     right = getattr(importlib.import_module(wrong.module), wrong.function)
     put = wrong.wrong(right)
-    # What numba has compiled knows no wrong equations.
-    changes = [(right, put)] + [(integrator._solvers, lambda: None)] * (wrong.module == equations.__name__)
-    for old, new in changes:
-        _exchange(old, new)
+    _exchange(right, put)
     try:
         yield
     finally:
-        for old, new in changes:
-            _exchange(new, old)
+        _exchange(put, right)
 
 
 def _exchange(old: Function, new: Function) -> None:
@@ -98,20 +93,6 @@ def where(test: Callable[[Any], bool], fault: Fault) -> Fault:
 def in_case(case: Case, fault: Fault) -> Fault:
     """The fault shows only where the first argument is this case."""
     return where(lambda first: first is case, fault)
-
-
-def writing(change: Callable[[Any, Any], None], *cases: Case) -> Fault:
-    """What it writes into its last argument is changed there, given the `Motion` beside it, in some cases."""
-
-    def wrong(right: Function) -> Function:
-        def function(t: float, z: Any, motion: Any, out: Any) -> None:
-            right(t, z, motion, out)
-            if motion.case in cases:
-                change(motion, out)
-
-        return function
-
-    return wrong
 
 
 def other(**factors: float) -> Callable[[Parameters], Parameters]:

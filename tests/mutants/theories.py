@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +12,6 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.mechanics import drag, rolling_forces
 from analytic.orbits.orbit_branch import Place
-from analytic.simulation import equations
 from analytic.slipping import slip_bounds
 from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
@@ -33,7 +32,6 @@ from tests.mutants.exchange import (
     swapped,
     times,
     where,
-    writing,
 )
 
 
@@ -143,59 +141,6 @@ def _rolls_for_ever(right: Function) -> Function:
     def function(p: Parameters, mu: Any, eta: Any, omega_0: Any) -> Any:
         plane = right(p, mu, eta, omega_0)
         return np.where((np.asarray(eta) > p.j)[:, None], plane | np.uint8(Exists.RR), plane)
-
-    return function
-
-
-def _backwards(right: Function) -> Function:
-    """Directions of slip at the end of RR that don't turn with the sense of the orbit."""
-
-    def function(at: Any, p: Parameters, omega_0: float) -> Any:
-        case, after = right(at, p, omega_0)
-        return case, after._replace(alpha=-after.alpha, beta=-after.beta) if at.x.omega_c < 0 else after
-
-    return function
-
-
-def _guard(number: int) -> Callable[[Any, Any], None]:
-    """A guard that never falls."""
-
-    def change(motion: Any, out: Any) -> None:
-        out[number] = 1.0
-
-    return change
-
-
-def _by_weight(right: Function) -> Function:
-    """NR that slips once B_y alone exceeds friction."""
-
-    def function(t: float, z: Any, k: Any, out: Any) -> None:
-        right(t, z, k, out)
-        if k.case == Case.NR:
-            omega_c, v_y, w_x, *_ = equations._at_wall(z, k)
-            c = equations.resistance(0.0, v_y, k.R * (omega_c - equations.fluid(t, k)), k)
-            forces = equations._forces(omega_c, v_y, w_x, c, 0.0, 0.0, 0.0, 0.0, 0.0, k)
-            out[1] = (k.eta * forces[3] - abs(forces[4])) / (k.m * k.g)
-
-    return function
-
-
-def _blocks(right: Function) -> Function:
-    """RN whose friction takes all of the drag, as that of a block that doesn't turn."""
-
-    def change(k: Any, out: Any) -> None:
-        out[0] = k.mu - (k.mu - out[0]) * (1 + k.j) / k.j
-
-    return writing(change, Case.RN)(right)
-
-
-def _light_wall(right: Function) -> Function:
-    """The forces of RS with m R omega_c^2 at the wall."""
-
-    def function(*given: Any) -> Any:
-        A_x, A_y, A_z, B_x, B_y, B_z = right(*given)
-        k = given[-1]
-        return (A_x, A_y, A_z, B_x / (1 + k.j), B_y, B_z) if k.case == Case.RS else (A_x, A_y, A_z, B_x, B_y, B_z)
 
     return function
 
@@ -470,19 +415,6 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "landings on the wall with 5 % more friction": where(lambda at: at.x.h == 0, given(other(eta=1.05))),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
-    "simulation.transitions.leave": {"against the clock slip begins in the mirrored direction": _backwards},
-    "simulation.transitions._contact": {
-        "a contact without load stays closed": lambda right: (
-            lambda contact, load, *rest: right(contact, max(load, 1e-300), *rest)
-        )
-    },
-    "simulation.equations._guards_at_wall": {
-        "the wall never opens while the ball slips at both": writing(_guard(3), Case.SS),
-        "the floor never lets go": writing(_guard(2), Case.SR, Case.SS),
-        "rolling on the wall needs no friction along the orbit": _by_weight,
-    },
-    "simulation.equations._guards_away": {"off the wall rolling needs the friction of a block": _blocks},
-    "simulation.equations._forces": {"the wall needn't turn the spin axis in RS": _light_wall},
     "simulation.charts._at_wall": {
         "motions at the wall have 2 % more inertia": given(other(j=1.02)),
         "one contact slips with 3 % more floor friction": where(

@@ -188,10 +188,15 @@ def _pulsating() -> Iterator[Check]:
     for eta, mu, law in product((0.1, 0.25, 0.35, 0.6), (0.1, 0.6), (drag.STOKES, drag.SCHILLER_NAUMANN)):
         p = FORMAL.replace(eta=eta, mu=mu, drag=law, nu_f=1e-6)
         t = analytic.thresholds(p)
-        p = p.replace(omega_0=0.7 * (t.omega_03 if math.isnan(t.omega_01) else t.omega_01))
+        end = t.omega_03 if math.isnan(t.omega_01) else t.omega_01
+        p, slow = p.replace(omega_0=0.7 * end), p.replace(omega_0=0.3 * end)
         for limit, frequency in ((pulsation.slow_onset, 1e-5 * p.c), (pulsation.fast_onset, 1e5 * p.c)):
             onset = pulsation.slip_onset(p, frequency)
             yield _check("slip_amplitude", limit.__name__, onset, limit(p), 1e-8 * onset)
+        # Where a slow flow falls to rest the wall bears nothing: the limit is approached as the frequency's root.
+        onset, closer = (pulsation.slip_onset(slow, frequency * p.c) for frequency in (4e-5, 1e-5))
+        what = "slow_onset, down to rest"
+        yield _check("slip_amplitude", what, 2 * closer - onset, pulsation.slow_onset(slow), abs(closer - onset))
 
 
 def _both_ways() -> Iterator[Check]:
