@@ -14,10 +14,12 @@ from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records
-from compare.kit.scales import natural_size
+from compare.kit.settling import ERROR_GROUPS, scale
+from compare.kit.short import slip_unit
 from compare.kit.statistics import COVERAGE, Measured
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
+from model.kinematics import VARIABLES, state_units
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -26,7 +28,9 @@ RTOL = 1e-7
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 """What a prediction raises where theory knows no such state or motion: that is a deviation, not a breakdown."""
 
-
+_RATIOS = frozenset({"slope", "steepest", "filippov_share", "response", "law_in_motion"})
+"""Ratios, angles, and deviations that are divided by their scales already."""
+_SETTLED = frozenset(name for group in ERROR_GROUPS for name in group)
 _computed = functools.cache(lambda function, *args, **options: function(*args, **options))
 
 
@@ -129,6 +133,22 @@ def check(bearing: Bearing, m: Measurement) -> Check:
         scale=1.0 if exact else abs(own.value) if size is None else size,
         relation=bearing.relation,
     )
+
+
+def natural_size(quantity: str, p: Parameters) -> float | None:
+    """Natural size of a quantity by its name; None where that is the predicted value itself."""
+    kind, _, of = quantity.partition("_")
+    if (settled := quantity.removeprefix("edge_")) in _SETTLED:
+        return scale(settled, p)
+    if kind in ("end", "after"):
+        return float(state_units(p)[VARIABLES.index(of)])
+    if kind == "rate":
+        return p.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": p.R}.get(of, p.r)
+    if kind == "moving":
+        return p.m * p.g
+    if quantity == "gamma":
+        return slip_unit(p)
+    return 1.0 if quantity in _RATIOS else None
 
 
 def select(claims: Iterable[Claim], ids: Sequence[str] | None) -> list[Claim]:

@@ -50,14 +50,10 @@ class Quantity:
     """Largest error of a prediction, divided by the scale of the quantity, that a check may overlook."""
 
 
-_SPEEDS = {"v_y": "v_y", "v_h": "v_h"}
 _TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
+_RATES = [(name, name, "m s-1") for name in ("v_y", "v_h")] + [(*turn, "rad s-1") for turn in _TURNS.items()]
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
 _FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}  # determined where both contacts roll
-_ENDS = (
-    *(("y", "y", "m"), ("h", "h", "m"), ("v_y", "v_y", "m s-1"), ("v_h", "v_h", "m s-1")),
-    *((name, symbol, "rad s-1") for name, symbol in _TURNS.items()),
-)
 _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),
@@ -79,10 +75,8 @@ _ALL = (
     Quantity("gamma_slope", "dγ/dω₀", "s-1", 2e-2),
     Quantity("gamma_zero_square", "ω₀² at γ = 0", "rad2 s-2", 2e-2),
     Quantity("gamma_slope_square", "dγ/d(ω₀²)", "rad-1", 2e-2),
-    *(Quantity(f"rate_{name}", f"d{symbol}/dt", "m s-2", 5e-3) for name, symbol in _SPEEDS.items()),
-    *(Quantity(f"rate_{name}", f"d{symbol}/dt", "rad s-2", 5e-3) for name, symbol in _TURNS.items()),
-    *(Quantity(f"after_{name}", f"{symbol} after", "m s-1", 5e-2) for name, symbol in _SPEEDS.items()),
-    *(Quantity(f"after_{name}", f"{symbol} after", "rad s-1", 5e-2) for name, symbol in _TURNS.items()),
+    *(Quantity(f"rate_{name}", f"d{symbol}/dt", unit.replace("-1", "-2"), 5e-3) for name, symbol, unit in _RATES),
+    *(Quantity(f"after_{name}", f"{symbol} after", unit, 5e-2) for name, symbol, unit in _RATES),
     Quantity("rebounds", "landings that rebound", "1", 0.0),
     *(Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4) for k in range(1, 5)),
     *(Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3) for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()),
@@ -97,7 +91,7 @@ _ALL = (
     Quantity("time", "t", "s", 1e-2),
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
-    *(Quantity(f"end_{n}", f"{s} at the end", u, 5e-3) for n, s, u in _ENDS),
+    *(Quantity(f"end_{n}", f"{s} at the end", u, 5e-3) for n, s, u in (("y", "y", "m"), ("h", "h", "m"), *_RATES)),
     Quantity("orbit_period", "period", "s", 1.5e-2),
     Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-3),
     Quantity("orbit_height", "height of the hops", "m", 3e-2),
