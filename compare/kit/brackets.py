@@ -44,9 +44,19 @@ class Bracket:
     """Why a run broke down, the last one if several did."""
 
     @property
+    def ends(self) -> tuple[float, float]:
+        """Both values."""
+        return self.low, self.high
+
+    @property
+    def width(self) -> float:
+        """How far they are apart."""
+        return self.high - self.low
+
+    @property
     def place(self) -> Measured:
         """Its middle; the uncertainty is that of a uniform distribution, and the shift."""
-        return Measured((self.low + self.high) / 2, math.hypot((self.high - self.low) / math.sqrt(12), self.shift))
+        return Measured((self.low + self.high) / 2, math.hypot(self.width / math.sqrt(12), self.shift))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +73,15 @@ class Search:
 
 Question = tuple[Search, float, Bracket]
 """What is asked, at which value, given the bracket so far."""
-Asked = tuple[list[Task], list[Trajectory | None], list[bool | None]]
+
+
+@dataclass(frozen=True, eq=False)
+class Reply:
+    """A run that was asked and what it says; no run where it broke down."""
+
+    task: Task
+    run: Trajectory | None
+    answer: bool | None
 
 
 def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
@@ -77,52 +95,56 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
     uncertain as the bracket before it was wide, see `Bracket.shift`.
     """
-    failures: dict[Search, str] = {}
-    sections = lab.effort.sections
-
-    def ask(questions: Sequence[Question], care: Care = USUAL) -> Asked:
-        tasks, runs = [search.task(value, bracket, care) for search, value, bracket in questions], []
-        for (search, *_), run in zip(questions, lab.each(tasks), strict=True):
-            if isinstance(run, str):
-                failures[search] = run
-            runs.append(None if isinstance(run, str) else run)
-        answers = [None if run is None else q[0].answer(run) for q, run in zip(questions, runs, strict=True)]
-        unclear = [n for n, (run, answer) in enumerate(zip(runs, answers, strict=True)) if run and answer is None]
-        if care is USUAL and unclear:
-            for n, task, longer, answer in zip(unclear, *ask([questions[n] for n in unclear], LONGER), strict=True):
-                tasks[n], runs[n], answers[n] = task, longer, answer
-        return tasks, runs, answers
-
+    failures, sections = dict[Search, str](), lab.effort.sections
     brackets = [search.begin for search in searches]
-    before = list(brackets)
-    todo = list(range(len(searches)))
-    while todo := [k for k in todo if brackets[k].high - brackets[k].low > searches[k].width]:
-        values = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist() for k in todo}
-        asked = [(searches[k], value, brackets[k]) for k in todo for value in values[k][1:-1]]
-        tasks, runs, answers = ask(asked)
+    before, todo = list(brackets), list(range(len(searches)))
+    while todo := [k for k in todo if brackets[k].width > searches[k].width]:
+        inside = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist()[1:-1] for k in todo}
+        replies = _ask(lab, [(searches[k], value, brackets[k]) for k in todo for value in inside[k]], failures)
         for n, k in enumerate(todo):
-            inside = slice(n * sections, (n + 1) * sections)
-            ends = brackets[k].runs
-            said, shown = [True, *answers[inside], False], [ends[0], *runs[inside], ends[1]]
-            yes = max(m for m in range(said.index(False)) if said[m])
-            undecided = [m for m, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run]
-            no = said.index(False, max(undecided, default=yes))
-            by = tuple(tasks[inside][max(yes - 1, 0) : no])
-            all_said = *brackets[k].said, *zip(values[k][1:-1], answers[inside], strict=True)
-            new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)
-            before[k], brackets[k] = brackets[k], new
-        todo = [k for k in todo if brackets[k].high - brackets[k].low < 0.51 * (before[k].high - before[k].low)]
+            before[k] = brackets[k]
+            brackets[k] = _shorter(brackets[k], inside[k], replies[n * sections : (n + 1) * sections])
+        todo = [k for k in todo if brackets[k].width < 0.51 * before[k].width]
     granted = [(k, end) for k, b in enumerate(brackets) for end in (0, 1) if not (b.runs[end] or lab.effort.granted)]
-    _, runs, answers = ask([(searches[k], (brackets[k].low, brackets[k].high)[end], brackets[k]) for k, end in granted])
-    for (k, end), shows, holds in zip(granted, runs, answers, strict=True):
-        if holds is (end == 0):
-            kept = brackets[k].runs
-            brackets[k] = replace(brackets[k], runs=(kept[0], shows) if end else (shows, kept[1]))
+    replies = _ask(lab, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures)
+    for (k, end), reply in zip(granted, replies, strict=True):
+        if reply.answer is (end == 0):
+            yes, no = brackets[k].runs
+            brackets[k] = replace(brackets[k], runs=(yes, reply.run) if end else (reply.run, no))
     if careful:
-        asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in (b.low, b.high)]
-        _, runs, answers = ask(asked, FINER)
-        for k in range(len(searches)):
-            low, high = answers[2 * k : 2 * k + 2]
-            if low is False or high is True or None in runs[2 * k : 2 * k + 2]:
-                brackets[k] = replace(brackets[k], shift=before[k].high - before[k].low)
+        asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in b.ends]
+        replies = _ask(lab, asked, failures, FINER)
+        for k, (low, high) in enumerate(zip(replies[::2], replies[1::2], strict=True)):
+            if low.answer is False or high.answer is True or not (low.run and high.run):
+                brackets[k] = replace(brackets[k], shift=before[k].width)
     return [replace(b, failure=failures.get(search, "")) for search, b in zip(searches, brackets, strict=True)]
+
+
+def _ask(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], care: Care = USUAL) -> list[Reply]:
+    """What runs answer, those that don't show it done again for longer; why some broke down is noted in `failures`."""
+    tasks, replies = [search.task(value, bracket, care) for search, value, bracket in questions], []
+    for (search, *_), task, run in zip(questions, tasks, lab.each(tasks), strict=True):
+        if isinstance(run, str):
+            failures[search] = run
+            replies.append(Reply(task, None, None))
+        else:
+            replies.append(Reply(task, run, search.answer(run)))
+    unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
+    if care is USUAL and unclear:
+        longer = _ask(lab, [questions[n] for n in unclear], failures, LONGER)
+        for n, reply in zip(unclear, longer, strict=True):
+            replies[n] = reply
+    return replies
+
+
+def _shorter(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply]) -> Bracket:
+    """The bracket that is left once values inside it were asked."""
+    answers, runs = [reply.answer for reply in replies], [reply.run for reply in replies]
+    places, said = [bracket.low, *values, bracket.high], [True, *answers, False]
+    shown = [bracket.runs[0], *runs, bracket.runs[1]]
+    yes = max(n for n in range(said.index(False)) if said[n])
+    undecided = [n for n, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run]
+    no = said.index(False, max(undecided, default=yes))
+    by = tuple(reply.task for reply in replies[max(yes - 1, 0) : no])
+    all_said = *bracket.said, *zip(values, answers, strict=True)
+    return Bracket(places[yes], places[no], (shown[yes], shown[no]), by, said=all_said)
