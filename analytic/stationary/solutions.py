@@ -147,9 +147,9 @@ def _solution(
     x: State,
     exists: bool,
     family: tuple[str, ...] = (),
-    alpha: float = np.nan,
     values: npt.NDArray[np.complex128] | None = None,
 ) -> StationarySolution:
+    """With forces and stability; the eigenvalues are those of the Jacobian unless given."""
     if p.c == 0:  # nothing pulls omega_c to omega_0
         family = (*family, "omega_c")
     force = dynamics.forces(case, x, p, p.omega_0)
@@ -174,7 +174,6 @@ def _solution(
         stability=stability,
         slip_stability=slip_stability.stability(case, p, x.omega_c),
         family=family,
-        alpha=alpha,
     )
 
 
@@ -223,8 +222,8 @@ def _ss(p: Parameters) -> list[StationarySolution]:
         return [_solution(Case.SS, p, x, True, family=smooth)]
     solutions = []
     for s in slipping_branch.points_at(p):
-        x, alpha = State.of(slipping_branch.states(s, p)[0]), -float(np.arctan(np.exp(s)))
-        solutions.append(_solution(Case.SS, p, x, True, smooth, alpha, slipping_branch.eigenvalues_at(s, p)))
+        x, values = State.of(slipping_branch.states(s, p)[0]), slipping_branch.eigenvalues_at(s, p)
+        solutions.append(replace(_solution(Case.SS, p, x, True, smooth, values), alpha=-float(np.arctan(np.exp(s)))))
     return solutions
 
 

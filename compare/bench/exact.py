@@ -28,7 +28,8 @@ from model.hdf5 import WholeFile
 from model.kinematics import to_world
 from model.versions import current_versions
 
-SMOOTH, ROUGH = Parameters.named("reference"), Parameters.named("high-wall-friction")
+SLOW = Parameters.named("reference").replace(omega_0=12.0)
+ROUGH = Parameters.named("high-wall-friction").replace(omega_0=25.0)
 README = Path(__file__).with_name("templates") / "cases.md"
 SHARP = 1e-13
 """Relative tolerance of the event-driven simulation."""
@@ -126,39 +127,32 @@ def _vessel() -> list[Case]:
     hits = State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3)
     rides = State(y=0.1, v_y=0.1, omega_c=22.0, slip_x=5.0)
     return [
-        ball("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)", SMOOTH, 12.0,
+        ball("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)", SLOW,
              State(omega_c=8.0), 4.0, rolling),
         ball("from-rest", "from rest it slips on the wall, then rolls on both, ever faster (RS, RR)",
-             SMOOTH, 12.0, State(), 8.0, rolling),
+             SLOW, State(), 8.0, rolling),
         ball("slips-on-both", "slipping on floor and wall it comes to its stationary state (SS)",
-             SMOOTH, 25.0, kicked, 2.0, slipping),
+             SLOW.replace(omega_0=25.0), kicked, 2.0, slipping),
         ball("rides-the-wall", "the wall alone carries it, and it rolls there (NR)",
-             ROUGH, 25.0, rides, 1.0, rolling),
+             ROUGH, rides, 1.0, rolling),
         ball("onset-of-slip", "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
-             SMOOTH, 20.0, State(omega_c=8.0), 3.0, slipping),
+             SLOW.replace(omega_0=20.0), State(omega_c=8.0), 3.0, slipping),
         ball("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
-             SMOOTH, 12.0, lands, 0.5, landing),
+             SLOW, lands, 0.5, landing),
         ball("hits-the-wall", "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
-             SMOOTH, 12.0, hits, 0.5, landing),
+             SLOW, hits, 0.5, landing),
         ball("falls-in", "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
-             SMOOTH, 12.0, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, landing),
+             SLOW, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, landing),
     ]  # fmt: skip
 
 
 def ball(
-    name: str,
-    about: str,
-    p: Parameters,
-    omega_0: float,
-    x0: State,
-    until: float,
-    wrong: Mapping[str, Mapping[str, float]],
+    name: str, about: str, p: Parameters, x0: State, until: float, wrong: Mapping[str, Mapping[str, float]]
 ) -> Case:
     """The ball of the paper between floor and wall, sampled 25 times.
 
     `wrong` are factors of its parameters, or a restitution.
     """
-    p = p.replace(omega_0=omega_0)
 
     def run(p: Parameters, rtol: float, restitution: float = 0.0) -> tuple[Array, Trajectory]:
         found = analytic.simulate(p, x0, until, rtol=rtol, restitution=restitution, sample_interval=until / 25)
@@ -178,9 +172,9 @@ def ball(
         contacts=tuple(case.name for case in motion.cases[1:]),
         bound=BOUND,
         source=f"analytic.simulate, event-driven, rtol {SHARP:g}",
-        scales=(p.R, p.R * omega_0, p.R * omega_0 / p.r),
+        scales=(p.R, p.R * p.omega_0, p.R * p.omega_0 / p.r),
         wrong={text: mistaken(**how) for text, how in wrong.items()},
         drag=p.c,
-        flow=omega_0,
+        flow=p.omega_0,
         motion=(p, x0),
     )

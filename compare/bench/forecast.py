@@ -191,7 +191,7 @@ def _measured(
     radius = radii(model)[bodies].min(1)
     history: list[dict[tuple[int, int], Array]] = []
     time = WINDOW if settled.steady and not moving else SECOND
-    found = measured_slip(model, data, those, number, bodies, noting_loads(step, history), time)
+    found = measured_slip(model, data, those, number, noting_loads(step, history), time)
     now = loads(model, start)
     for pair in np.unique(those.geoms, axis=0):
         part, key = (those.geoms == pair).all(1), tuple(pair.tolist())

@@ -48,12 +48,11 @@ def noting_loads(step: Advance, history: list[dict[tuple[int, int], Array]]) -> 
     return one_by_one
 
 
-def measured_slip(
-    model: Any, data: Any, c: Contacts, number: Array, bodies: Array, step: Advance, time: float
-) -> dict[str, Array]:
+def measured_slip(model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float) -> dict[str, Array]:
     """How deep each contact is, and how fast its two bodies slip past each other and turn, in the mean of a window."""
     found = data.contact
     depth, drift, frames = -found.dist[number], found.surfacevel[number, :2], found.frame[number].reshape(-1, 3, 3)
+    bodies = model.geom_bodyid[c.geoms]
     lever = found.pos[number][:, None] - data.xipos[bodies]
     velocity = mean_velocities(model, data, step, time)[bodies]
     (first, second), turning = np.moveaxis(velocity, 1, 0)[..., :3], np.diff(velocity[..., 3:], axis=1)[:, 0]
