@@ -18,14 +18,14 @@ Answer = Callable[[Trajectory], bool | None]
 
 
 @dataclass(frozen=True)
-class Care:
+class Attempt:
     """How a run is done: `time` times as long, with the time step divided by `refine`."""
 
     time: int = 1
     refine: int = 1
 
 
-USUAL, LONGER, FINER = Care(), Care(time=4), Care(refine=2)
+USUAL, LONGER, FINER = Attempt(), Attempt(time=4), Attempt(refine=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Search:
     """A question with a yes at `begin.low` and a no at `begin.high`."""
 
     begin: Bracket
-    task: Callable[[float, Bracket, Care], Task]
+    task: Callable[[float, Bracket, Attempt], Task]
     """The run to ask at a value, given the bracket so far."""
     answer: Answer
     width: float
@@ -120,9 +120,9 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     return [replace(b, failure=failures.get(search, "")) for search, b in zip(searches, brackets, strict=True)]
 
 
-def _ask(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], care: Care = USUAL) -> list[Reply]:
+def _ask(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], attempt: Attempt = USUAL) -> list[Reply]:
     """What runs answer, those that don't show it done again for longer; why some broke down is noted in `failures`."""
-    tasks, replies = [search.task(value, bracket, care) for search, value, bracket in questions], []
+    tasks, replies = [search.task(value, bracket, attempt) for search, value, bracket in questions], []
     for (search, *_), task, run in zip(questions, tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
             failures[search] = run
@@ -130,7 +130,7 @@ def _ask(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], c
         else:
             replies.append(Reply(task, run, search.answer(run)))
     unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
-    if care is USUAL and unclear:
+    if attempt is USUAL and unclear:
         longer = _ask(lab, [questions[n] for n in unclear], failures, LONGER)
         for n, reply in zip(unclear, longer, strict=True):
             replies[n] = reply

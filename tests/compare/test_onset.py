@@ -29,8 +29,8 @@ NUMBERS = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=
 """Stands for a lab whose tasks are their own runs."""
 
 
-def narrowed(answer, width, task=lambda v, b, care: (v, care), careful=True):
-    """The bracket in which an answer to (value, care) changes, from 0 to 1."""
+def narrowed(answer, width, task=lambda v, b, attempt: (v, attempt), careful=True):
+    """The bracket in which an answer to (value, attempt) changes, from 0 to 1."""
     (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
     return bracket
 
@@ -51,15 +51,15 @@ def test_runs_that_are_undecided_or_break_down_leave_the_place_open():
     """What is undecided is run again, for longer; what broke says why."""
 
     def answer(run):
-        value, care = run
+        value, attempt = run
         if abs(value - 0.5) < 0.1:
-            return value < 0.47 if care is LONGER and value < 0.47 else None
+            return value < 0.47 if attempt is LONGER and value < 0.47 else None
         return value < 0.5
 
     bracket = narrowed(answer, 1e-3, careful=False)
     assert 0.4 < bracket.low < 0.47 <= 0.5 < bracket.high
     assert bracket.high - bracket.low > 0.1
-    broken = narrowed(lambda v: v < 0.5, 1e-3, lambda v, b, care: v if abs(v - 0.5) > 0.1 else "broke")
+    broken = narrowed(lambda v: v < 0.5, 1e-3, lambda v, b, attempt: v if abs(v - 0.5) > 0.1 else "broke")
     assert broken.low < 0.4 < 0.6 < broken.high
     assert broken.failure == "broke"
 

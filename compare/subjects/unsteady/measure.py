@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.kit.brackets import Bracket, Care, Search, narrow
+from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
@@ -235,8 +235,8 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
 def _search(lab: Lab, each: Pulsation) -> Search:
     """For the amplitude at which slip begins, in runs of one period and a half of which the first sixth is left out."""
 
-    def task(amplitude: float, bracket: Bracket, care: Care) -> Task:
-        course = Course(1.5 * care.time, lab.effort.pulsation_samples, 2 * care.refine)
+    def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
+        course = Course(1.5 * attempt.time, lab.effort.pulsation_samples, 2 * attempt.refine)
         return each.task(lab, amplitude, each.start(amplitude), course, largest=begin.high)
 
     if each.p.drag == STOKES:

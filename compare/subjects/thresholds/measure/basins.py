@@ -19,7 +19,7 @@ from itertools import islice, zip_longest
 import numpy as np
 from scipy.spatial import Delaunay
 
-from compare.kit.brackets import Bracket, Care, Search, narrow
+from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.fits import vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
@@ -206,8 +206,8 @@ def _search(lab: Lab, edge: Edge) -> Search:
     reach = 5e-3 * 4.0**edge.missed
     around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 1e-5)
 
-    def task(s: float, bracket: Bracket, care: Care) -> Task:
-        lasts = t_end * care.time
+    def task(s: float, bracket: Bracket, attempt: Attempt) -> Task:
+        lasts = t_end * attempt.time
         return lab.task(edge.p, edge.centre + s * edge.line, lasts, step, samples=round(lasts / (8 * step)))
 
     return Search(around, task, partial(ends_slipping, edge=edge), width)

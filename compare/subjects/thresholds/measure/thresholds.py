@@ -21,7 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from compare.kit.brackets import Answer, Bracket, Care, Search, narrow
+from compare.kit.brackets import Answer, Attempt, Bracket, Search, narrow
 from compare.kit.engines import sliding_speeds
 from compare.kit.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
@@ -96,11 +96,11 @@ class Findings:
         """
         units, answer = ASKED[kind]
 
-        def task(omega: float, bracket: Bracket, care: Care) -> Task:
+        def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
             q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
             x0 = last.x[-1] if last else named_start("", q, start).x0 if isinstance(start, str) else start
-            t_end = lasting(q, units * time * care.time)
-            return self.lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / care.refine)
+            t_end = lasting(q, units * time * attempt.time)
+            return self.lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / attempt.refine)
 
         return kind, Search(around, task, answer, width)
 
