@@ -76,7 +76,7 @@ def validate(
     output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
     results.open_directory(output)
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
-    todo = [protocol for protocol in programme.needed(PROTOCOLS, names) if protocol.coverage.level <= level]
+    todo = [protocol for protocol in programme.needed(PROTOCOLS, names) if protocol.assignment.level <= level]
     engines = [engine] if engine else [*WITNESSES]
     testimony = {each.name: dict.fromkeys(each.refine, Records()) for each in engines}
     broken, judged = dict[str, str](), dict[str, Future[Verdict]]()

@@ -99,7 +99,7 @@ def _on_trial(name: str, said: Verdict) -> Witness:
 
 
 @dataclass(frozen=True)
-class Asked:
+class Yielded:
     """What the protocols of a claim yielded, with the time steps in one that they asked for, the fewest first."""
 
     rows: tuple[tuple[int, Measurement | Missing], ...]
@@ -139,7 +139,7 @@ def _testify(
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves the claim undecided
     where too few of its numbers can tell, those without a limit among them: see `_limit`.
     """
-    asked = Asked.of(claim, steps)
+    asked = Yielded.of(claim, steps)
     try:
         found = {n: checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
@@ -201,7 +201,7 @@ def _allowed(check: Check, share: float) -> Check:
 
 
 @dataclass(frozen=True)
-class Kind:
+class Alike:
     """What checks of the same thing with different steps have in common, but for the numbers among their conditions."""
 
     protocol: str
@@ -225,10 +225,10 @@ def _place(m: Measurement) -> dict[str, float]:
 
 def _aligned(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) -> Iterator[list[Step]]:
     """The checks with the finest step of their protocol, each after those of the same with coarser ones."""
-    groups: dict[int, dict[Kind, list[Check]]] = {n: {} for n in sorted(found)}
+    groups: dict[int, dict[Alike, list[Check]]] = {n: {} for n in sorted(found)}
     for n, group in groups.items():
         for check in found[n]:
-            group.setdefault(Kind.of(check), []).append(check)
+            group.setdefault(Alike.of(check), []).append(check)
     for n, kind, last in [(n, kind, own) for n, group in groups.items() for kind, own in group.items()]:
         if n == finest[kind.protocol]:
             steps: list[list[Step]] = [[] for _ in last]

@@ -92,9 +92,9 @@ class Effort:
     motions_pieces: int = 6  # of a motion
 
 
-QUICK = Effort()
-DEFAULT = replace(
-    QUICK,
+AT_QUICK = Effort()
+AT_DEFAULT = replace(
+    AT_QUICK,
     sections=7,
     settled_starts=tuple((how, _FLOWS) for how in _STARTS),
     settled_sharp=0.1,
@@ -125,8 +125,8 @@ DEFAULT = replace(
     laws_refined=(8, 16),
     motions_pieces=20,
 )
-FULL = replace(
-    DEFAULT,
+AT_FULL = replace(
+    AT_DEFAULT,
     thresholds_width=5e-7,
     thresholds_fold=1.5e-4,
     edge_flows=(0.1, 0.17, 0.26, 0.38, 0.45, 0.6, 0.8),
@@ -151,7 +151,7 @@ FULL = replace(
     motions_pieces=32,
 )
 WITNESS = replace(
-    QUICK,
+    AT_QUICK,
     halves=(2, 2),  # the same run twice: all numbers are extrapolated to no step from several steps
     granted=True,
     slow=False,
@@ -188,7 +188,7 @@ WITNESS_ABOVE_QUICK = replace(WITNESS, thresholds_loose=1e3, thresholds_rounds=(
 
 
 def effort(level: Level, witness: bool = False) -> Effort:
-    """How much is measured at a level; by an engine beside the one on trial if `beside`."""
+    """How much is measured at a level; by an engine beside the one on trial if it is a `witness`."""
     if witness:
         return WITNESS if level is Level.QUICK else WITNESS_ABOVE_QUICK
-    return (QUICK, DEFAULT, FULL)[level]
+    return (AT_QUICK, AT_DEFAULT, AT_FULL)[level]

@@ -20,7 +20,7 @@ from compare.kit.engines import Engine, Role
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
-from compare.kit.sets import COVERAGE, MOST_WITNESSED, Coverage, sets
+from compare.kit.sets import ASSIGNMENTS, MOST_WITNESSED, Assignment, sets
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
 from model import Parameters, StorageError
@@ -60,20 +60,20 @@ class Protocol:
     """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is stored."""
 
     @property
-    def coverage(self) -> Coverage:
+    def assignment(self) -> Assignment:
         """Who measures it on which sets."""
-        return COVERAGE.get(self.name, Coverage())
+        return ASSIGNMENTS.get(self.name, Assignment())
 
     def measures(self, lab: Lab) -> dict[str, Parameters]:
         """The sets that it measures at a level with an engine, by name."""
-        known, coverage, above = sets(lab.level), self.coverage, lab.level > Level.QUICK
-        names: Iterable[str] = known if above else coverage.quick
+        known, assignment, above = sets(lab.level), self.assignment, lab.level > Level.QUICK
+        names: Iterable[str] = known if above else assignment.quick
         if lab.engine.role is Role.AS_IT_COMES:
-            names = coverage.as_it_comes
+            names = assignment.as_it_comes
         elif lab.engine.role is Role.IN_THE_LIMIT:
-            most = MOST_WITNESSED if coverage.limit else 1
-            names = tuple(known)[:most] if above else coverage.limit
-            if lab.refine not in lab.engine.refine[: coverage.steps[above]]:
+            most = MOST_WITNESSED if assignment.limit else 1
+            names = tuple(known)[:most] if above else assignment.limit
+            if lab.refine not in lab.engine.refine[: assignment.steps[above]]:
                 names = ()
         return {name: p for name, p in known.items() if name in names and not (lab.is_witness and self.engine)}
 
@@ -111,7 +111,7 @@ def job_name(protocol: str, lab: Lab) -> str:
 def cost(job: Job) -> float:
     """Processor time at the quick level, about."""
     protocol, lab = job
-    asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.coverage.quick), 1)
+    asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.assignment.quick), 1)
     return protocol.cost * asked * lab.refine if lab.is_witness else protocol.cost
 
 

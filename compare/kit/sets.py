@@ -52,11 +52,11 @@ def sets(level: Level) -> dict[str, Parameters]:
     return sets
 
 
-REFERENCE = ("reference",)
+ONE_BALL = ("reference",)
 """For what one ball shows as well as many, or the paper draws for one."""
-ENDS_OF_ROLLING = (*REFERENCE, "high-wall-friction")
+ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
 """One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
-DRAG_LAWS = (*REFERENCE, "wake", "blunt")
+DRAG_LAWS = (*ONE_BALL, "wake", "blunt")
 """One for each law of drag."""
 WITNESSED = (*ENDS_OF_ROLLING, "rough-floor", "wake")
 """Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at one flow, a law of
@@ -70,7 +70,7 @@ MOST_WITNESSED = 12
 
 
 @dataclass(frozen=True)
-class Coverage:
+class Assignment:
     """Which sets a protocol measures, by which engine."""
 
     quick: tuple[str, ...] = VARIED
@@ -87,37 +87,37 @@ class Coverage:
 
 
 # fmt: off
-COVERAGE: dict[str, Coverage] = {
+ASSIGNMENTS: dict[str, Assignment] = {
     # protocol            on trial         in the limit     steps   as it comes
-    "settled":    Coverage(VARIED,          WITNESSED,       (4, 4), REFERENCE),
-    "mirrored":   Coverage(REFERENCE),
-    "plane":      Coverage(REFERENCE),
-    "thresholds": Coverage(VARIED,          WITNESSED,       (3, 4)),
-    "edge":       Coverage(("reference", "rough-floor")),
-    "birth":      Coverage(VARIED),
-    "rates":      Coverage((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), REFERENCE),
-    "growth":     Coverage(VARIED,          WITNESSED),
-    "steepest":   Coverage(VARIED,          WITNESSED),
-    "lift":       Coverage(VARIED,          ENDS_OF_ROLLING, (4, 4)),
-    "bounds":     Coverage(VARIED,          REFERENCE),
-    "laws":       Coverage(VARIED,          REFERENCE),
-    "field":      Coverage(VARIED,          WITNESSED),
-    "motions":    Coverage(REFERENCE,       REFERENCE),
-    "runs":       Coverage(DRAG_LAWS,       REFERENCE),
-    "torque":     Coverage(REFERENCE),
-    "impacts":    Coverage(ENDS_OF_ROLLING, REFERENCE),
-    "hysteresis": Coverage(REFERENCE,       REFERENCE,       (4, 4)),
-    "unloading":  Coverage(ENDS_OF_ROLLING),
-    "slope":      Coverage(VARIED),
-    "pulsation":  Coverage(DRAG_LAWS,       REFERENCE),
-    "unsteady":   Coverage(DRAG_LAWS,       REFERENCE),
-    "recurrent":  Coverage(REFERENCE),
-    "stepped":    Coverage(REFERENCE),
-    "choice":     Coverage(REFERENCE,       REFERENCE,       (4, 4)),
-    "followed":   Coverage(REFERENCE, level=Level.DEFAULT),
-    "rebounding": Coverage(REFERENCE, level=Level.DEFAULT),
-    "swing":      Coverage(REFERENCE, level=Level.DEFAULT),
-    "calm":       Coverage(REFERENCE, level=Level.DEFAULT),
+    "settled":    Assignment(VARIED,          WITNESSED,       (4, 4), ONE_BALL),
+    "mirrored":   Assignment(ONE_BALL),
+    "plane":      Assignment(ONE_BALL),
+    "thresholds": Assignment(VARIED,          WITNESSED,       (3, 4)),
+    "edge":       Assignment(("reference", "rough-floor")),
+    "birth":      Assignment(VARIED),
+    "rates":      Assignment((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL),
+    "growth":     Assignment(VARIED,          WITNESSED),
+    "steepest":   Assignment(VARIED,          WITNESSED),
+    "lift":       Assignment(VARIED,          ENDS_OF_ROLLING, (4, 4)),
+    "bounds":     Assignment(VARIED,          ONE_BALL),
+    "laws":       Assignment(VARIED,          ONE_BALL),
+    "field":      Assignment(VARIED,          WITNESSED),
+    "motions":    Assignment(ONE_BALL,       ONE_BALL),
+    "runs":       Assignment(DRAG_LAWS,       ONE_BALL),
+    "torque":     Assignment(ONE_BALL),
+    "impacts":    Assignment(ENDS_OF_ROLLING, ONE_BALL),
+    "hysteresis": Assignment(ONE_BALL,       ONE_BALL,       (4, 4)),
+    "unloading":  Assignment(ENDS_OF_ROLLING),
+    "slope":      Assignment(VARIED),
+    "pulsation":  Assignment(DRAG_LAWS,       ONE_BALL),
+    "unsteady":   Assignment(DRAG_LAWS,       ONE_BALL),
+    "recurrent":  Assignment(ONE_BALL),
+    "stepped":    Assignment(ONE_BALL),
+    "choice":     Assignment(ONE_BALL,       ONE_BALL,       (4, 4)),
+    "followed":   Assignment(ONE_BALL, level=Level.DEFAULT),
+    "rebounding": Assignment(ONE_BALL, level=Level.DEFAULT),
+    "swing":      Assignment(ONE_BALL, level=Level.DEFAULT),
+    "calm":       Assignment(ONE_BALL, level=Level.DEFAULT),
 }
 # fmt: on
 """Who measures what, by protocol. One that isn't listed has the default."""

@@ -6,7 +6,7 @@ from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Text
 from compare.kit.levels import Level
 from compare.kit.programme import needed
-from compare.kit.sets import COUNT, COVERAGE, sets
+from compare.kit.sets import ASSIGNMENTS, COUNT, sets
 
 
 def test_names_are_unique():
@@ -20,8 +20,8 @@ def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols():
 
 
 def test_the_table_of_who_measures_what_lists_every_protocol():
-    assert COVERAGE.keys() == {protocol.name for protocol in PROTOCOLS}
-    asked = {name for each in COVERAGE.values() for name in (*each.quick, *each.limit, *each.as_it_comes)}
+    assert ASSIGNMENTS.keys() == {protocol.name for protocol in PROTOCOLS}
+    asked = {name for each in ASSIGNMENTS.values() for name in (*each.quick, *each.limit, *each.as_it_comes)}
     assert asked <= sets(Level.QUICK).keys()
 
 

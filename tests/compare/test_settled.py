@@ -26,13 +26,13 @@ THICK = Parameters.named("reference").replace(c=10.0)
 
 def _measured(lab, patch, p, *flows):
     starts = tuple((how, flows) for how in ("rest", "with the fluid", "on the wall"))
-    patch.setattr(levels, "QUICK", replace(levels.QUICK, settled_starts=starts))
+    patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, settled_starts=starts))
     return Records.of(settled.measure(lab, {"thick": p}, Records()))
 
 
 class TestSettled:
     def test_what_does_not_settle_is_missing(self, lab, monkeypatch):
-        monkeypatch.setattr(levels, "QUICK", replace(levels.QUICK, settling_rounds=(1.0,)))
+        monkeypatch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, settling_rounds=(1.0,)))
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
         found = _measured(lab, monkeypatch, THICK, 0.6)
         assert not found.measurements
@@ -129,7 +129,7 @@ class TestPlane:
         assert any(u[0] < 0.6 and u[1] > 0.6 for u in added)
 
     def test_a_few_points_are_measured(self, lab, monkeypatch):
-        monkeypatch.setattr(levels, "QUICK", replace(levels.QUICK, plane_spread=2, plane_added=()))
+        monkeypatch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, plane_spread=2, plane_added=()))
         monkeypatch.setattr(basins, "DRAG", 10.0)
         rows = list(basins.planes(lab, {"reference": THICK}, Records()))
         masks = [row for row in rows if isinstance(row, Measurement)]

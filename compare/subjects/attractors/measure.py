@@ -47,7 +47,7 @@ SAMPLE = 1e-3
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
 """eta of the walls along which the hop is followed, in units of that of the set. The first steps are short: their
 starts are extrapolated from one or two hops, which attract from nearby only."""
-FOLLOWED, ALONE = 10.0, 60.0
+FOLLOWED_FOR, ALONE_FOR = 10.0, 60.0
 """How long a hop is followed at a wall, and then left alone, s."""
 RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
 """From which coefficient of restitution to the next a rebounding ball is followed."""
@@ -184,21 +184,21 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         ahead = steady[-1]
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
-        tasks.append([task(q, x, FOLLOWED, refined) for x, refined in zip(ahead, MARGINAL, strict=True)])
+        tasks.append([task(q, x, FOLLOWED_FOR, refined) for x, refined in zip(ahead, MARGINAL, strict=True)])
         (runs,) = lab.groups(tasks[-1:])
-        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
+        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED_FOR) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED))]
+        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED_FOR))]
         factors.append([factor for factor, _ in maps])
         steady.append(np.array([state for _, state in maps[:2]]))
         if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
             near = parts[1].conditions(q)
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
-    again = [task(walls[k], np.array(tasks[k][1].x0), ALONE, MARGINAL[0]) for k in (-4, -1)]
+    again = [task(walls[k], np.array(tasks[k][1].x0), ALONE_FOR, MARGINAL[0]) for k in (-4, -1)]
     yield from _left_alone(lab, "followed", SET, again)
 
 

@@ -59,7 +59,7 @@ PUSH = 1e-2
 
 
 @dataclass(frozen=True)
-class Number:
+class Shown:
     """What a trial shows at an event."""
 
     trial: str
@@ -239,7 +239,7 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
                 yield Missing("unloading", state.start.set, f"no ball to begin with on the wall: {state.failure}")
             else:
                 trials += [_trial(lab, state, name) for name in names]
-    kinds: dict[Number, list[tuple[TrialResult, Measured, float]]] = {}
+    kinds: dict[Shown, list[tuple[TrialResult, Measured, float]]] = {}
     for result in carry_out(lab, "unloading", trials):
         if isinstance(result, Missing):
             yield result
@@ -278,14 +278,14 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
     lands = 1.2 + 7 * p.c * time_unit(p)
     t_end, step = lasting(p, lands if name == LANDING else 6.0), coarse_step(p) / fine
 
-    def read(run: Trajectory) -> tuple[Case, dict[Number, Measured]]:
+    def read(run: Trajectory) -> tuple[Case, dict[Shown, Measured]]:
         numbers = {}
         if name == LANDING:
             numbers = _landed(run)
         elif name == UPWARDS:  # it falls on the floor soon after
-            numbers = {Number(name, "lift", "first top"): first_top(run)}
+            numbers = {Shown(name, "lift", "first top"): first_top(run)}
         elif name == BY_SPIN:  # it leaves the floor at a whole step, up to one late or early, which changes its height
-            numbers = {Number(name, "lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
+            numbers = {Shown(name, "lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
         return physical_case(settled_case(run)), numbers
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
@@ -293,7 +293,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
     return Trial(state.start.set, p, name, x0.stacked(), t_end, (coarse, fine), samples, read, conditions=known)
 
 
-def _landed(run: Trajectory) -> dict[Number, Measured]:
+def _landed(run: Trajectory) -> dict[Shown, Measured]:
     """Onset of slip, and landing: time, speed and vertical impulse. Empty if the ball doesn't land."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
@@ -310,10 +310,10 @@ def _landed(run: Trajectory) -> dict[Number, Measured]:
     rest = run.v_y[k + 5 : k + 12]  # by then it must have come to rest on the floor
     impulse = Measured(p.m * (float(rest.mean()) - v_y), p.m * float(np.abs(rest).max()))
     return {
-        Number(LANDING, "time", "slip at B"): Measured(cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))),
-        Number(LANDING, "time", "landing"): Measured(float(run.time[k]) + wait, step / math.sqrt(12)),
-        Number(LANDING, "landing_speed", "landing"): Measured(v_y, 0.0),
-        Number(LANDING, "landing_impulse", "landing"): impulse,
+        Shown(LANDING, "time", "slip at B"): Measured(cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))),
+        Shown(LANDING, "time", "landing"): Measured(float(run.time[k]) + wait, step / math.sqrt(12)),
+        Shown(LANDING, "landing_speed", "landing"): Measured(v_y, 0.0),
+        Shown(LANDING, "landing_impulse", "landing"): impulse,
     }
 
 

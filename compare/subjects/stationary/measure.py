@@ -36,7 +36,7 @@ MIRRORED = ("rest", 0.62), ("rest", 1.4), ("on the wall", 4.2)
 
 
 @dataclass(frozen=True, order=True)
-class Kind:
+class Attractor:
     """What starts have in common that come to one state."""
 
     set: str
@@ -52,8 +52,8 @@ class Kind:
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The case that every start ends in, and once for every distinct state its values."""
     sharp, refine = lab.effort.settled_sharp, lab.effort.settled_refine
-    alike: dict[Kind, list[Settled]] = {}
-    without: dict[Kind, Missing] = {}
+    alike: dict[Attractor, list[Settled]] = {}
+    without: dict[Attractor, Missing] = {}
     for state in settle(lab, list(_starts(lab, sets)), Patience(sharp=sharp, loose=lab.effort.settled_loose)):
         if state.failure:
             yield _unsettled(state, 1)
@@ -61,9 +61,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield _record(lab, state, "case", state.case)
         if why := "no values of it" if state.failure else _fading(state):
             why = f"{state.case.name} at omega_0 = {state.start.p.omega_0:.4g} rad/s: {why}"
-            without[Kind.of(state)] = Missing(PROTOCOL, state.start.set, why, len(state.values))
+            without[Attractor.of(state)] = Missing(PROTOCOL, state.start.set, why, len(state.values))
         else:
-            alike.setdefault(Kind.of(state), []).append(state)
+            alike.setdefault(Attractor.of(state), []).append(state)
     yield from (each for kind, each in without.items() if kind not in alike)
     groups = [alike[kind] for kind in sorted(alike)]
     again = []  # with half the step, from the mean, at the height from which it started

@@ -42,7 +42,7 @@ LASTING = 5
 """Samples for which slip must last to count: friction may be full for a moment before."""
 PHASES = 8
 """Phases of a period at which the motion is started anew from its state."""
-ROLLING, SLIPPING, RAMP = 0.85, 0.3, (0.75, 1.35)
+ROLLS_AT, SLIPS_AT, RAMP_ENDS = 0.85, 0.3, (0.75, 1.35)
 """Flows of rolling, in units of that at which it ends; of slipping, as parts of the way from there to where the wall
 carries the ball; and ends of a ramp, as parts of the way to where slipping ends in a jump."""
 JUMP = 1e-3
@@ -50,7 +50,7 @@ JUMP = 1e-3
 the response to a small jump is wanted, and near the ends of that range it is far from linear."""
 
 
-class Course(NamedTuple):
+class Timing(NamedTuple):
     """How a run in a pulsation is done."""
 
     periods: float
@@ -96,14 +96,14 @@ class Pulsation:
         """The same with this omega_c as a period begins."""
         return replace(self, begin=(omega_c - self.p.omega_0) / self.amplitude)
 
-    def task(self, lab: Lab, amplitude: float, x: Array, course: Course, largest: float = 0.0) -> Task:
+    def task(self, lab: Lab, amplitude: float, x: Array, timing: Timing, largest: float = 0.0) -> Task:
         """A run from a state, with as many steps in a period, a power of two, as the `largest` amplitude needs."""
         fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
         least = max(lab.effort.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest)
-        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * course.refine)
-        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, course.phase)
-        samples = round(course.samples * course.periods)
-        return lab.task(self.p, x, course.periods / self.frequency, step, flow=flow, samples=samples)
+        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * timing.refine)
+        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, timing.phase)
+        samples = round(timing.samples * timing.periods)
+        return lab.task(self.p, x, timing.periods / self.frequency, step, flow=flow, samples=samples)
 
     def row(self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float) -> Measurement:
         """A measurement in this pulsation."""
@@ -136,7 +136,7 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
 
 def _small(lab: Lab, name: str, p: Parameters, end: float) -> list[Pulsation]:
     """Small pulsations of a set about a part of the flow at which rolling ends."""
-    q = p.replace(omega_0=ROLLING * end)
+    q = p.replace(omega_0=ROLLS_AT * end)
     room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
     octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach
     return [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach * room) for n in octaves]
@@ -184,9 +184,9 @@ def _rounds(
     """
     states, seen = [each.start(a) for each, a in driven], list[list[Round] | str]([[]] * len(driven))
     for n in range(ROUNDS):
-        course = Course(PERIODS, samples, refine * (lab.effort.pulsation_refine if n == ROUNDS - 1 else 1))
+        timing = Timing(PERIODS, samples, refine * (lab.effort.pulsation_refine if n == ROUNDS - 1 else 1))
         todo = [(k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)]
-        tasks = [each.task(lab, a, states[k], course) for k, each, a, _ in todo]
+        tasks = [each.task(lab, a, states[k], timing) for k, each, a, _ in todo]
         for (k, each, a, before), task, run in zip(todo, tasks, lab.each(tasks), strict=True):
             if isinstance(run, str):
                 seen[k] = f"the run {run}"
@@ -236,8 +236,8 @@ def _search(lab: Lab, each: Pulsation) -> Search:
     """For the amplitude at which slip begins, in runs of one period and a half of which the first sixth is left out."""
 
     def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
-        course = Course(1.5 * attempt.time, lab.effort.pulsation_samples, 2 * attempt.refine)
-        return each.task(lab, amplitude, each.start(amplitude), course, largest=begin.high)
+        timing = Timing(1.5 * attempt.time, lab.effort.pulsation_samples, 2 * attempt.refine)
+        return each.task(lab, amplitude, each.start(amplitude), timing, largest=begin.high)
 
     if each.p.drag == STOKES:
         # Slip may begin from about half the largest amplitude on: the width is taken relative to that.
@@ -264,7 +264,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
     samples = 8 * PHASES
     rounds = _rounds(lab, slipping, 1, samples, slips=True)
     anew = [
-        each.task(lab, a, x, Course(1, samples, 1, phase=2 * math.pi * k / PHASES))
+        each.task(lab, a, x, Timing(1, samples, 1, phase=2 * math.pi * k / PHASES))
         for (each, a), seen in zip(slipping, rounds, strict=True)
         if not isinstance(seen, str)
         for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // PHASES])
@@ -305,13 +305,13 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             continue
         flows[name] = begins, holds, ends or math.nan
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
-            q = p.replace(omega_0=ROLLING * begins)
+            q = p.replace(omega_0=ROLLS_AT * begins)
             trials.append(_jump(lab, Start(name, q, "RR", State(omega_c=q.omega_0).stacked()), JUMP * q.omega_0))
-        starts.append(Start(name, p.replace(omega_0=begins + SLIPPING * (holds - begins)), "jump", np.zeros(8)))
+        starts.append(Start(name, p.replace(omega_0=begins + SLIPS_AT * (holds - begins)), "jump", np.zeros(8)))
         if ends is None:
             yield Missing("unsteady", name, "no flow was measured at which slipping at both points ends in a jump")
         else:
-            starts.append(Start(name, p.replace(omega_0=begins + RAMP[0] * (ends - begins)), "ramp", np.zeros(8)))
+            starts.append(Start(name, p.replace(omega_0=begins + RAMP_ENDS[0] * (ends - begins)), "ramp", np.zeros(8)))
     for start, state in zip(starts, settle(lab, starts), strict=True):
         if state.failure or state.case is not Case.SS:
             why = state.failure or state.case.name
@@ -340,7 +340,7 @@ def _jump(lab: Lab, start: Start, size: float) -> Trial:
 def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial]:
     """Ramps from settled slipping, which is between two flows in rad s-1, at several rates."""
     p, span = start.p, ends - begins
-    last = begins + RAMP[1] * span
+    last = begins + RAMP_ENDS[1] * span
     for rate in lab.effort.unsteady_rates:
         rise = rate * p.c * span
         t_end, at = (last - p.omega_0) / rise, {"rate": rise, **state_of(start.x0[:6])}

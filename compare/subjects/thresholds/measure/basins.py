@@ -36,6 +36,8 @@ DRAG = 1.25
 """Drag c, s-1: states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry."""
 FIGURES = ("fig-7", "fig-8")
 """mu as it is, and mu = eta."""
+WAYS = ("rest", "half as fast", "with the fluid", "on the wall")
+"""How balls start at each point of a plane."""
 
 FAR_AWAY, ARRIVED = 0.1, 0.01
 """Distances divided by that of the attractors: a long way, in two fifths of a run, and where a ball has arrived."""
@@ -56,9 +58,7 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             eta, flow = (np.array([0.02, 0.45]) + u * np.array([0.78, 3.15])).tolist()
             p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
             p = p.replace(mu=eta) if figure == "fig-8" else p
-            starts.append(
-                [named_start(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")]
-            )
+            starts.append([named_start(figure, p, how) for how in WAYS])
         patience = Patience(span=20.0, loose=LOOSE, rounds=lab.effort.plane_rounds)
         for (figure, u), states in zip(chosen, settle_groups(lab, starts, patience), strict=True):
             if not any(each.failure for each in states):
