@@ -127,6 +127,7 @@ class Run:
         """Samples of each run whose case is not yet decided."""
         self._ends = [math.inf] * len(parameters)
         """When each run broke down, s."""
+        self._check: Callable[[], object] = lambda: None
 
     @property
     def events(self) -> list[Events]:
@@ -156,6 +157,7 @@ class Run:
             for k, row in enumerate(raw):
                 left, first = 1 if last and k + 1 == len(raw) else self._interval, row
                 while left:
+                    self._check()
                     count = min(left, room - filled)
                     self._stepper.advance(itertools.islice(omega_0, count), self._noted[filled:], first)
                     filled, left, first = filled + count, left - count, None
@@ -171,8 +173,8 @@ class Run:
     def trajectories(self, check: Callable[[], object] = lambda: None) -> list[Trajectory]:
         """All runs, carried out to their ends; `check` is called from time to time, and may raise an error."""
         kept: list[Blocks] = [[] for _ in self.headers]
+        self._check = check
         for blocks in self:
-            check()
             for own, block in zip(kept, blocks, strict=True):
                 own.append(block)
         return [Trajectory.from_blocks(*each) for each in zip(self.headers, kept, self.events, strict=True)]

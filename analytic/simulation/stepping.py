@@ -114,6 +114,12 @@ class Ball(NamedTuple):
     """0, or by how much the velocities of a step that did not converge still changed, m s-1."""
 
 
+def whole(parts: Any) -> Ball:
+    """The ball that `advance` returns in parts."""
+    (place, u), P, impact, rest = parts
+    return Ball(At._make([*place, Velocities(*u)]), Forces(*P), Forces(*impact), *rest)
+
+
 class Solved(NamedTuple):
     """Velocities after a step or an impact, and what brought them about."""
 
@@ -314,11 +320,12 @@ def _worse(new: float, residual: float) -> float:
 @compiled
 def advance(
     ball: Ball, start: float, dt: float, first: int, count: int, flow: FlowArrays, p: Constants, events: Array
-) -> tuple[Ball, int, int]:
+) -> tuple[Any, int, int]:
     """Go on from step `first` of `count` that begin at `start`; return the ball, the next step, and events noted.
 
-    A row of `events` takes time, code of the case before and after, impulses of landings. It ends early when no row
-    is left, or when a step doesn't converge.
+    The ball is in parts, plain tuples (`whole`): a signal would be answered while numba makes named ones, which doesn't
+    look whether it has got them. A row of `events` takes time, code of the case before and after, impulses of landings.
+    It ends early when no row is left, or when a step doesn't converge.
     """
     noted, k = 0, first
     while k < count and noted < len(events):
@@ -331,7 +338,7 @@ def advance(
             events[noted, 3], events[noted, 4], events[noted, 5] = ball.impact.A_x, ball.impact.A_y, ball.impact.A_z
             events[noted, 6], events[noted, 7], events[noted, 8] = ball.impact.B_x, ball.impact.B_y, ball.impact.B_z
             noted += 1
-    return ball, k, noted
+    return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), k, noted
 
 
 @compiled

@@ -66,7 +66,8 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
             taken = 0
             while taken < count:
                 until = min(count, taken + AT_ONCE)
-                now, taken, noted = stepping.advance(now, start, dt, taken, until, fluid, given, events)
+                parts, taken, noted = stepping.advance(now, start, dt, taken, until, fluid, given, events)
+                now = stepping.whole(parts)
                 for time, before, after, *impulse in events[:noted].tolist():
                     recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
                 recorder.reached(start + taken * dt)

@@ -83,6 +83,8 @@ def program() -> NoReturn:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="spelled")
     os.environ["MPLBACKEND"] = "agg"  # figures go into files: that of a notebook would be looked for here, too
+    if not {"render", "--view"} & {*sys.argv}:  # MuJoCo would load a window library, by way of a Python of its own
+        os.environ.setdefault("MUJOCO_GL", "disable")
     with signals.answered(signals.end):
         try:
             code = main()
