@@ -131,7 +131,7 @@ def test_trajectory_describes_itself(method):
 
 @pytest.mark.parametrize(("method", "torque"), [("event", 0.0), ("time-stepping", 0.0), ("time-stepping", 3.0)])
 @pytest.mark.parametrize("x", [[0, 0, 9, 0, 0, 0, 0, 0], [0.01, 0, 20, -30, 10, 20, 0.002, -0.1]])
-def test_a_motion_against_the_clock_is_the_reflection_of_that_with_it(method, torque, x):
+def test_the_mirrored_motion(method, torque, x):
     """Onsets of slip, landings and the fluid's torque: reflection turns omega_c, slip_x, slip_y and omega_0."""
     p, flip, way = P.replace(fluid_torque=torque), np.array([1, 1, -1, -1, -1, 1, 1, 1]), {"timestep": 1e-3}
     there, back = (

@@ -164,7 +164,7 @@ def test_integrated_in_world_axes_the_motion_is_the_same(case):
 @pytest.mark.parametrize(
     ("name", "share"), [("block-rests", 0.9), ("block-slides", 1.25), ("pinched-block", 0.5), ("groove-rests", 0.9)]
 )
-def test_what_is_to_rest_needs_the_share_of_friction_that_is_said(name, share):
+def test_rest_needs_the_share_of_friction_that_is_said(name, share):
     """Statics: normal forces balance what acts across the surfaces, and friction what is left."""
     (case,) = (case for case in cases() if case.name == name)
     body, normals = case.body, np.array([surface.normal for surface in case.surfaces])

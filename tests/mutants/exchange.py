@@ -36,6 +36,8 @@ class WrongTheory:
     wrong: Fault
     level: Level = Level.QUICK
     """The least level whose measurements can show it."""
+    test: str = ""
+    """The unit test that sees it, where no measurement can."""
 
 
 @contextmanager

@@ -3,6 +3,9 @@
 import dataclasses
 import importlib
 import itertools
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +27,7 @@ from model import Case, Parameters
 from tests.mutants import engines, trial
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import WrongTheory, believed, scaled
-from tests.mutants.theories import THEORIES
+from tests.mutants.theories import FOR_TESTS, THEORIES
 
 P = Parameters.named("reference").replace(omega_0=25.0)
 
@@ -32,8 +35,8 @@ P = Parameters.named("reference").replace(omega_0=25.0)
 def test_there_are_many_and_each_replaces_a_function_that_exists_and_gives_it_back() -> None:
     assert len(THEORIES) >= 40
     assert len(WRONG_ENGINES) >= 8
-    assert len({wrong.what for wrong in THEORIES}) == len(THEORIES)
-    for wrong in THEORIES:
+    assert len({wrong.what for wrong in (*THEORIES, *FOR_TESTS)}) == len(THEORIES) + len(FOR_TESTS)
+    for wrong in (*THEORIES, *FOR_TESTS):
         module = importlib.import_module(wrong.module)
         right = getattr(module, wrong.function)
         with believed(wrong):
@@ -123,3 +126,27 @@ def test_functions_that_nothing_tries_are_found() -> None:
         names
     )  # called; changed by a wrong theory
     assert "flowmeter.characteristic.operating_limit" in names
+
+
+def test_subjects_name_wrong_theories_and_tests_that_there_are():
+    assert set(trial.SUBJECTS.values()) <= {wrong.what for wrong in (*THEORIES, *FOR_TESTS)}
+    for named in (*trial.BY_HAND.values(), *(f"analytic/test_{wrong.test}" for wrong in FOR_TESTS)):
+        file, _, test = named.partition("::")
+        assert f"def {test}(" in (Path(__file__).parents[1] / f"{file}.py").read_text("utf-8"), named
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", FOR_TESTS, ids=lambda wrong: wrong.what)
+def test_what_no_measurement_shows_a_unit_test_sees(wrong, tmp_path):
+    """In a process of its own, which believes it before the test is imported."""
+    file, _, test = wrong.test.partition("::")
+    (tmp_path / "believing.py").write_text(
+        "from tests.mutants.exchange import believed\nfrom tests.mutants.theories import FOR_TESTS\n"
+        f"belief = believed(next(w for w in FOR_TESTS if w.what == {wrong.what!r}))\n"
+        "def pytest_configure(config): belief.__enter__()\n"
+    )
+    root = Path(__file__).parents[2]
+    words = ["-p", "believing", "-n0", "-xq", "-p", "no:cacheprovider", f"tests/analytic/test_{file}.py", "-k", test]
+    where = {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{tmp_path}"}
+    done = subprocess.run([sys.executable, "-m", "pytest", *words], cwd=root, env=where, capture_output=True, text=True)
+    assert "1 failed" in done.stdout, done.stdout

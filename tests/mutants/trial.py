@@ -36,7 +36,7 @@ from compare.witnesses import hear
 from tests.mutants import engines
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import believed
-from tests.mutants.theories import THEORIES
+from tests.mutants.theories import FOR_TESTS, THEORIES
 
 Outcomes = dict[str, Outcome]
 R = TypeVar("R")
@@ -44,6 +44,43 @@ PROVING = frozenset({"settled", "laws", "field", "impacts"})
 """Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
 PATIENCE = 40.0
 """Processor time that the predictions of a claim may take under a wrong theory, s; several times what they need."""
+SUBJECTS = {
+    "C_D of the quadratic law": "the quadratic law's C_D is always 0.44",
+    "the law of the fluid's torque": "the fluid's torque as in creeping flow",
+    "restitution": "rebounds with nine tenths of the restitution",
+    "a ramp that rolling leads": "rolling at both points leads a ramp",
+    "ramps that begin later": "rolling at both points takes a ramp to begin with the run",
+    "stationary states at ω₀ < 0": "in a flow the other way round the ball spins as before",
+    "slow pulsation that falls to rest": "a slow pulsation never falls to rest",
+    "fast pulsation with both cones full": "a fast pulsation never fills both cones",
+    "RR in the case map for η > j": "regions in which RR never ends for η > j",
+    "η_cr of the quadratic law": "η_cr of the quadratic law as under Stokes' drag",
+    "η_cr for equal friction": "for equal friction the fold is born at η_cr of the set",
+    "RN and ω̃_z": "row of ω̃_z of RN 2 % large",
+    "jamming at μ > 1": "rolling lasts while forces can jam it",
+    "choice at μ > 1": "rolling goes on while forces allow it",
+    "SR on a smooth floor": "on a smooth floor the ball lags by 1 %",
+    "leaning direction's sign": "leaning mirrored",
+    "leaning direction's factor": "leaning at half the slope",
+    "landings on the wall": "landings on the wall with 5 % more friction",
+    "added mass": "the fluid adds all of the displaced mass",
+    "1 + j of RS": "the wall of RS doesn't turn the spin axis",
+}
+"""What wrong theories of others were about that nobody noticed at first, and a wrong theory here that is about it."""
+BY_HAND = {
+    "SS whose wall never opens": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "a floor without load that is never lost": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "NR that slips by B_y alone": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "RN's slip limit without j": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "onset of slip that isn't mirrored": "analytic/test_simulation::test_the_mirrored_motion",
+    "the fluid's spin with the wrong sign of ω₀": "analytic/test_real_fluid::test_rolling_with_the_torque_obeys_newton_"
+    "and_euler",
+    "a return map without its section": "analytic/test_orbits::test_newton_closes_the_orbit",
+    "a pinch at 0.95 of the friction": "compare/test_cases::test_rest_needs_the_share_of_friction_that_is_said",
+    "the wall's correction of friction's direction 20 % weak in y": "mjsim/test_drag::test_slipping_converges_with_the_"
+    "square_of_the_step",
+}
+"""Faults in compiled code, in methods and in MuJoCo's corrections, put in by hand, and the test that saw each."""
 _PAGE = """\
 # What the verdicts notice
 
@@ -64,6 +101,11 @@ wrote, without these claims in mind, says more: each was judged once, at quick, 
 | written here ({first}) | {tried} | {by_numbers} | {by_error} | {by_hanging} | {missed} |
 | written by others, held out | 171 | 152 | 1 | 5 | 13, of which 4 probably change nothing |
 | written by others, new | 55 | 29 | 1 | 1 | 24 |
+
+What these lists missed was about the following. Wrong theories that no measurement can show are tried by unit tests;
+those in compiled code and in methods were put in by hand, once, and a unit test saw each.
+
+{subjects}
 {trials}
 ## Functions that nothing tries
 
@@ -234,7 +276,18 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
     words = {"first": levels[0].name, "tried": len(tried), **{name: kinds[name] for name in KINDS}}
     words |= {"levels": names, "until": until, "patience": PATIENCE, "level": levels[-1].name}
     lists = {"untried": _by_module(levels[-1].untried), "powers": pages.markdown(rows)}
+    lists |= {"subjects": pages.markdown(_subjects(levels[0].trials))}
     return _PAGE.format(trials=tables, **words, **lists)
+
+
+def _subjects(trials: Sequence[Trial]) -> list[list[str]]:
+    """Who notices wrong theories about each of `SUBJECTS`, and the faults `BY_HAND`."""
+    measured, tests = {trial.what: trial.by for trial in trials}, {wrong.what: wrong.test for wrong in FOR_TESTS}
+    rows = [["subject", "wrong theory", "noticed by measurement", "by a unit test"]]
+    for subject, what in SUBJECTS.items():
+        test = f"`analytic/test_{tests[what]}`" if what in tests else "–"
+        rows.append([subject, what, measured.get(what, "**nobody**"), test])
+    return rows + [[subject, "by hand", "not tried", f"`{test}`"] for subject, test in BY_HAND.items()]
 
 
 def _by_module(names: Sequence[str]) -> str:
