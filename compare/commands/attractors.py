@@ -187,7 +187,7 @@ def plane(args: argparse.Namespace) -> int:
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     with running.campaign(args, "basins") as campaign:
-        mapped = basins(campaign, p, start._asdict(), across, up, args.mujoco, args.timestep)
+        mapped = basins(campaign, p, start._asdict(), (across, up), args.mujoco, args.timestep)
     if args.map:
         mapped.save(args.map)
     if args.plot:

@@ -96,7 +96,7 @@ def test_kept_searches_are_whole(path, tmp_path):
 def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):
     """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both engines alike."""
     assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
-    given = BISTABLE, {"y": 0.002}, Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0)), 2
+    given = BISTABLE, {"y": 0.002}, (Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0))), 2
     seen, maps = [], []
     for _ in range(2):
         with Campaign(tmp_path, workers=0, report=lambda what, done, total, failed: seen.append(done)) as campaign:
@@ -115,7 +115,7 @@ def test_a_ball_that_hops_on(tmp_path):
     p = Parameters.named("hopping")
     with Campaign(tmp_path, workers=0) as campaign:
         axes = Axis("y", (6.36e-3, 6.4e-3)), Axis("v_y", (0.0, 1e-3))
-        basin = basins(campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, *axes)
+        basin = basins(campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, axes)
     assert {FATES[k] for k in basin.fates.ravel()} == {"hops"}
 
 
@@ -149,7 +149,7 @@ def test_a_file_of_another_kind(kind, what, text, tmp_path):
 )
 def test_no_basins(changes, start, message, tmp_path):
     with pytest.raises(InputError, match=message), Campaign(tmp_path, workers=0) as campaign:
-        basins(campaign, BISTABLE.replace(**changes), start, Axis("omega_c", (0, 1)), Axis("slip_x", (0, 1)))
+        basins(campaign, BISTABLE.replace(**changes), start, (Axis("omega_c", (0, 1)), Axis("slip_x", (0, 1))))
 
 
 def test_command_basins(capsys, tmp_path):

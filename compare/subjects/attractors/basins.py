@@ -87,15 +87,15 @@ def basins(
     campaign: Campaign,
     p: Parameters,
     start: Mapping[str, float],
-    across: Axis,
-    up: Axis,
+    plane: tuple[Axis, Axis],
     coarse: int = 0,
     timestep: float = 2.5e-4,
 ) -> Basins:
-    """Fates of starts on a plane of two state variables, all others as in `start`, else zero, after 10/c.
+    """Fates of starts on a plane of two state variables, across and up, all others as in `start`, else zero, after 10/c.
 
     Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
     """
+    across, up = plane
     check_names((*start, across.name, up.name), VARIABLES, "state variable")
     if across.name == up.name:
         raise InputError(f"across and up are both {up.name}: a plane needs two state variables")
