@@ -91,7 +91,7 @@ def basins(
     coarse: int = 0,
     timestep: float = 2.5e-4,
 ) -> Basins:
-    """Fates of starts on a plane of two state variables, across and up, all others as in `start`, else zero, after 10/c.
+    """Fates after 10/c of starts on a plane of two state variables, across and up; all others as in `start`, or zero.
 
     Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
     """
