@@ -16,6 +16,7 @@ from compare.claim import Outcome, Verdict
 from compare.commands import options, running
 from compare.kit import pages, progress
 from compare.kit.levels import Level
+from compare.kit.sets import sets
 from compare.report import results, wording
 
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
@@ -60,9 +61,7 @@ def run(args: argparse.Namespace) -> int:
         wanted |= {"workers": running.workers(args), "progress": show}
         wanted |= {"announce": lambda verdict: console.print(line(verdict), soft_wrap=True)}
         verdicts = validation.validate(args.output, **wanted)
-    # A set of one's own may be too rough for a claim, or hold no example of it; the study's must not be.
-    spared = {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if chosen else set()
-    return _finish(verdicts, [v for v in verdicts if v.outcome not in spared], args, console)
+    return _finish(verdicts, {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if chosen else set(), args, console)
 
 
 def judge(args: argparse.Namespace) -> int:
@@ -73,20 +72,22 @@ def judge(args: argparse.Namespace) -> int:
     verdicts = validation.judge_stored(args.output, args.claim, args.workers)
     for verdict in verdicts:
         console.print(line(verdict), soft_wrap=True)
-    return _finish(verdicts, [v for v in verdicts if v.outcome is not Outcome.NOT_RUN], args, console)
+    own = any(check.measurement.set not in sets(Level.FULL) for verdict in verdicts for check in verdict.checks)
+    return _finish(verdicts, {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if own else {Outcome.NOT_RUN}, args, console)
 
 
-def _finish(
-    verdicts: Sequence[Verdict], counting: Sequence[Verdict], args: argparse.Namespace, console: Console
-) -> int:
-    """Print what there is, and return the exit code: 0 if all that count came out as expected."""
+def _finish(verdicts: Sequence[Verdict], spared: set[Outcome], args: argparse.Namespace, console: Console) -> int:
+    """Print what there is, and return the exit code: 0 if all came out as expected, or in a way that is spared.
+
+    A set of one's own may be too rough for a claim, or hold no example of it; the study's must not be.
+    """
     if args.json:
         print(json.dumps([results.described(verdict) for verdict in verdicts], indent=1))
     if args.verbose:
         console.print(*(checks(verdict) for verdict in verdicts if verdict.checks))
     console.print(summary(verdicts), soft_wrap=True)
     console.print(f"report: {args.output / results.REPORT}")
-    return 0 if all(verdict.passed for verdict in counting) else 1
+    return 0 if all(verdict.passed or verdict.outcome in spared for verdict in verdicts) else 1
 
 
 def line(verdict: Verdict) -> Text:

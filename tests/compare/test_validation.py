@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import pytest
 
 from compare import validation
-from compare.claim import Bearing, Claim, Outcome
+from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.commands import cli
 from compare.kit import programme
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
 from compare.kit.programme import UNDAMPED, Protocol
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Check, Measurement, Missing, Records
 from compare.report import results
 from model import Parameters, StorageError
 from tests.measured import measured
@@ -185,3 +185,25 @@ def test_the_command_line(command, tmp_path, counted, capsys):
     assert verdicts[0]["passed"] is True
     assert set(verdicts[0]["resolving_power"]) == {"omega_c"}
     assert verdicts[0]["checks"][0]["predicted"] == Parameters.named("reference").omega_0
+
+
+@pytest.mark.parametrize(
+    ("of", "outcome", "code"),
+    [
+        ("reference", Outcome.INCONCLUSIVE, 1),
+        ("mine", Outcome.INCONCLUSIVE, 0),
+        ("mine", Outcome.REFUTED, 1),
+        ("mine", Outcome.ERROR, 1),
+    ],
+)
+def test_what_a_set_of_ones_own_is_too_rough_for_is_no_failure(of, outcome, code, monkeypatch, tmp_path, capsys):
+    row = measured("round", "omega_c", 12.0, 1.0, set=of)
+    found = Verdict(
+        claim=claim("of-round", "round"),
+        outcome=outcome,
+        checks=(Check(measurement=row, predicted=12.0, tolerance=1.0, scale=12.0),),
+    )
+    monkeypatch.setattr(validation, "judge_stored", lambda *_: [found])
+    assert cli.main(["judge", str(tmp_path)]) == code
+    told = "1 of 1 claims can't be told from what was measured: of-round"
+    assert (told in capsys.readouterr().out) == (outcome is Outcome.INCONCLUSIVE)
