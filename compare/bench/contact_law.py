@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -100,48 +101,60 @@ class Contacts:
         """Stiffness and damping of rows of these contacts, see the function `reference`."""
         return reference(solref, self.solimp, self.timestep, self.discrete, self.refsafe)
 
-    @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
-    def law(self) -> Law:
-        """What the contacts do under their loads."""
-        h, load = self.timestep, self.force[:, 0]
+    @cached_property
+    def _springs(self) -> tuple[Array, Array, Array]:
+        """Stiffness for an impedance of one, s-2, damping of normal rows and of friction, s-1."""
         spring, b = self.reference(self.solref)
         own = self.solreffriction.any(1) & (not self.pyramidal)
-        b_f = np.where(own, self.reference(self.solreffriction)[1], b)
-        mu, frictional = self.friction, self._frictional
-        slides = self.cone >= CONE
-        wanted = np.where(frictional, np.abs(self.force[:, 1:]) / mu, 0)  # friction divided by its coefficient
+        return spring, b, np.where(own, self.reference(self.solreffriction)[1], b)
 
-        def rows(depth: Array) -> tuple[Array, Array, Array]:
-            """Softness of a row, its stiffness, and the damping of friction as a steady state sees it."""
-            d = impedance(self.solimp, depth)
-            softness, k = (1 - d) / d * self.softness, spring * d
-            if not self.discrete:
-                return softness, k, b_f
-            return softness, k, b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
+    @cached_property
+    def _wanted(self) -> Array:
+        """Friction divided by its coefficient, (n, 5), N or N m."""
+        return np.where(self._frictional, np.abs(self.force[:, 1:]) / self.friction, 0)
 
-        def excess(depth: Array) -> Array:
-            """Load at a depth, less the load that there is."""
-            softness, k, damping = rows(depth)
-            x = k * depth / softness
-            sliding = damping[:, None] * mu * np.abs(self.slip) / softness[:, None] * frictional
-            if self.pyramidal:
-                edge = np.maximum(2 * x[:, None], np.where(slides[:, None], x[:, None] + sliding, wanted))
-                return np.where(self.dim > 1, (edge * frictional).sum(1), x) - load
-            kept = mu[:, 0] ** 2 / self.impratio * load
-            return x + np.where(slides, np.maximum(np.hypot.reduce(sliding, 1) - kept, 0), 0) - load
+    def _rows(self, depth: Array) -> tuple[Array, Array, Array]:
+        """Softness of a row, its stiffness, and the damping of friction as a steady state sees it."""
+        (spring, b, b_f), d, h = self._springs, impedance(self.solimp, depth), self.timestep
+        softness, k = (1 - d) / d * self.softness, spring * d
+        if not self.discrete:
+            return softness, k, b_f
+        return softness, k, b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
 
+    def _borne(self, depth: Array, slides: Array) -> Array:
+        """The load that contacts bear at a depth."""
+        softness, k, damping = self._rows(depth)
+        x, load = k * depth / softness, self.force[:, 0]
+        sliding = damping[:, None] * self.friction * np.abs(self.slip) / softness[:, None] * self._frictional
+        if self.pyramidal:
+            edge = np.maximum(2 * x[:, None], np.where(slides[:, None], x[:, None] + sliding, self._wanted))
+            return np.where(self.dim > 1, (edge * self._frictional).sum(1), x)
+        kept = self.friction[:, 0] ** 2 / self.impratio * load
+        return x + np.where(slides, np.maximum(np.hypot.reduce(sliding, 1) - kept, 0), 0)
+
+    def _depth(self, slides: Array) -> Array:
+        """Depth below the margin at which contacts bear their loads, by bisection, m."""
+        load = self.force[:, 0]
         low = np.zeros(len(load))
-        softness, k, _ = rows(low)
+        softness, k, _ = self._rows(low)
         high = 1.01 * softness * load / k
         for _ in range(100):
             middle = (low + high) / 2
-            above = excess(middle) > 0
+            above = self._borne(middle, slides) - load > 0
             low, high = np.where(above, low, middle), np.where(above, middle, high)
-        depth = (low + high) / 2
-        softness, k, damping = rows(depth)
-        first, _, first_damping = rows(np.zeros(len(load)))
+        return np.asarray((low + high) / 2)
+
+    @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
+    def law(self) -> Law:
+        """What the contacts do under their loads."""
+        load, mu, frictional, slides = self.force[:, 0], self.friction, self._frictional, self.cone >= CONE
+        _, b, b_f = self._springs
+        depth = self._depth(slides)
+        softness, k, damping = self._rows(depth)
+        first, _, first_damping = self._rows(np.zeros(len(load)))
         if self.pyramidal:
             x = (k * depth / softness)[:, None]
+            wanted = self._wanted
             creep = softness[:, None] * np.where(wanted <= 2 * x, wanted / 2, wanted - x) / (mu * damping[:, None])
             hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
             sideways = 2 * mu**2 / softness[:, None]
@@ -151,7 +164,7 @@ class Contacts:
             hover = (1 + mu[:, 0] ** 2 / self.impratio) * first * load / (mu[:, :2].max(1) * first_damping)
             sideways = 1 / soft
         shift = 1e-6 * depth
-        (softer, k_less, _), (harder, k_more, _) = rows(depth - shift), rows(depth + shift)
+        (softer, k_less, _), (harder, k_more, _) = self._rows(depth - shift), self._rows(depth + shift)
         slope = softness * (k_more * (depth + shift) / harder - k_less * (depth - shift) / softer) / (2 * shift)
         if self.noslip:  # it corrects friction alone, after normal forces were found beside friction at no creep
             creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
