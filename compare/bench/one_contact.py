@@ -19,8 +19,8 @@ from model import Parameters, State
 from model.arrays import Array
 
 G, J = 9.81, 0.4
-RADIUS, BLOCK = 0.1, (0.1, 0.1, 0.05)
-"""Radius of the spheres and half edges of the blocks, m; all weigh 1 kg."""
+RADIUS, BLOCK, MU = 0.1, (0.1, 0.1, 0.05), 0.5
+"""Radius of the spheres and half edges of the blocks, m; all weigh 1 kg; friction of most surfaces."""
 CLOSED = 1e-14
 """Round-off of a closed form, in units of the scales."""
 SPEED_ALONE = (math.inf, 0.01, math.inf)
@@ -32,7 +32,7 @@ Course = Callable[..., tuple[Array, ...]]
 
 def cases() -> tuple[Case, ...]:
     """The cases with one contact."""
-    return (*_blocks(), *_spheres(), _turntable(), _cylinder())
+    return (*_blocks_on_slopes(), _growing_pull(), _pinched(), *_spheres(), _drilling(), _turntable(), _cylinder())
 
 
 def closed(
@@ -100,10 +100,8 @@ def along(way: Array, s: Any, v: Any, spin: Any, start: Any) -> tuple[Array, Arr
     return start + np.outer(s, way), np.outer(v, way), np.outer(spin, across)
 
 
-def _blocks() -> list[Case]:
-    mu = 0.5
-
-    def slides(t: Array, angle: float, mu: float = mu, v: float = 0.0) -> tuple[Array, Array, Array]:
+def _blocks_on_slopes() -> list[Case]:
+    def slides(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> tuple[Array, Array, Array]:
         """On a slope, from a speed; it stops where friction is the stronger and doesn't start again."""
         way, normal = slope(angle)
         a = G * (math.sin(angle) - mu * math.cos(angle))
@@ -113,31 +111,31 @@ def _blocks() -> list[Case]:
 
     def on_slope(name: str, about: str, tangent: float, v: float, **more: Any) -> Case:
         angle = math.atan(tangent)
-        floor, course = Surface("floor", mu, normal=slope(angle)[1]), partial(slides, angle=angle, v=v)
+        floor, course = Surface("floor", MU, normal=slope(angle)[1]), partial(slides, angle=angle, v=v)
         source = "Coulomb's law with Newton's second, integrated by hand"
         return closed(name, about, block(angle), (floor,), course, source=source, **more)
 
-    found = [
+    return [
         on_slope(
             "block-rests",
             "a block on a slope whose tangent is 0.9 of its friction must not move",
-            0.9 * mu,
+            0.9 * MU,
             0.0,
             contacts=lambda t: "R",
-            wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.85 * mu}},
+            wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.85 * MU}},
             until=2.0,
             scales=SPEED_ALONE,
         ),
         on_slope(
             "block-slides",
             "a block on a slope whose tangent is 1.25 of its friction slides down at g (sin - mu cos)",
-            1.25 * mu,
+            1.25 * MU,
             0.0,
             contacts=lambda t: "S",
             wrong={
                 "no friction": {"mu": 0.0},
-                "friction 5 % too strong": {"mu": 1.05 * mu},
-                "a threshold at 1.3 of Coulomb's": {"mu": 1.3 * mu},
+                "friction 5 % too strong": {"mu": 1.05 * MU},
+                "a threshold at 1.3 of Coulomb's": {"mu": 1.3 * MU},
             },
             until=1.0,
             scales=(0.5, 1.0, math.inf),
@@ -147,56 +145,56 @@ def _blocks() -> list[Case]:
             "a box that is pushed off at 2 m/s slides v^2/(2 mu g) on a level floor, stops and stays",
             0.0,
             2.0,
-            contacts=lambda t: "S" if t < 2.0 / (mu * G) else "R",
-            wrong={"friction 5 % too weak": {"mu": 0.95 * mu}, "no friction": {"mu": 0.0}},
+            contacts=lambda t: "S" if t < 2.0 / (MU * G) else "R",
+            wrong={"friction 5 % too weak": {"mu": 0.95 * MU}, "no friction": {"mu": 0.0}},
             until=1.0,
             scales=(0.5, 1.0, math.inf),
         ),
     ]
 
-    def pulled(t: Array, mu: float = mu, grip: float = 1.0) -> tuple[Array, Array, Array]:
+
+def _growing_pull() -> Case:
+    def pulled(t: Array, mu: float = MU, grip: float = 1.0) -> tuple[Array, Array, Array]:
         late = np.maximum(t - grip * mu * G / 10.0, 0.0)
         way, a0 = np.array([1.0, 0.0, 0.0]), (grip - 1) * mu * G
         return along(way, a0 * late**2 / 2 + 10.0 * late**3 / 6, a0 * late + 5.0 * late**2, 0 * t, BLOCK[2] * _UP)
 
-    found.append(
-        closed(
-            "growing-pull",
-            "a block under a force that grows by 10 N a second breaks away at mu m g and then slides",
-            block(),
-            (Surface("floor", mu),),
-            pulled,
-            {"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
-            until=1.0,
-            scales=(0.1, 0.5, math.inf),
-            contacts=lambda t: "R" if t < mu * G / 10.0 else "S",
-            source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive",
-            growth=(10.0, 0.0, 0.0),
-        )
+    return closed(
+        "growing-pull",
+        "a block under a force that grows by 10 N a second breaks away at mu m g and then slides",
+        block(),
+        (Surface("floor", MU),),
+        pulled,
+        {"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
+        until=1.0,
+        scales=(0.1, 0.5, math.inf),
+        contacts=lambda t: "R" if t < MU * G / 10.0 else "S",
+        source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive",
+        growth=(10.0, 0.0, 0.0),
     )
-    push = G / (0.5 * mu)
 
-    def held(t: Array, mu: float = mu) -> tuple[Array, Array, Array]:
+
+def _pinched() -> Case:
+    push = G / (0.5 * MU)
+
+    def held(t: Array, mu: float = MU) -> tuple[Array, Array, Array]:
         fall = max(G - mu * push, 0.0)
         start = np.array([-BLOCK[0], 0.0, 1.0])
         return start - np.outer(fall * t**2 / 2, _UP), -np.outer(fall * t, _UP), np.zeros((len(t), 3))
 
-    found.append(
-        closed(
-            "pinched-block",
-            "a block is pressed against a vertical wall, half of the friction there is carries it: it must not move",
-            block(),
-            (Surface("wall", mu, normal=(-1.0, 0.0, 0.0)),),
-            held,
-            {"friction of 0.45 of Coulomb's": {"mu": 0.45 * mu}},
-            until=2.0,
-            scales=SPEED_ALONE,
-            contacts=lambda t: "R",
-            source="statics: half of mu times the force carries the weight, the pressure stays on the face",
-            pull=(push, 0.0, 0.0),
-        )
+    return closed(
+        "pinched-block",
+        "a block is pressed against a vertical wall, half of the friction there is carries it: it must not move",
+        block(),
+        (Surface("wall", MU, normal=(-1.0, 0.0, 0.0)),),
+        held,
+        {"friction of 0.45 of Coulomb's": {"mu": 0.45 * MU}},
+        until=2.0,
+        scales=SPEED_ALONE,
+        contacts=lambda t: "R",
+        source="statics: half of mu times the force carries the weight, the pressure stays on the face",
+        pull=(push, 0.0, 0.0),
     )
-    return found
 
 
 def _spheres() -> list[Case]:
@@ -212,9 +210,6 @@ def _spheres() -> list[Case]:
         a = max(G * math.sin(angle) / (1 + j), G * (math.sin(angle) - mu * math.cos(angle)))
         spun = (G * math.sin(angle) - a) / (j * RADIUS)
         return along(way, a * t**2 / 2, a * t, spun * t, RADIUS * np.array(normal))
-
-    def spins(t: Array, decay: float = 0.0) -> tuple[Array, Array, Array]:
-        return RADIUS * _UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), _UP)
 
     gentle, steep = math.atan(0.5), math.atan(2.5)
     return [
@@ -254,19 +249,25 @@ def _spheres() -> list[Case]:
             contacts=lambda t: "S",
             source="Newton and Euler: a = g (sin - mu cos), j r spin' = mu g cos",
         ),
-        closed(
-            "drilling-sphere",
-            "a sphere spins about the vertical on a point, where friction has no arm: it spins for ever",
-            sphere(),
-            (Surface("floor", 0.5),),
-            spins,
-            {"a damping of 5 % a second": {"decay": 0.05}},
-            until=2.0,
-            scales=(0.1, 1.0, 20.0),
-            contacts=lambda t: "R",
-            source="a point contact carries no moment",
-        ),
     ]
+
+
+def _drilling() -> Case:
+    def spins(t: Array, decay: float = 0.0) -> tuple[Array, Array, Array]:
+        return RADIUS * _UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), _UP)
+
+    return closed(
+        "drilling-sphere",
+        "a sphere spins about the vertical on a point, where friction has no arm: it spins for ever",
+        sphere(),
+        (Surface("floor", MU),),
+        spins,
+        {"a damping of 5 % a second": {"decay": 0.05}},
+        until=2.0,
+        scales=(0.1, 1.0, 20.0),
+        contacts=lambda t: "R",
+        source="a point contact carries no moment",
+    )
 
 
 def _turntable() -> Case:
@@ -296,6 +297,8 @@ def _turntable() -> Case:
 
 def _cylinder() -> Case:
     orbit, turns = 1.0, 8.0
+    # The same in the study's vessel, far above its floor.
+    p = Parameters(m=1.0, r=RADIUS, R=orbit, j=J, mu=1.0, eta=1.0, g=G, c=0.0, omega_0=0.0)
 
     def rises(t: Array, j: float = J) -> tuple[Array, Array, Array]:
         """Round and down from rest: z'' = -g/(1 + j) - k^2 z with k = turns sqrt(j/(1 + j))."""
@@ -318,11 +321,5 @@ def _cylinder() -> Case:
         scales=(1.0, 8.0, 80.0),
         contacts=lambda t: "R",
         source="Newton and Euler in the turning frame: the spin along the radius changes with height",
-        motion=_high_up(orbit, turns),
+        motion=(p, State(y=10.0, omega_c=turns, slip_x=-turns * orbit / RADIUS)),
     )
-
-
-def _high_up(orbit: float, turns: float) -> tuple[Parameters, State]:
-    """The same in the study's vessel, far above its floor and without drag."""
-    p = Parameters(m=1.0, r=RADIUS, R=orbit, j=J, mu=1.0, eta=1.0, g=G, c=0.0, omega_0=0.0)
-    return p, State(y=10.0, omega_c=turns, slip_x=-turns * orbit / RADIUS)
