@@ -4,6 +4,7 @@ The steep contact has friction against the direction of v/sqrt(v^2 + eps^2) in t
 (26) hold throughout, nothing ever sticks and no case is chosen. The simulation has to be its limit for eps -> 0.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -149,8 +150,9 @@ def test_the_papers_bounds(mu, eta):
 def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
     """At the end of RR friction is full and opposes the slip that sets in, which has no acceleration yet."""
     rng, ends = np.random.default_rng(2), set()
-    for _ in range(300):
+    for sense in [1, -1] * 150:
         p, omega_c = random_rolling(rng)
+        p, omega_c = p.replace(omega_0=sense * p.omega_0), sense * omega_c
         lag = p.omega_0 - omega_c
 
         def margin(share, p=p, omega_c=omega_c, lag=lag):
@@ -161,7 +163,7 @@ def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
         fluid = omega_c + brentq(margin, 0, 3, xtol=1e-14) * lag
         at = Moment(0.0, 0.0, State(omega_c=omega_c))
         case, onset = transitions.leave(at, p, fluid)
-        ends.add(case)
+        ends.add((case, sense))
         slips = (onset.alpha, case.A), (onset.beta, case.B)
         directions = [(math.sin(angle), math.cos(angle)) for angle, contact in slips if contact is Contact.S]
         forces = dynamics.FORCES[case](at.x, p, fluid, *directions)
@@ -170,7 +172,7 @@ def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
         assert math.hypot(forces.B_y, forces.B_z) <= p.eta * forces.B_x * (1 + 1e-9)
         rate = dynamics.newton_euler(case, at.x, forces, p, fluid)
         np.testing.assert_allclose([rate.slip_x, rate.slip_y, rate.slip_z], 0.0, atol=1e-9 * p.g / p.r)
-    assert ends == {Case.RS, Case.SR, Case.SS}
+    assert ends == set(itertools.product((Case.RS, Case.SR, Case.SS), (1, -1)))
 
 
 @pytest.mark.parametrize("rolls", "AB")

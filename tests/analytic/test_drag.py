@@ -67,7 +67,6 @@ def test_a_ball_with_the_drag_10_sinks_at_stokes_speed(nu_f, rho_f, rho_b, r):
 
 
 METHODS = [Settings(), Settings(method="time-stepping", timestep=1e-4)]
-OTHERS = LAWS[1:]
 
 
 @pytest.mark.parametrize("settings", METHODS, ids=lambda s: s.method)
@@ -82,20 +81,6 @@ def test_rolling_after_the_fluid_under_quadratic_drag(settings):
     # Global error of the midpoint rule, t/24 h^2 max|f'''| and as much from the products of lower derivatives.
     allowed = 1e-8 * p.omega_0 + 2 * t_end / 24 * step**2 * 6 * K**3 * lag**4
     np.testing.assert_allclose(run.omega_c, expected, rtol=0, atol=allowed)
-
-
-@pytest.mark.parametrize("law", OTHERS)
-@pytest.mark.parametrize("settings", METHODS, ids=lambda s: s.method)
-def test_a_fall_through_still_fluid_ends_at_the_terminal_speed(law, settings):
-    """In the middle of the vessel, at rest, both contacts open; weight is balanced by the force of the law."""
-    p = BY_LAW[law].replace(omega_0=0.0, c=1.0, nu_f=1e-4)
-    run = simulate(p, [50.0, 0, 0, 0, 0, 0, p.R / 2, 0], 4.0, settings=settings, sample_interval=0.1)
-    assert set(run.cases) == {Case.NN}
-    speed = -run.v_y[-1]
-    assert float(resistance(speed, p)) * speed == pytest.approx(p.g, rel=1e-8)
-    if law == "quadratic":
-        np.testing.assert_allclose(run.v_y, -speed * np.tanh(p.g * run.time / speed), rtol=0, atol=1e-6 * speed)
-    assert run.h[-1] == pytest.approx(p.R / 2, abs=1e-12)
 
 
 @pytest.mark.parametrize("law", LAWS)

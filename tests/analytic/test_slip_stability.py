@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from analytic import contact_forces, stationary_solutions, thresholds, vector_field
+from analytic import stationary_solutions, thresholds, vector_field
 from analytic.mechanics import rolling_forces
 from analytic.slipping import slip_stability as slip
 from model import Case, InputError, Parameters, State
@@ -131,26 +131,6 @@ def test_counter_example_to_the_claim_after_80():
     for factor, grows in ((0.605, True), (0.615, False)):
         x, q = State(omega_c=factor * 2 * omega), P.replace(omega_0=factor * 2 * omega)
         assert (extreme(1, Case.RR, Case.SS, x, q)[1] > 0) == grows
-
-
-@pytest.mark.parametrize(
-    ("inner", "outer", "x"),
-    [
-        (Case.SR, Case.NR, State(omega_c=9.0, slip_x=-6.0)),
-        (Case.SS, Case.NS, State(omega_c=9.0, slip_x=-20.0, slip_y=4.0, slip_z=22.0)),
-    ],
-)
-def test_the_ball_lifts_where_the_floor_would_have_to_pull(inner, outer, x):
-    p = P.replace(omega_0=12.0)
-    onset = slip.lift_onset(inner, outer, x, p)
-    for factor, lifts in ((0.999, False), (1.001, True)):
-        faster = factor * onset / x.omega_c
-        spin = x.slip_x * (faster if inner is Case.SR else 1.0)
-        there, q = x._replace(omega_c=factor * onset, slip_x=spin), p.replace(omega_0=p.omega_0 * faster)
-        assert (
-            (contact_forces(inner, there, q)[0][1] < 0) == (slip.lift_acceleration(inner, outer, there, q) > 0) == lifts
-        )
-    assert np.isnan(slip.lift_onset(Case.RS, Case.NS, State(omega_c=9.0, slip_y=4.0), p))
 
 
 # --- arrows -----------------------------------------------------------------------------------------------------

@@ -1,8 +1,6 @@
 """Searches cover their box evenly; basins are those of theory; both go on where they stopped."""
 
 import dataclasses
-import json
-import math
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from analytic.simulation.ensemble import interval
 from compare.commands import cli
 from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
-from compare.kit.workers import processes
 from compare.subjects.attractors.basins import FATES, Basins, basins
 from docs.studies import search
 from docs.studies.figures import SEARCHES
@@ -23,37 +20,6 @@ from model import InputError, Parameters, StorageError, storage
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 QUICK = AttractorSearch({**BOX, "kappa": (0.5, 1.0)}, starts=2)
-
-
-def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
-    points = AttractorSearch().points(64)
-    low, high = np.array(list(BOX.values())).T
-    assert np.all((points >= low) & (points <= high))
-    np.testing.assert_array_equal(AttractorSearch().points(1000)[:64], points)
-    halves = points[:, 0] < math.sqrt(low[0] * high[0])
-    assert halves.sum() == 32  # a Sobol sequence puts equally many into each half, here of log mu
-    p = parameters(points[0])
-    np.testing.assert_allclose([p.mu, p.eta, p.j, p.r / p.R, p.kappa, p.Omega_0], points[0])
-
-
-def test_a_search_goes_on_where_it_stopped(tmp_path):
-    """A chunk that is there is read, not computed: nothing is left for the workers to do."""
-    rows = [{"hops": 0, "failed": 0}] * (search.CHUNK - 1) + [{"hops": 1, "failed": 1, "x": [], "confirmed": None}]
-    (tmp_path / f"{QUICK.key(0)}.json").write_text(json.dumps({"chunk": 0, "rows": rows}), "utf-8")
-    seen = []
-    record = search.run(tmp_path, QUICK, 10, processes(1), lambda *now: seen.append(now))
-    assert seen == [("search", search.CHUNK, search.CHUNK, 0)]
-    assert (record.sets, record.failed, len(record.rows), record.confirmed) == (search.CHUNK, 1, 1, [])
-    assert record.rows[0]["mu"] == QUICK.points(search.CHUNK)[-1, 0]
-
-
-def test_a_chunk_is_the_same_whoever_computes_it(tmp_path):
-    points = QUICK.points(search.CHUNK)[:3]
-    for name in ("a", "b"):
-        search.carry_out(QUICK, 0, points, tmp_path / name)
-    a, b = ((tmp_path / name).read_text() for name in ("a", "b"))
-    assert a == b
-    assert len(json.loads(a)["rows"]) == 3
 
 
 def test_screen_and_confirmation_tell_hopping_from_rest():

@@ -72,7 +72,8 @@ BY_HAND = {
     "a floor without load that is never lost": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
     "NR that slips by B_y alone": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
     "RN's slip limit without j": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
-    "onset of slip that isn't mirrored": "analytic/test_simulation::test_the_mirrored_motion",
+    "onset of slip that isn't mirrored": "analytic/test_choice::test_never_beyond_what_forces_can_hold_and_continuous_"
+    "where_it_ends",
     "the fluid's spin with the wrong sign of ω₀": "analytic/test_real_fluid::test_rolling_with_the_torque_obeys_newton_"
     "and_euler",
     "a return map without its section": "analytic/test_orbits::test_newton_closes_the_orbit",
