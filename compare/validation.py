@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
@@ -21,6 +20,7 @@ from compare.kit.drawing import Material
 from compare.kit.engines import WITNESSES, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
+from compare.kit.programme import Protocol
 from compare.kit.progress import Show, ValidationProgress, nowhere
 from compare.kit.record import Missing, Records, RecordsByEngine
 from compare.kit.workers import JUDGING, Spread, Workers, at_most, processes, threads
@@ -78,19 +78,6 @@ def validate(
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
     todo = [protocol for protocol in programme.needed(PROTOCOLS, names) if protocol.assignment.level <= level]
     engines = [engine] if engine else [*WITNESSES]
-    testimony = {each.name: dict.fromkeys(each.refine, Records()) for each in engines}
-    broken, judged = dict[str, str](), dict[str, Future[Verdict]]()
-
-    def judge_what_is_there() -> None:
-        waiting = Counter(protocol.name for protocol, _ in jobs)
-        for claim in chosen:
-            # Next to a threshold a settled state has no limit: see `witnesses.MARGIN`.
-            needed = claim.protocols | ({"thresholds"} if "settled" in claim.protocols else set())
-            if claim.id not in judged and not waiting.keys() & needed:
-                heard = {name: dict(steps) for name, steps in testimony.items()}
-                judged[claim.id] = bench.submit(_announced, claim, heard, dict(broken), announce)
-                judged[claim.id].add_done_callback(lambda _: far.judged())
-
     far = ValidationProgress(progress, {}, len(chosen))
     with (
         threads(1) as bench,  # judges while the next protocols' runs are on their way
@@ -99,22 +86,15 @@ def validate(
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
         jobs = [(protocol, lab) for lab in labs for protocol in todo if protocol.measures(lab)]
         far.costs = {programme.job_name(protocol.name, lab): programme.cost((protocol, lab)) for protocol, lab in jobs}
-        judge_what_is_there()
+        judging = _Judging(chosen, engines, lambda *of: bench.submit(_announced, announce, *of), far.judged)
+        judging.judge(jobs)
         for job, found in programme.run(tuple(jobs), sets, output):
             protocol, lab = job
             jobs.remove(job)
-            name = programme.job_name(protocol.name, lab)
-            far.measured(name)
-            if isinstance(found, Records):
-                testimony[lab.engine.name][lab.refine] += found
-            elif lab.engine is engines[0]:  # a protocol that breaks down takes its own claims with it, and no others
-                broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
-            else:
-                why = f"{name}: {type(found).__name__}: {found}"
-                lost = tuple(Missing(protocol.name, each, why) for each in sets or protocol.measures(lab))
-                testimony[lab.engine.name][lab.refine] += Records(missing=lost)
-            judge_what_is_there()
-    verdicts = {name: future.result() for name, future in judged.items()}
+            far.measured(programme.job_name(protocol.name, lab))
+            judging.take(protocol, lab, found, [*(sets or protocol.measures(lab))])
+            judging.judge(jobs)
+    verdicts = {name: future.result() for name, future in judging.judged.items()}
     files = {
         each.name: {refine: _files(output, Lab(campaign, each, level, refine), sets) for refine in each.refine}
         for each in engines
@@ -124,6 +104,44 @@ def validate(
         draw = far.drawing(work.map) if report else None
         _write(output, level, files, results.testimony(files), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
+
+
+class _Judging:
+    """Claims that are judged as soon as all that they need is measured."""
+
+    def __init__(
+        self,
+        claims: Sequence[Claim],
+        engines: Sequence[Engine],
+        submit: Callable[..., Future[Verdict]],
+        done: Callable[[], None],
+    ) -> None:
+        self.claims, self.trial, self.submit, self.done = claims, engines[0], submit, done
+        self.measured = {each.name: dict.fromkeys(each.refine, Records()) for each in engines}
+        self.broken, self.judged = dict[str, str](), dict[str, Future[Verdict]]()
+
+    def take(self, protocol: Protocol, lab: Lab, found: Records | Exception, sets: Sequence[str]) -> None:
+        """What a protocol has measured, or why it broke down, which takes its own claims with it, and no others."""
+        if isinstance(found, Records):
+            records = found
+        elif lab.engine is self.trial:
+            self.broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
+            return
+        else:
+            why = f"{programme.job_name(protocol.name, lab)}: {type(found).__name__}: {found}"
+            records = Records(missing=tuple(Missing(protocol.name, each, why) for each in sets))
+        self.measured[lab.engine.name][lab.refine] += records
+
+    def judge(self, jobs: Sequence[programme.Job]) -> None:
+        """All claims that wait for none of these protocols."""
+        waiting = {protocol.name for protocol, _ in jobs}
+        for claim in self.claims:
+            # Next to a threshold a settled state has no limit: see `witnesses.MARGIN`.
+            needed = claim.protocols | ({"thresholds"} if "settled" in claim.protocols else set())
+            if claim.id not in self.judged and not waiting & needed:
+                heard = {name: dict(steps) for name, steps in self.measured.items()}
+                self.judged[claim.id] = self.submit(claim, heard, dict(self.broken))
+                self.judged[claim.id].add_done_callback(lambda _: self.done())
 
 
 def _files(output: Path, lab: Lab, sets: Mapping[str, Parameters] | None) -> list[Path]:
@@ -210,7 +228,7 @@ def _write(
     return verdicts
 
 
-def _announced(claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str], announce: Announce) -> Verdict:
+def _announced(announce: Announce, claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str]) -> Verdict:
     """The verdict, or that one of the protocols of its claim broke down."""
     judged = hear(claim, testimony)
     if errors := [why for name, why in broken.items() if name in claim.protocols]:
