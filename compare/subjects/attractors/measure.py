@@ -58,37 +58,6 @@ SWINGING, SWUNG = 24.0, 4.0
 """How long a ball swings, and the last part of it that is measured, s."""
 
 
-def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
-    """The set p with kappa = c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g), and other parameters."""
-    return p.replace(**others, c=kappa / time_unit(p), omega_0=Omega_0 / time_unit(p))
-
-
-class Hops(NamedTuple):
-    """The tops of the hops in part of a run: times and angles (n,), and states (n, 8)."""
-
-    time: Array
-    theta: Array
-    x: Array
-
-    @property
-    def values(self) -> dict[str, Measured]:
-        """Period, mean angular velocity and height, uncertain by half the range over single hops.
-
-        Means of two parts could agree by chance, because disturbances swing while they die out.
-        """
-        span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
-        values = {
-            "orbit_period": (span / len(periods), periods),
-            "orbit_omega_c": ((self.theta[-1] - self.theta[0]) / span, np.diff(self.theta) / periods),
-            "orbit_height": (height.mean(), height),
-        }
-        return {name: Measured(float(mean), float(np.ptp(hops)) / 2) for name, (mean, hops) in values.items()}
-
-    def conditions(self, p: Parameters) -> dict[str, Any]:
-        """A state at a top, and the period: near a closed orbit."""
-        return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
-
-
 def hopping(
     lab: Lab,
     sets: Mapping[str, Parameters],
@@ -126,6 +95,37 @@ def hopping(
     if len(heights) >= 3:
         coarse_birth, fine_birth = (birth(flows[: len(heights)], each) for each in zip(*heights, strict=True))
         yield result.row(lab, "orbit_birth", finer(coarse_birth.value, fine_birth))
+
+
+def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
+    """The set p with kappa = c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g), and other parameters."""
+    return p.replace(**others, c=kappa / time_unit(p), omega_0=Omega_0 / time_unit(p))
+
+
+class Hops(NamedTuple):
+    """The tops of the hops in part of a run: times and angles (n,), and states (n, 8)."""
+
+    time: Array
+    theta: Array
+    x: Array
+
+    @property
+    def values(self) -> dict[str, Measured]:
+        """Period, mean angular velocity and height, uncertain by half the range over single hops.
+
+        Means of two parts could agree by chance, because disturbances swing while they die out.
+        """
+        span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
+        values = {
+            "orbit_period": (span / len(periods), periods),
+            "orbit_omega_c": ((self.theta[-1] - self.theta[0]) / span, np.diff(self.theta) / periods),
+            "orbit_height": (height.mean(), height),
+        }
+        return {name: Measured(float(mean), float(np.ptp(hops)) / 2) for name, (mean, hops) in values.items()}
+
+    def conditions(self, p: Parameters) -> dict[str, Any]:
+        """A state at a top, and the period: near a closed orbit."""
+        return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
 
 
 def _multiplier(result: TrialResult, begin: float, end: float, p: Parameters) -> Measured:

@@ -58,29 +58,6 @@ PUSH = 1e-2
 """How hard a ball is pushed: speed in units of sqrt(g R), or more spin in units of its spin on the wall."""
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What a trial shows at an event."""
-
-    trial: str
-    quantity: str
-    event: str
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Flows of settled states that are joined to a slope."""
-
-    by: str
-    set: str
-    p: Parameters
-    """With the flow at which the slope is wanted."""
-    flows: tuple[float, ...]
-    x0: tuple[float, ...] = (0.0,) * 8
-    noise: float = 0.0
-    """Standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1."""
-
-
 def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there to unloading."""
     most = lab.effort.slope_slipping
@@ -99,6 +76,20 @@ def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             else:
                 cases = ", ".join(each.case.name for each in states)
                 yield Missing("slope", curve.set, f"{where}: the states there are not of one kind ({cases})")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Flows of settled states that are joined to a slope."""
+
+    by: str
+    set: str
+    p: Parameters
+    """With the flow at which the slope is wanted."""
+    flows: tuple[float, ...]
+    x0: tuple[float, ...] = (0.0,) * 8
+    noise: float = 0.0
+    """Standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1."""
 
 
 def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
@@ -220,6 +211,15 @@ def _levels(name: str, records: Records, parts: int) -> list[float]:
     for a, b in (*takes_up[:1], gives_way[-1]):
         levels |= {a + (b - a) * k / parts for k in range(parts + 1)}
     return sorted(levels)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a trial shows at an event."""
+
+    trial: str
+    quantity: str
+    event: str
 
 
 def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

@@ -54,6 +54,32 @@ REST = 0.05
 Exponents = npt.NDArray[np.complex128]
 
 
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """All exponents of settled states in the six cases in which a ball can go round for ever."""
+    found = [each for name, p in sets.items() for each in chosen(records, name, p, lab.effort.rates_more)]
+    yield from (each for each in found if isinstance(each, Missing))
+    states = [each for each in found if isinstance(each, Pushed)]
+    tasks = [state.tasks(lab) for state in states]
+    for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
+        if isinstance(runs, str):
+            yield state.missing(f"a run {runs}")
+            continue
+        count = 2 * len(state.active)
+        answers = [answer(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
+        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates of leaning by shorter records
+        # had been seen to be off.)
+        if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
+            yield state.missing("pushed, the ball doesn't stay in this case")
+            continue
+        (_, step), start = state.steps(lab), state.start
+        at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
+        row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
+        values, uncertainty = spectrum(state, answers, step)
+        yield row(quantity="modes", value=len(values))
+        yield from _modes(state, values, uncertainty, step, row)
+        yield from _responses(state, answers, float(uncertainty.max()), row)
+
+
 @dataclass(frozen=True, eq=False)
 class Pushed:
     """A settled state, from which the ball is pushed."""
@@ -126,32 +152,6 @@ class Pushed:
         """That the rates (decay and frequency) of some modes, or of all, were not measured."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
         return Missing(PROTOCOL, self.start.set, f"{at}: {why}", 2 * (modes or len(self.active)))
-
-
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    found = [each for name, p in sets.items() for each in chosen(records, name, p, lab.effort.rates_more)]
-    yield from (each for each in found if isinstance(each, Missing))
-    states = [each for each in found if isinstance(each, Pushed)]
-    tasks = [state.tasks(lab) for state in states]
-    for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
-        if isinstance(runs, str):
-            yield state.missing(f"a run {runs}")
-            continue
-        count = 2 * len(state.active)
-        answers = [answer(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
-        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates of leaning by shorter records
-        # had been seen to be off.)
-        if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
-            yield state.missing("pushed, the ball doesn't stay in this case")
-            continue
-        (_, step), start = state.steps(lab), state.start
-        at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
-        row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
-        values, uncertainty = spectrum(state, answers, step)
-        yield row(quantity="modes", value=len(values))
-        yield from _modes(state, values, uncertainty, step, row)
-        yield from _responses(state, answers, float(uncertainty.max()), row)
 
 
 def chosen(records: Records, name: str, p: Parameters, more: float) -> Iterator[Pushed | Missing]:

@@ -35,20 +35,6 @@ MIRRORED = ("rest", 0.62), ("rest", 1.4), ("on the wall", 4.2)
 """Starts and flows, in units of sqrt(g/R), of those that are measured the other way round, too."""
 
 
-@dataclass(frozen=True, order=True)
-class Attractor:
-    """What starts have in common that come to one state."""
-
-    set: str
-    omega_0: float
-    case: Case
-
-    @classmethod
-    def of(cls, state: Settled) -> Self:
-        """That of a settled state."""
-        return cls(state.start.set, state.start.p.omega_0, physical_case(state.case))
-
-
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The case that every start ends in, and once for every distinct state its values."""
     sharp, refine = lab.effort.settled_sharp, lab.effort.settled_refine
@@ -75,6 +61,20 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     refined = settle(lab, again, patience) if refine > 1 else [state for state, *_ in groups]
     for same, fine in zip(groups, refined, strict=True):
         yield from _values(lab, same, fine)
+
+
+@dataclass(frozen=True, order=True)
+class Attractor:
+    """What starts have in common that come to one state."""
+
+    set: str
+    omega_0: float
+    case: Case
+
+    @classmethod
+    def of(cls, state: Settled) -> Self:
+        """That of a settled state."""
+        return cls(state.start.set, state.start.p.omega_0, physical_case(state.case))
 
 
 def _starts(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Start]:

@@ -50,6 +50,30 @@ JUMP = 1e-3
 the response to a small jump is wanted, and near the ends of that range it is far from linear."""
 
 
+def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
+    ends = {name: known_flow(records, name, "omega_01") for name in sets}
+    why = "no flow was measured at which two-point rolling ends by slipping"
+    yield from (Missing("pulsation", name, why) for name, end in ends.items() if end is None)
+    small = [each for name, end in ends.items() if end is not None for each in _small(lab, name, sets[name], end)]
+    followed = _followed(lab, small)
+    for each in followed:
+        yield from _response(lab, each)
+    rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
+    for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
+        onset = _onset(lab, each, bracket)
+        yield onset
+        if isinstance(onset, Missing):
+            continue
+        # The predicted amplitude may be a tenth smaller than the measured one.
+        if COVERAGE * onset.uncertainty <= QUANTITIES["slip_amplitude"].resolves * 0.9 * onset.value:
+            slipping.append((each, 1.5 * onset.value))
+        else:
+            at = f"a pulsation at {each.frequency:g} Hz"
+            yield Missing("pulsation", each.set, f"slip in {at} begins at no definite amplitude: no mean reading there")
+    yield from mean_errors(lab, slipping)
+
+
 class Timing(NamedTuple):
     """How a run in a pulsation is done."""
 
@@ -108,30 +132,6 @@ class Pulsation:
     def row(self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float) -> Measurement:
         """A measurement in this pulsation."""
         return measurement(lab, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at)
-
-
-def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
-    ends = {name: known_flow(records, name, "omega_01") for name in sets}
-    why = "no flow was measured at which two-point rolling ends by slipping"
-    yield from (Missing("pulsation", name, why) for name, end in ends.items() if end is None)
-    small = [each for name, end in ends.items() if end is not None for each in _small(lab, name, sets[name], end)]
-    followed = _followed(lab, small)
-    for each in followed:
-        yield from _response(lab, each)
-    rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
-    for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
-        onset = _onset(lab, each, bracket)
-        yield onset
-        if isinstance(onset, Missing):
-            continue
-        # The predicted amplitude may be a tenth smaller than the measured one.
-        if COVERAGE * onset.uncertainty <= QUANTITIES["slip_amplitude"].resolves * 0.9 * onset.value:
-            slipping.append((each, 1.5 * onset.value))
-        else:
-            at = f"a pulsation at {each.frequency:g} Hz"
-            yield Missing("pulsation", each.set, f"slip in {at} begins at no definite amplitude: no mean reading there")
-    yield from mean_errors(lab, slipping)
 
 
 def _small(lab: Lab, name: str, p: Parameters, end: float) -> list[Pulsation]:

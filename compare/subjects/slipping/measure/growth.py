@@ -66,6 +66,40 @@ AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_erro
 FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
 
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """gamma out of random states, along every arrow; where one contact may slip to either side, their shares (69)."""
+    rough = {name: p for name, p in sets.items() if p.mu and p.eta}
+    yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
+    sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort.growth_more)]
+    tasks = [push.tasks(lab) for pushes in sides for push in pushes]
+    runs = zip(tasks, lab.groups(tasks), strict=True)
+    left = Counter[tuple[str, Case, Case]]()
+    for pushes in sides:
+        grown = []
+        for push in pushes:
+            own, pairs = next(runs)
+            if isinstance(pairs, str):
+                yield Missing("growth", push.start.set, f"from {push.inner.name} to {push.outer.name}: the run {pairs}")
+                continue
+            if value := growth(push, pairs):
+                grown.append(value)
+                yield push.row(lab, "growth", "gamma", value, own)
+                continue
+            sized = ((size, slice(2 * k, 2 * k + 2)) for k, size in enumerate(push.sizes))
+            strays = (push.stray(lab, "growth", size, own[of], pairs[of]) for size, of in sized)
+            if stray := next(filter(None, strays), None):
+                yield stray
+            else:
+                left[push.start.set, push.inner, push.outer] += 1
+        if len(grown) == 2:  # the share of the side of negative slip with which the two growth rates cancel
+            plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
+            both = plus.value + minus.value
+            error = math.hypot(plus.uncertainty * minus.value, minus.uncertainty * plus.value) / both**2
+            yield push.row(lab, "growth", "filippov_share", Measured(plus.value / both, error), own)
+    for (name, inner, outer), count in left.items():
+        yield Missing("growth", name, f"slips from {inner.name} to {outer.name} pass through several cases", count)
+
+
 @dataclass(frozen=True, eq=False)
 class Push:
     """A start that rolls, and the slip that it is given.
@@ -127,40 +161,6 @@ class Push:
             return None
         at = {"slip": size * start_unit(self.start.p, self.start.x0), "time": float(fine.time[-1])}
         return self.row(lab, protocol, "case", ended, tasks, **at)
-
-
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """gamma out of random states, along every arrow; where one contact may slip to either side, their shares (69)."""
-    rough = {name: p for name, p in sets.items() if p.mu and p.eta}
-    yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
-    sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort.growth_more)]
-    tasks = [push.tasks(lab) for pushes in sides for push in pushes]
-    runs = zip(tasks, lab.groups(tasks), strict=True)
-    left = Counter[tuple[str, Case, Case]]()
-    for pushes in sides:
-        grown = []
-        for push in pushes:
-            own, pairs = next(runs)
-            if isinstance(pairs, str):
-                yield Missing("growth", push.start.set, f"from {push.inner.name} to {push.outer.name}: the run {pairs}")
-                continue
-            if value := growth(push, pairs):
-                grown.append(value)
-                yield push.row(lab, "growth", "gamma", value, own)
-                continue
-            sized = ((size, slice(2 * k, 2 * k + 2)) for k, size in enumerate(push.sizes))
-            strays = (push.stray(lab, "growth", size, own[of], pairs[of]) for size, of in sized)
-            if stray := next(filter(None, strays), None):
-                yield stray
-            else:
-                left[push.start.set, push.inner, push.outer] += 1
-        if len(grown) == 2:  # the share of the side of negative slip with which the two growth rates cancel
-            plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
-            both = plus.value + minus.value
-            error = math.hypot(plus.uncertainty * minus.value, minus.uncertainty * plus.value) / both**2
-            yield push.row(lab, "growth", "filippov_share", Measured(plus.value / both, error), own)
-    for (name, inner, outer), count in left.items():
-        yield Missing("growth", name, f"slips from {inner.name} to {outer.name} pass through several cases", count)
 
 
 def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:

@@ -59,6 +59,20 @@ DEGREES = (3, 2)
 """Degrees of the polynomials; the lower one shows what the degree changes."""
 
 
+def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Zero and slope of gamma along every line: from two flows, then from two more around the zero that these show."""
+    yield from (Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta))
+    sets = {name: p for name, p in sets.items() if p.mu and p.eta}
+    hanging = _hanging(lab, sets, records)
+    for name in (name for name in sets if name not in hanging):
+        yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
+    lines = [*(line for name, p in sets.items() for line in _rolling(name, p)), *hanging.values()]
+    first = _growths(lab, [line.pushes[:2] for line in lines])
+    around = _growths(lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)])
+    for line, seen, more in zip(lines, first, around, strict=True):
+        yield from _zero_and_slope(lab, line, seen, more)
+
+
 @dataclass(frozen=True, eq=False)
 class Crossing:
     """Pushes at several flows, between which gamma passes through zero."""
@@ -105,20 +119,6 @@ class Growths:
     tasks: list[Task]
     strays: list[Measurement | Missing]
     """What became of slips that didn't last, and of runs that broke down."""
-
-
-def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Zero and slope of gamma along every line: from two flows, then from two more around the zero that these show."""
-    yield from (Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta))
-    sets = {name: p for name, p in sets.items() if p.mu and p.eta}
-    hanging = _hanging(lab, sets, records)
-    for name in (name for name in sets if name not in hanging):
-        yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
-    lines = [*(line for name, p in sets.items() for line in _rolling(name, p)), *hanging.values()]
-    first = _growths(lab, [line.pushes[:2] for line in lines])
-    around = _growths(lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)])
-    for line, seen, more in zip(lines, first, around, strict=True):
-        yield from _zero_and_slope(lab, line, seen, more)
 
 
 def _hanging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[str, Crossing]:
@@ -215,6 +215,31 @@ def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
         yield Crossing(tuple(Push(start, Case.RR, outer, np.array(n)) for start in starts))
 
 
+def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
+    arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
+    orbits = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
+    first = list(lab.groups(orbits))
+    kept = [[] if isinstance(got, str) else arrow.kept(got) for arrow, got in zip(arrows, first, strict=True)]
+    nearer = [arrow.nearer(runs) for arrow, runs in zip(arrows, kept, strict=True)]
+    rows = zip(arrows, orbits, first, kept, nearer, lab.groups(nearer), strict=True)
+    for arrow, tasks, got, runs, later, near in rows:
+        leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
+        if not runs:
+            why = f"the run {got}" if isinstance(got, str) else "the ball doesn't stay in it at any orbit"
+            yield Missing("lift", arrow.set, f"out of {arrow.inner.name}: {why}")
+        elif leaves is None:
+            yield arrow.row("lifts", float(runs[-1].omega_c[0]), 0.0, tasks)
+        elif leaves is not arrow.outer:
+            why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
+            yield Missing("lift", arrow.set, why)
+        elif isinstance(near, str) or (onset := _onset(near)) is None:
+            why = f"the run {near}" if isinstance(near, str) else "the contact at the floor opens and closes"
+            yield Missing("lift", arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
+        else:
+            yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, later)
+
+
 @dataclass(frozen=True)
 class Arrow:
     """States of a case that differ in omega_c, and the case to which the ball leaves the floor."""
@@ -260,31 +285,6 @@ class Arrow:
         p, x0 = self.start(omega_c)
         at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(x0)
         return measurement(self.lab, "lift", self.set, p, quantity, value, tasks, **at)
-
-
-def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
-    arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
-    orbits = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
-    first = list(lab.groups(orbits))
-    kept = [[] if isinstance(got, str) else arrow.kept(got) for arrow, got in zip(arrows, first, strict=True)]
-    nearer = [arrow.nearer(runs) for arrow, runs in zip(arrows, kept, strict=True)]
-    rows = zip(arrows, orbits, first, kept, nearer, lab.groups(nearer), strict=True)
-    for arrow, tasks, got, runs, later, near in rows:
-        leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
-        if not runs:
-            why = f"the run {got}" if isinstance(got, str) else "the ball doesn't stay in it at any orbit"
-            yield Missing("lift", arrow.set, f"out of {arrow.inner.name}: {why}")
-        elif leaves is None:
-            yield arrow.row("lifts", float(runs[-1].omega_c[0]), 0.0, tasks)
-        elif leaves is not arrow.outer:
-            why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
-            yield Missing("lift", arrow.set, why)
-        elif isinstance(near, str) or (onset := _onset(near)) is None:
-            why = f"the run {near}" if isinstance(near, str) else "the contact at the floor opens and closes"
-            yield Missing("lift", arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
-        else:
-            yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, later)
 
 
 def _force(run: Trajectory) -> Measured | None:

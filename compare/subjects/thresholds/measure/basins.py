@@ -11,7 +11,7 @@ for a while near the unstable state. The mean of their states while they are tog
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice, zip_longest
@@ -104,6 +104,41 @@ def added(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     return [(places[a] + places[b]) / 2 for _, a, b in turns]
 
 
+def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Between the measured omega_02 and omega_04, cross the border again and again; not under the quadratic law.
+
+    At the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
+    """
+    limits: dict[str, tuple[float, float]] = {}
+    for name, p in sets.items():
+        holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
+        if p.drag == QUADRATIC:
+            why = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
+            yield Missing("edge", name, why)
+        elif holds and folds:
+            limits[name] = holds.value, folds.value
+        else:
+            yield Missing("edge", name, "at no flow are a slipping ball and a lifted one both settled")
+    soonest = max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
+    flows = [
+        (name, sets[name].replace(omega_0=low + part * (high - low)))
+        for name, (low, high) in limits.items()
+        for part in (CLOSING if name == soonest else lab.effort.edge_flows)
+    ]
+    edges = yield from _edges(lab, flows)
+    for _ in range(lab.effort.edge_lines):
+        edges = _crossed(lab, edges)
+    for edge in edges:
+        yield from _rows(lab, edge)
+    for name, (low, high) in limits.items():
+        last = low + (max(CLOSING) + 1e-6) * (high - low)
+        near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
+        if len(near) >= len(CLOSING):
+            yield _closed(lab, near)
+        elif name == soonest or lab.level > Level.QUICK:
+            yield Missing("edge", name, "too few crossings to follow the edge to where it meets the lifted ball")
+
+
 @dataclass(frozen=True, eq=False)
 class Edge:
     """The border between the basins of two attractors at one flow, and where it crosses a line; states are (8,)."""
@@ -129,67 +164,32 @@ class Edge:
         return np.asarray(self.centre + self.bracket.place.value * self.line)
 
 
-def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Between the measured omega_02 and omega_04, cross the border again and again; not under the quadratic law.
-
-    At the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
-    """
-    limits: dict[str, tuple[float, float]] = {}
-    for name, p in sets.items():
-        holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
-        if p.drag == QUADRATIC:
-            why = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
-            yield Missing("edge", name, why)
-        elif holds and folds:
-            limits[name] = holds.value, folds.value
-        else:
-            yield Missing("edge", name, "at no flow are a slipping ball and a lifted one both settled")
-    soonest = max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
-    flows = [
-        (name, sets[name].replace(omega_0=low + part * (high - low)))
-        for name, (low, high) in limits.items()
-        for part in (CLOSING if name == soonest else lab.effort.edge_flows)
-    ]
-    starts = [[named_start(name, q, "rest"), named_start(name, q, "on the wall")] for name, q in flows]
+def _edges(lab: Lab, flows: Sequence[tuple[str, Parameters]]) -> Generator[Missing, None, list[Edge]]:
+    """The edges at flows of sets, first on the line between the two attractors; and where these did not settle."""
+    starts = [[named_start(name, p, "rest"), named_start(name, p, "on the wall")] for name, p in flows]
     edges = []
-    for (name, q), (slipping, lifted) in zip(flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True):
+    for (name, p), (slipping, lifted) in zip(flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True):
         if slipping.failure or lifted.failure or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR):
             fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
-            yield Missing("edge", name, f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {fates}")
+            yield Missing("edge", name, f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}")
         else:
             a, b = _grounded(slipping.mean), _grounded(lifted.mean)
-            edges.append(Edge(name, q, a, b, a, b - a))
-    for _ in range(lab.effort.edge_lines):  # cross each border on one line after the other
-        lines = [_onward(edge) for edge in edges]
-        for k, bracket in enumerate(narrow(lab, [_search(lab, line) for line in lines], careful=False)):
-            edge = edges[k]
-            if None in bracket.runs:
-                edges[k] = replace(edge, moves=(), missed=edge.missed + 1)
-            else:
-                crossed = replace(lines[k], bracket=bracket, missed=0)
-                moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
-                edges[k] = replace(crossed, moves=moves)
-    for edge in edges:
-        if edge.moves:  # crossed by the last line, and by one before
-            yield from _rows(lab, edge)
+            edges.append(Edge(name, p, a, b, a, b - a))
+    return edges
+
+
+def _crossed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
+    """The edges once they were crossed on one line more each."""
+    lines, found = [_onward(edge) for edge in edges], []
+    brackets = narrow(lab, [_search(lab, line) for line in lines], careful=False)
+    for edge, line, bracket in zip(edges, lines, brackets, strict=True):
+        if None in bracket.runs:
+            found.append(replace(edge, moves=(), missed=edge.missed + 1))
         else:
-            at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
-            yield Missing("edge", edge.set, f"{at} the last lines missed the border between the two attractors", 5)
-    edges = [edge for edge in edges if edge.moves]
-    for name, (low, high) in limits.items():  # the edge meets the lifted ball where they don't differ in omega_c
-        last = low + (max(CLOSING) + 1e-6) * (high - low)
-        near = [edge for edge in edges if edge.set == name and edge.p.omega_0 < last]
-        if len(near) < len(CLOSING):
-            if name == soonest or lab.level > Level.QUICK:
-                yield Missing("edge", name, "too few crossings to follow the edge to where it meets the lifted ball")
-            continue
-        noise = max(float(_uncertainty(edge)[2]) for edge in near)
-        apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
-        place = vanishing(np.array([edge.p.omega_0 for edge in near]), apart)
-        tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
-        q, by = sets[name].replace(omega_0=place.value), "unstable slipping meets the lifted ball"
-        row = measurement(lab, "edge", name, q, "omega_02", place, tasks, side="from above", by=by)
-        yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
+            crossed = replace(line, bracket=bracket, missed=0)
+            moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
+            found.append(replace(crossed, moves=moves))
+    return found
 
 
 def _grounded(x: Array) -> Array:
@@ -266,9 +266,12 @@ def _uncertainty(edge: Edge) -> Array:
     return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
-def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement]:
+def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
     """omega_c, the slips and the spin on the wall; the uncertainties are alike."""
-    assert edge.bracket is not None
+    if not (edge.moves and edge.bracket):  # it is to be crossed by the last line, and by one before
+        at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
+        yield Missing("edge", edge.set, f"{at} the last lines missed the border between the two attractors", 5)
+        return
     x, sure = State.of(edge.crossing), State.of(_uncertainty(edge))
     roll, values = edge.p.R / edge.p.r, {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
     values["wall_spin"] = x.slip_x + roll * x.omega_c
@@ -276,3 +279,14 @@ def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement]:
     for name, value in values.items():
         of = Measured(value, slips / roll if name == "omega_c" else slips)
         yield measurement(lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
+
+
+def _closed(lab: Lab, near: Sequence[Edge]) -> Measurement | Missing:
+    """Where the edge of a set meets the lifted ball: where they don't differ in omega_c."""
+    noise = max(float(_uncertainty(edge)[2]) for edge in near)
+    apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
+    place = vanishing(np.array([edge.p.omega_0 for edge in near]), apart)
+    tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
+    p, by = near[0].p.replace(omega_0=place.value), "unstable slipping meets the lifted ball"
+    row = measurement(lab, "edge", near[0].set, p, "omega_02", place, tasks, side="from above", by=by)
+    return if_found(row, "the edge points to no flow at which it meets the lifted ball")

@@ -71,6 +71,26 @@ From = str | Array | Callable[[Parameters], Array]
 """How a ball starts: a name that `settling.named_start` knows, a state, or a function of the parameters for it."""
 
 
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Begin between flows whose settled cases differ; bisect; settle states beside each change; bisect again from
+    these, and extrapolate them.
+    """
+    sure = not lab.effort.granted
+    found = [_changes(lab, name, p, records) for name, p in sets.items()]
+    found = _narrowed(lab, found, _end_of_rolling, careful=sure)
+    found = _narrowed(lab, found, _sinking_and_slipping)
+    found = _settled_beside(lab, [each if lab.effort.granted else _seen(each) for each in found])
+    found = _narrowed(lab, found, _riding_and_leaning, careful=sure)
+    found = _narrowed(lab, found, _fold)
+    for each in found:
+        for kind, bracket in each.brackets.items():
+            if bracket.failure and kind != "sinking":  # which is looked for roughly
+                yield each.missing(f"{kind}: its limit is known less well, as a run {bracket.failure}", 0)
+        yield from _rolling_rows(each)
+        yield from _riding_rows(each)
+        yield from _slipping_rows(each)
+
+
 @dataclass(frozen=True, eq=False)
 class Findings:
     """What was found on one set so far, by kind: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or
@@ -144,26 +164,6 @@ class Findings:
 
 Questions = Callable[[Findings], Iterator[tuple[str, Search]]]
 """What is to be narrowed down on a set, by kind."""
-
-
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Begin between flows whose settled cases differ; bisect; settle states beside each change; bisect again from
-    these, and extrapolate them.
-    """
-    sure = not lab.effort.granted
-    found = [_changes(lab, name, p, records) for name, p in sets.items()]
-    found = _narrowed(lab, found, _end_of_rolling, careful=sure)
-    found = _narrowed(lab, found, _sinking_and_slipping)
-    found = _settled_beside(lab, [each if lab.effort.granted else _seen(each) for each in found])
-    found = _narrowed(lab, found, _riding_and_leaning, careful=sure)
-    found = _narrowed(lab, found, _fold)
-    for each in found:
-        for kind, bracket in each.brackets.items():
-            if bracket.failure and kind != "sinking":  # which is looked for roughly
-                yield each.missing(f"{kind}: its limit is known less well, as a run {bracket.failure}", 0)
-        yield from _rolling_rows(each)
-        yield from _riding_rows(each)
-        yield from _slipping_rows(each)
 
 
 def _changes(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
