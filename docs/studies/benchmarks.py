@@ -1,4 +1,4 @@
-"""``python -m docs.studies.benchmarks``: speed, as ratios within one run, which depend less on the machine than times do.
+"""``python -m docs.studies.benchmarks``: speed, as ratios within one run: they depend less on the machine than times.
 
 With ``--page docs/campaigns.md`` they are written there; and with ``--growth`` the table of sweeps of 1000 to 100 000
 runs, which takes some minutes.

@@ -1,4 +1,4 @@
-"""The coordinates of each case against the vector field in the paper's: the chain rule, by central differences."""
+"""The coordinates of each case move as the vector field says, by the chain rule and central differences."""
 
 import math
 

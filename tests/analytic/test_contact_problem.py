@@ -1,4 +1,4 @@
-"""Coulomb's law at two contacts: the conditions that define the solution, and a contact alone in closed form."""
+"""The contact problem's solution obeys Coulomb's law at both contacts, also where friction locks the ball."""
 
 import math
 import sys

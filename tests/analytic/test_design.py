@@ -1,4 +1,4 @@
-"""Design of a flowmeter, against closed forms, differences of other widths, sampling and brute force."""
+"""A design is the best that its bounds, tolerances and response allow, and its readings are the stable solutions'."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Laws of drag against the coefficients of their sources, and motions under them by both simulators."""
+"""Each law of drag has the coefficient of its source, and both simulators move by it."""
 
 import math
 

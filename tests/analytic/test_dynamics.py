@@ -1,4 +1,4 @@
-"""Vector fields and contact forces against what sympy makes of vectors: Newton-Euler (20) with Table 3, solved."""
+"""Vector fields and contact forces are what sympy solves Newton-Euler (20) with Table 3 to, to 1e-12."""
 
 import numpy as np
 import pytest

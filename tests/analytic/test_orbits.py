@@ -1,4 +1,4 @@
-"""Periodic motions, closed and followed to their births, and what motions from many starts come to."""
+"""Periodic motions close, are as stable as their multipliers say, and motions from many starts come to what they do."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the paper leaves out of a real fluid: the torque on the spinning ball."""
+"""A ball that rolls in a fluid with torque obeys Newton and Euler, and its mirror image, too."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The one-parameter family of forces in RR against brute force over its parameter, and against closed forms."""
+"""No force of the family of RR does better than the one that is said to, by brute force over its parameter."""
 
 import numpy as np
 import pytest

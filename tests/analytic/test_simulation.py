@@ -1,4 +1,4 @@
-"""Both simulators through their common door: laws that hold at every sample, input that is refused, interruption."""
+"""Both simulators keep the laws at every sample, reflect, refuse what is wrong, and can be interrupted."""
 
 import importlib
 import itertools

@@ -1,4 +1,4 @@
-"""Stability with respect to slipping: the paper's formulas, the other two routes, and where the paper's claim fails."""
+"""Slip grows as the vector field says, and the paper's claim after (80) fails where it is said to."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Compiled steps and those of scipy come to the same: all cases, drag laws, flows and restitution."""
+"""Compiled steps and those of scipy come to the same, in all cases, drag laws and flows, with restitution."""
 
 import numpy as np
 import pytest

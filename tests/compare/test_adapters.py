@@ -1,4 +1,4 @@
-"""Adapters of other engines with a free body, as far as they are installed."""
+"""Other engines with a free body, as far as they are installed, reach the order that they have."""
 
 import importlib
 

@@ -1,4 +1,4 @@
-"""The command of attractors, and how hops are measured."""
+"""Hops are measured to the digits of known motions, and the command says what is undecided."""
 
 import json
 import math

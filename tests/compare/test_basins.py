@@ -1,4 +1,4 @@
-"""Searches cover their box evenly; basins are those of theory; both go on where they stopped."""
+"""Basins are those of theory, are kept, and go on where they stopped; kept searches are whole."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Exact contact cases: their numbers, checked by other ways, and what they notice."""
+"""Exact contact cases are right by other ways, and would notice a wrong engine."""
 
 import math
 

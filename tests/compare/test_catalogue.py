@@ -1,4 +1,4 @@
-"""Claims and protocols fit together."""
+"""Every protocol bears on a claim, and every claim has its protocols."""
 
 from collections import Counter
 

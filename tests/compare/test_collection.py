@@ -1,4 +1,4 @@
-"""Collections: varied parameters as coordinates, and what can't be gathered is named."""
+"""A collection has varied parameters as coordinates, and names what can't be gathered."""
 
 import dataclasses
 import json

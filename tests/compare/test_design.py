@@ -1,4 +1,4 @@
-"""``dualball design``: its answers as data and as a page, and one clear line for what can't be asked."""
+"""``dualball design`` gives its answers as data and as a page, and one clear line for what can't be asked."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What holds at every instant: each deviation from the laws is noticed by itself."""
+"""Each deviation from what holds at every instant is noticed by itself."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The exact cases of version 2 by other ways: equations of motion in space, integrated, and balances."""
+"""The exact cases of version 2 are right by equations of motion in space, integrated, and by balances."""
 
 import dataclasses
 import json

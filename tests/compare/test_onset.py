@@ -1,4 +1,4 @@
-"""Thresholds: bisection and extrapolation on functions with known answers, the protocol on one set, and the claims."""
+"""Thresholds are bracketed and extrapolated to where they are known to be, and say when they are not."""
 
 import math
 from types import SimpleNamespace

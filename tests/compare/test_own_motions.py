@@ -1,4 +1,4 @@
-"""Assertions for one's own motions, and two motions side by side."""
+"""Assertions about one's own motions fail just where they should, and two motions are told apart."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The plugin for pytest, in runs of its own."""
+"""The plugin for pytest judges an engine on the exact cases, and is no burden on runs that don't use it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Unsteady flow: both protocols on one set, and the claims."""
+"""A pulsation that breaks down loses its own numbers, and sets without slip say why."""
 
 from dataclasses import replace
 from types import SimpleNamespace

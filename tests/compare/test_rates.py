@@ -1,4 +1,4 @@
-"""Whole spectra from pushes: exact on linear motions, honest on bent ones, and judged."""
+"""Spectra from pushes are exact on linear motions and honest on bent ones."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Engines of three functions on exact cases: what breaks loses a case, not the run; the league; files of the set."""
+"""An engine that breaks loses its case and not the run, and files hold the whole set."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Uncertainties that hold what they promise, on series whose truth is known."""
+"""Uncertainties hold what they promise, on series whose truth is known."""
 
 import json
 

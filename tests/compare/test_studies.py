@@ -1,4 +1,4 @@
-"""What writes tables and figures of pages: each has its place, and its numbers hold together."""
+"""Tables and figures of pages have each their place, and their numbers hold together."""
 
 import dataclasses
 import itertools

@@ -1,4 +1,4 @@
-"""Event-driven simulation, time stepping and MuJoCo beside each other, at random sets of parameters and starts."""
+"""Event-driven simulation, time stepping and MuJoCo agree at random sets of parameters and starts."""
 
 import os
 import warnings

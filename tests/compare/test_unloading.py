@@ -1,4 +1,4 @@
-"""Unloading and pushes: numbers read off theory's own runs, and the claims."""
+"""Predictions of unloading are as sure as they say, and a top is found between samples."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The main job on protocols that cost nothing: what is measured, kept, judged, and what one failure takes with it."""
+"""One failure takes its own claim only, and nothing is measured again that is kept."""
 
 import dataclasses
 import json

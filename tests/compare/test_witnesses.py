@@ -1,4 +1,4 @@
-"""What engines beside the one on trial say: limits of no step that contain the truth, and whom a claim can ask."""
+"""What other engines say is judged in limits of no step that contain the truth, of all that they were asked."""
 
 from __future__ import annotations
 

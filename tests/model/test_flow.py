@@ -1,4 +1,4 @@
-"""Flows, and the longest step of a problem."""
+"""Flows have the values that they are made of, and files, pieces and steps that are wrong are refused by name."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Round trips between the paper's coordinates and the world's; cases."""
+"""States go to the world and back without loss, and slip is the velocity of the material point."""
 
 import numpy as np
 import pytest

@@ -1,3 +1,5 @@
+"""Parameters have the drag, groups and files of their physics, and a bad one is one clear line."""
+
 import dataclasses
 import math
 import tempfile

@@ -1,3 +1,5 @@
+"""A run comes back from its file as it was, and a file that was damaged, cut or is foreign is refused by name."""
+
 import dataclasses
 import json
 import os
