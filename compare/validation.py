@@ -26,7 +26,7 @@ from compare.kit.record import Missing, Records, RecordsByEngine
 from compare.kit.workers import JUDGING, Spread, Workers, at_most, processes, threads
 from compare.report import results
 from compare.report.results import Summary
-from compare.witnesses import hear
+from compare.witnesses import full_verdict
 from model import Parameters
 from model.errors import check_type
 
@@ -179,7 +179,7 @@ def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     """The verdict on what is stored, or that it took too long."""
     try:
         with at_most(JUDGING):
-            return hear(claim, testimony)
+            return full_verdict(claim, testimony)
     except TimeoutError as error:
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=str(error))
 
@@ -217,7 +217,7 @@ def _write(
 
     Return the verdicts on all claims.
     """
-    verdicts = [known.get(claim.id) or hear(claim, testimony) for claim in CLAIMS]
+    verdicts = [known.get(claim.id) or full_verdict(claim, testimony) for claim in CLAIMS]
     summary = Summary.of(directory, verdicts, level, files)
     if over:
         from compare.report import report as page  # here, because drawing takes a second to load
@@ -230,7 +230,7 @@ def _write(
 
 def _announced(announce: Announce, claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str]) -> Verdict:
     """The verdict, or that one of the protocols of its claim broke down."""
-    judged = hear(claim, testimony)
+    judged = full_verdict(claim, testimony)
     if errors := [why for name, why in broken.items() if name in claim.protocols]:
         judged = replace(judged, outcome=Outcome.ERROR, error="; ".join(errors))
     announce(judged)

@@ -67,7 +67,7 @@ Step = tuple[int, Check]
 """A check, and the time steps in one that its protocol asks for."""
 
 
-def hear(claim: Claim, testimony: RecordsByEngine) -> Verdict:
+def full_verdict(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
     (name, steps), *others = testimony.items()
     measured = steps[max(steps)]

@@ -19,7 +19,7 @@ from compare.kit.pages import Rows
 from compare.kit.record import Relation
 from compare.report import wording
 from compare.validation import stored
-from compare.witnesses import hear
+from compare.witnesses import full_verdict
 
 QUANTITIES = {
     "angular velocity ω_c": ("omega_c",),
@@ -35,7 +35,7 @@ QUANTITIES = {
 
 def verdicts(results: Path) -> list[Verdict]:
     """Of all claims of the last validation in a results directory; raises as `compare.report.results.load`."""
-    return [hear(claim, stored(results)) for claim in CLAIMS]
+    return [full_verdict(claim, stored(results)) for claim in CLAIMS]
 
 
 def counted(results: Path) -> Rows:

@@ -136,13 +136,13 @@ def test_judging_a_claim_takes_no_longer_than_it_may(tmp_path, monkeypatch):
         while True:
             pass
 
-    def hear(of, testimony):
+    def full_verdict(of, testimony):
         with pytest.raises(TimeoutError):
             endless()
         endless()
 
     monkeypatch.setattr(validation, "JUDGING", 0.1)
-    monkeypatch.setattr(validation, "hear", hear)
+    monkeypatch.setattr(validation, "full_verdict", full_verdict)
     monkeypatch.setattr(validation, "stored", lambda directory: {})
     told = validation._judged(tmp_path, 0)
     assert (told["outcome"], told["error"]) == (Outcome.ERROR, "it took longer than 0.1 s")

@@ -17,7 +17,7 @@ from compare.judge import forget
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
-from compare.witnesses import CEILING, COARSEST, _limit, extrapolated, hear
+from compare.witnesses import CEILING, COARSEST, _limit, extrapolated, full_verdict
 from model import Parameters
 from tests.mutants.exchange import WrongTheory, answer, believed, entries, scaled, times
 
@@ -88,7 +88,7 @@ def test_the_uncertainty_of_a_limit_covers_the_truth():
 def test_a_claim_is_judged_in_the_limit_of_no_step(left, outcome):
     """States that differ a little with the step are the same state; at 2 ms it is off by what users see."""
     steps = {n: seen(left + 0.01 / n, "mujoco-plain", slip_x=1.0 + 0.05 / n) for n in (1, 2, 3, 4)}
-    _, plain = hear(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": steps}).witnesses
+    _, plain = full_verdict(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": steps}).witnesses
     assert (plain.outcome, plain.left_out) == (outcome, 0)
     assert plain.order == pytest.approx(1.0, abs=1e-6)
     assert plain.typical == plain.worst == pytest.approx(left + 0.005)
@@ -102,7 +102,10 @@ def test_three_steps_show_a_limit_to_a_share_of_what_extrapolation_takes_away(le
     """Of 3.3e-6, with a standard uncertainty of a tenth; with four steps the lesser one is noticed, too."""
     steps = {n: seen(left + 1e-5 / n, "mujoco-plain") for n in (1, 2, 3, 4)}
     three = {n: records for n, records in steps.items() if n < 4}
-    assert [hear(CLAIM, {"mujoco-plain": each}).outcome for each in (three, steps)] == [outcome, Outcome.REFUTED]
+    assert [full_verdict(CLAIM, {"mujoco-plain": each}).outcome for each in (three, steps)] == [
+        outcome,
+        Outcome.REFUTED,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -121,27 +124,29 @@ def test_no_limit_is_taken_next_to_a_threshold(near, outcome):
     """There the step decides on the case, and all of a state in the wrong case would be off."""
     steps = {n: seen(0.05 + 0.01 / n, "mujoco-plain") for n in (1, 2, 3, 4)}
     end = tests.measured.measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine")
-    _, plain = hear(CLAIM, {"mujoco": {1: seen(0.0, "mujoco") + Records((end,))}, "mujoco-plain": steps}).witnesses
+    _, plain = full_verdict(
+        CLAIM, {"mujoco": {1: seen(0.0, "mujoco") + Records((end,))}, "mujoco-plain": steps}
+    ).witnesses
     assert plain.outcome == outcome
 
 
 def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
     steps = {n: seen(0.0, "mujoco-plain", slip_x=100.0 * (n == 1), slip_y=100.0 * (n == 2)) for n in (1, 2, 3)}
-    (plain,) = hear(CLAIM, {"mujoco-plain": steps}).witnesses
+    (plain,) = full_verdict(CLAIM, {"mujoco-plain": steps}).witnesses
     assert (plain.outcome, plain.left_out) == (Outcome.INCONCLUSIVE, 1)
     assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c"
 
 
 @pytest.mark.parametrize(("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)])
 def test_an_engine_as_it_comes_may_be_off_by_its_allowance(error, outcome):
-    (said,) = hear(CLAIM, {"mujoco-defaults": {2: seen(error, "mujoco-defaults")}}).witnesses
+    (said,) = full_verdict(CLAIM, {"mujoco-defaults": {2: seen(error, "mujoco-defaults")}}).witnesses
     assert (said.outcome, said.worst) == (outcome, pytest.approx(error))
 
 
 def test_who_was_asked_and_measured_nothing_is_undecided_and_says_why():
     none = {1: Records((), (Missing("settled", "mine", "nothing settles"),))}
     other = {2: Records((), (Missing("settled", "another", "nothing settles"),))}
-    said = hear(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": none, "mujoco-defaults": other})
+    said = full_verdict(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": none, "mujoco-defaults": other})
     assert said.outcome is Outcome.CONFIRMED
     _, plain, defaults = said.witnesses
     assert (plain.outcome, defaults.outcome) == (Outcome.INCONCLUSIVE, Outcome.NOT_ASKED)
@@ -159,7 +164,7 @@ def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
         for k, flow in enumerate(flows)
     ]
     own = Records(tuple(rows))
-    _, plain = hear(CLAIM, {"mujoco": {1: own + ends}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
+    _, plain = full_verdict(CLAIM, {"mujoco": {1: own + ends}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
     assert (plain.outcome, plain.left_out) == (outcome, near)
 
 
@@ -174,9 +179,9 @@ def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost, outc
     counts = tuple(tests.measured.measured("thresholds", "lifts", 1.0, 0.0, P, name) for name in sets)
     flows = tuple(tests.measured.measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)
     trial, own = Records(counts + flows), Records(counts + flows[lost:])
-    _, plain = hear(claim, {"mujoco": {1: trial}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
+    _, plain = full_verdict(claim, {"mujoco": {1: trial}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
     assert plain.outcome is outcome
-    assert hear(claim, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN  # counts confirm no number
+    assert full_verdict(claim, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN  # counts confirm no number
 
 
 SETS = {name: Parameters.named(name).replace(omega_0=1.0) for name in ("reference", "high-wall-friction")}
@@ -217,13 +222,13 @@ def test_no_claim_that_a_fault_refutes_stays_confirmed_by_a_witness(function, wr
     trial, steps = {"mujoco": {1: flows("mujoco", 0.0)}}, (1, 2, 3, 4)
     whole = trial | {"mujoco-plain": {n: flows("mujoco-plain", 1e-3 / n) for n in steps}}
     part = trial | {"mujoco-plain": {n: flows("mujoco-plain", 1e-3 / n, lost) for n in steps}}
-    right = {claim.id: hear(claim, whole) for claim in CLAIMS}
+    right = {claim.id: full_verdict(claim, whole) for claim in CLAIMS}
     assert right[named].witnesses[1].outcome is Outcome.CONFIRMED
     forget()
     module, _, name = f"analytic.{function}".rpartition(".")
     with believed(WrongTheory("", module, name, wrong)):
         for testimony, said in ((whole, Outcome.REFUTED), (part, Outcome.INCONCLUSIVE)):
-            heard = {claim.id: hear(claim, testimony) for claim in CLAIMS}
+            heard = {claim.id: full_verdict(claim, testimony) for claim in CLAIMS}
             about = [each for each in heard if heard[each].outcome is not right[each].outcome]
             assert named in about
             assert heard[named].witnesses[1].outcome is said

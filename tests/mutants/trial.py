@@ -32,7 +32,7 @@ from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Records
 from compare.kit.workers import processes
 from compare.report import results
-from compare.witnesses import hear
+from compare.witnesses import full_verdict
 from tests.mutants import engines
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import believed
@@ -332,7 +332,7 @@ def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
     """The verdict on a claim by a witness; by the engine on trial if it has no name."""
     if not by:
         return verdict(claim, _measured(directory)).outcome
-    witnesses = hear(claim, validation.stored(directory)).witnesses
+    witnesses = full_verdict(claim, validation.stored(directory)).witnesses
     return {each.engine: each.outcome for each in witnesses}[by]
 
 
