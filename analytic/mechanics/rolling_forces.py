@@ -99,8 +99,16 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
         at_A, limit_A, at_B, limit_B = friction(q)
         return np.asarray(at_A * limit_B - at_B * limit_A)
 
+    def slope(q: Array) -> Array:
+        """Derivative of that."""
+        at_A, limit_A, at_B, limit_B = friction(q)
+        turn_A = np.where(at_A > 0, ((a + 1) ** 2 + z**2) * q - (a + 1), 0.0) / np.where(at_A > 0, at_A, 1.0)
+        turn_B = np.where(at_B > 0, (4 + z**2) * q - 2, 0.0) / np.where(at_B > 0, at_B, 1.0)
+        return np.asarray(turn_A * limit_B + at_A * p.eta * (k - 2) * (limit_B > 0) - turn_B * limit_A + at_B * p.mu)
+
     A_binds, B_binds = excess_of_A(q_A) >= 0, excess_of_A(q_B) <= 0
-    q = np.where(A_binds, q_A, np.where(B_binds, q_B, roots.bisected(excess_of_A, q_A, q_B)))
+    high = np.where(A_binds, q_A, q_B)
+    q = roots.rising(excess_of_A, slope, np.where(A_binds | B_binds, high, q_A), high)
     at_A, limit_A, at_B, limit_B = friction(q)
     use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(at_A, limit_A))
     use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(at_B, limit_B))

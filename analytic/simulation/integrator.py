@@ -84,8 +84,9 @@ class Stretch:
 
     def __init__(self, chart: Chart, start: float, until: float, times: Array, relative: float, steady: bool) -> None:
         self.chart, self.start, self.until, self.times = chart, start, until, times
-        self.relative, self.absolute, self.steady = relative, relative / FINER, steady
-        self._arm = [0.0 if name in GAPS else self.absolute for name in chart.ends]
+        self.relative, self.steady = relative, steady
+        self._absolute = np.array(chart.scale) / FINER
+        self._arm = [0.0 if name in GAPS else relative / FINER for name in chart.ends]
         values = chart.guards(start, chart.start)
         self._level = [0.0 if value > arm else -relative for value, arm in zip(values, self._arm, strict=True)]
         self._opens = any(gap == 0 for gap, name in zip(values, chart.ends, strict=True) if name in GAPS)
@@ -150,7 +151,7 @@ class Stretch:
             before = taken
             why, tau, h, guard, taken = solver(
                 motion, start, tau, h, self.until - start, here, times, taken, samples, rtol,
-                rtol / FINER * scale, np.array(self._arm), level, slips, unit, *more,
+                rtol * self._absolute, np.array(self._arm), level, slips, unit, *more,
             )  # fmt: skip
             if why == solvers.STUCK or not np.isfinite(here).all():
                 raise StalledError(f"steps become too short in case {Case(chart.motion.case).name}")
@@ -202,7 +203,7 @@ class Stretch:
             z,
             self.until - start,
             rtol=LOCAL * self.relative,
-            atol=LOCAL * self.absolute * np.array(chart.scale),
+            atol=LOCAL * self.relative * self._absolute,
             first_step=first_step,
             **({"jac": jacobian} if method is BDF else {}),
         )

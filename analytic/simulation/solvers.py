@@ -36,6 +36,9 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 """Of the length of a step: below what its error allows; and by how much it may change."""
 LOOKS_A_STEP = 4
 """How often in a step guards are looked at."""
+INSIDE, CLEAR = 8, 2.0
+"""The stage, .65 of the step on, at which guards are looked at, too; and by how many times what they vary by they have
+to be positive for a step not to be looked into."""
 ROOT_STEPS = 200
 COLUMNS, USUAL = 10, 6
 """Most columns of an extrapolation, and how many steps aim at."""
@@ -112,6 +115,71 @@ def _pass(guard_values: Array, arm: Array, level: Array) -> int:
     return -1
 
 
+@register_jitable  # type: ignore[untyped-decorator]
+def _combined(weights: Array, count: int, K: Array, out: Array) -> None:
+    """The sum of so many rows of K (s, n) by their weights."""
+    out[:] = 0.0
+    for j in range(count):
+        for i in range(len(out)):
+            out[i] += weights[j] * K[j, i]
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _dense(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: Array, F: Array) -> None:
+    """Coefficients of `_between` for a step from z to `new` with its stages K, three more of which it fills in."""
+    for s in range(len(C_MORE)):
+        _combined(A_MORE[s], STAGES + 1 + s, K, now)
+        for i in range(len(z)):
+            now[i] = z[i] + h * now[i]
+        equations.rates(t + C_MORE[s] * h, now, k, K[STAGES + 1 + s])
+    for i in range(len(z)):
+        change = new[i] - z[i]
+        F[0, i], F[1, i] = change, h * K[0, i] - change
+        F[2, i] = 2 * change - h * (K[STAGES, i] + K[0, i])
+    for j in range(len(D)):
+        _combined(D[j], ALL, K, F[3 + j])
+        for i in range(len(z)):
+            F[3 + j, i] *= h
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _first_fall(
+    t: float, h: float, k: Motion, z: Array, F: Array, arm: Array, level: Array, seen: Array, now: Array, values: Array
+) -> tuple[int, float]:
+    """The guard that falls through its level first in a step, or -1, and the share of the step at which it does.
+
+    `seen` (LOOKS_A_STEP + 1, guards) holds their values at both ends, and takes those between.
+    """
+    fired, end = -1, 2.0
+    for look in range(1, LOOKS_A_STEP):
+        _between(look / LOOKS_A_STEP, z, F, now)
+        equations.guards(t + look / LOOKS_A_STEP * h, now, k, seen[look])
+    for guard in range(len(arm)):
+        for look in range(1, LOOKS_A_STEP + 1):
+            share = look / LOOKS_A_STEP
+            if seen[look, guard] > arm[guard]:
+                level[guard] = 0.0
+            lowest = share
+            if look > 1:  # a dip between the looks: the vertex of the parabola through three
+                one, two, three = seen[look - 2, guard], seen[look - 1, guard], seen[look, guard]
+                bend = one - 2 * two + three
+                away = (one - three) / (2 * bend) if bend > 0 else 2.0
+                if abs(away) < 1 and two - bend * away * away / 2 < level[guard] + bend:
+                    lowest = share + (away - 1) / LOOKS_A_STEP
+                    _between(lowest, z, F, now)
+                    equations.guards(t + lowest * h, now, k, values)
+                    if not values[guard] < level[guard]:
+                        lowest = share
+            if lowest < share or seen[look, guard] < level[guard]:
+                high = min(lowest, share)
+                low = share - (1 if high > share - 1 / LOOKS_A_STEP else 2) / LOOKS_A_STEP
+                root = _root(guard, level[guard], max(low, 0.0), high, t, h, k, z, F, now, values)
+                if root < end:
+                    fired, end = guard, root
+                break
+    return fired, end
+
+
 @_compiled
 def explicit(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
@@ -122,12 +190,15 @@ def explicit(
 
     z, level and samples are written to: z (n,); level of each guard, as `integrator.Stretch` says; samples, (m, n), at
     those of `times` that are passed, from the number `taken` on. A slip (coordinates `slips`) below `small` times
-    `unit` for more than `patience` steps is for a stiff method.
+    `unit` for more than `patience` steps is for a stiff method. A step is interpolated where a sample is due, or a
+    guard not `CLEAR`.
     """
     n, slow, rejected = len(z), 0, False
     K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
     new, now, values, seen = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty((LOOKS_A_STEP + 1, len(arm)))
+    five, three = np.empty(n), np.empty(n)
     equations.rates(start + tau, z, k, K[0])
+    equations.guards(start + tau, z, k, seen[0])
     if h <= 0:  # by the size of the rates
         rate = 0.0
         for i in range(n):
@@ -142,93 +213,53 @@ def explicit(
         if h <= 4 * EPS * tau or h < 1e-300:
             return STUCK, tau, h, -1, taken
         for s in range(1, STAGES):
+            _combined(A[s], s, K, now)
             for i in range(n):
-                value = 0.0
-                for j in range(s):
-                    value += A[s, j] * K[j, i]
-                now[i] = z[i] + h * value
+                now[i] = z[i] + h * now[i]
             equations.rates(start + (tau + C[s] * h), now, k, K[s])
+            if s == INSIDE:
+                equations.guards(start + (tau + C[s] * h), now, k, values)
+        _combined(B, STAGES, K, new)
         for i in range(n):
-            value = 0.0
-            for j in range(STAGES):
-                value += B[j] * K[j, i]
-            new[i] = z[i] + h * value
+            new[i] = z[i] + h * new[i]
         after = span if last else tau + h
         equations.rates(start + after, new, k, K[STAGES])
+        _combined(E5, STAGES + 1, K, five)
+        _combined(E3, STAGES + 1, K, three)
         fifth = third = 0.0
         for i in range(n):
-            five = three = 0.0
-            for j in range(STAGES + 1):
-                five += E5[j] * K[j, i]
-                three += E3[j] * K[j, i]
             size = atol[i] + rtol * max(abs(z[i]), abs(new[i]))
-            fifth += (five / size) ** 2
-            third += (three / size) ** 2
+            fifth += (five[i] / size) ** 2
+            third += (three[i] / size) ** 2
         bound = fifth + 0.01 * third
         error = h * fifth / math.sqrt(bound * n) if bound > 0 else bound
         if not error < 1:
             h *= max(SHRINK, SAFETY * error**-0.125) if error < math.inf else SHRINK
             rejected = True
             continue
-        for s in range(len(C_MORE)):
-            for i in range(n):
-                value = 0.0
-                for j in range(STAGES + 1 + s):
-                    value += A_MORE[s, j] * K[j, i]
-                now[i] = z[i] + h * value
-            equations.rates(start + (tau + C_MORE[s] * h), now, k, K[STAGES + 1 + s])
-        for i in range(n):
-            change = new[i] - z[i]
-            F[0, i], F[1, i] = change, h * K[0, i] - change
-            F[2, i] = 2 * change - h * (K[STAGES, i] + K[0, i])
-            for j in range(len(D)):
-                value = 0.0
-                for s in range(ALL):
-                    value += D[j, s] * K[s, i]
-                F[3 + j, i] = h * value
-        fired, end = -1, 2.0
-        for look in range(LOOKS_A_STEP + 1):
-            _between(look / LOOKS_A_STEP, z, F, now)
-            equations.guards(
-                start + (tau + look / LOOKS_A_STEP * h), new if look == LOOKS_A_STEP else now, k, seen[look]
-            )
+        equations.guards(start + after, new, k, seen[LOOKS_A_STEP])
+        clear = True
         for guard in range(len(arm)):
-            for look in range(1, LOOKS_A_STEP + 1):
-                share = look / LOOKS_A_STEP
-                if seen[look, guard] > arm[guard]:
-                    level[guard] = 0.0
-                lowest = share
-                if look > 1:  # a dip between the looks: the vertex of the parabola through three
-                    one, two, three = seen[look - 2, guard], seen[look - 1, guard], seen[look, guard]
-                    bend = one - 2 * two + three
-                    away = (one - three) / (2 * bend) if bend > 0 else 2.0
-                    if abs(away) < 1 and two - bend * away * away / 2 < level[guard] + bend:
-                        lowest = share + (away - 1) / LOOKS_A_STEP
-                        _between(lowest, z, F, now)
-                        equations.guards(start + (tau + lowest * h), now, k, values)
-                        if not values[guard] < level[guard]:
-                            lowest = share
-                if lowest < share or seen[look, guard] < level[guard]:
-                    high = min(lowest, share)
-                    low = (
-                        max(share - 1 / LOOKS_A_STEP, 0.0)
-                        if high > share - 1 / LOOKS_A_STEP
-                        else max(share - 2 / LOOKS_A_STEP, 0.0)
-                    )
-                    root = _root(guard, level[guard], low, high, start + tau, h, k, z, F, now, values)
-                    if root < end:
-                        fired, end = guard, root
-                    break
-        until = tau + end * h if fired >= 0 else after
-        while taken < len(times) and times[taken] <= start + until:
-            _between(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
-            taken += 1
-        if fired >= 0:
-            _between(end, z, F, now)
-            z[:] = now
-            return FIRED, until, h, fired, taken
+            one, two, end = seen[0, guard], values[guard], seen[LOOKS_A_STEP, guard]
+            if one > arm[guard]:
+                level[guard] = 0.0
+            low = min(one, two, end)
+            clear = clear and low > CLEAR * (max(one, two, end) - low)
+        fired, until = -1, after
+        if not clear or (taken < len(times) and times[taken] <= start + after):
+            _dense(start + tau, h, k, z, new, K, now, F)
+            fired, share = _first_fall(start + tau, h, k, z, F, arm, level, seen, now, values)
+            until = tau + share * h if fired >= 0 else after
+            while taken < len(times) and times[taken] <= start + until:
+                _between(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
+                taken += 1
+            if fired >= 0:
+                _between(share, z, F, now)
+                z[:] = now
+                return FIRED, until, h, fired, taken
         z[:] = new
         K[0] = K[STAGES]
+        seen[0] = seen[LOOKS_A_STEP]
         tau = after
         grow = GROW if error == 0 else min(GROW, SAFETY * error**-0.125)
         h *= min(grow, 1.0) if rejected else grow
