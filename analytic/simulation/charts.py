@@ -62,9 +62,10 @@ def _motion(
     """What the rates depend on, as plain numbers."""
     ball = {name: float(getattr(p, name)) for name in ("m", "r", "R", "j", "mu", "eta", "g")}
     line = {name: float(getattr(omega_0, name)) for name in ("start", "value", "slope")}
+    unit, _, spin, _ = natural_units(p)
     return Motion(
         int(case), **ball, law=drag.Law(*map(float, drag.law(p))), **line, waves=omega_0.waves, floor=floor, side=side,
-        leaves=LEAVES[leaves], falls=falls, since=since, v_y=v_y,
+        leaves=LEAVES[leaves], falls=falls, since=since, v_y=v_y, unit=unit, spin=spin,
     )  # fmt: skip
 
 

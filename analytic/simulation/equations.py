@@ -50,6 +50,10 @@ class Motion(NamedTuple):
     """When it began, s;"""
     v_y: float
     """and its vertical velocity then, m s-1."""
+    unit: float
+    """Natural units: of time, s,"""
+    spin: float
+    """and of the spin of the ball, rad s-1."""
 
 
 def fluid(t: float, k: Motion) -> float:
@@ -157,22 +161,21 @@ def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
     out[0] = omega_c
     if k.case == SS or k.case == NS:
         dw_z = (A_x - B_y) / jmr + omega_c * (k.R * omega_c / k.r + w_x) - dv_y / k.r
-    unit, spin = math.sqrt(k.R / k.g), math.sqrt(k.R * k.g) / k.r
     if k.case == SR or k.case == SS:
-        bond = (q_A * c_A - w_z) / unit
+        bond = (q_A * c_A - w_z) / k.unit
         out[first] = dw_x * s_A + dw_z * c_A - bond * c_A
         power -= k.r * q_A * k.mu * A_y
         if k.case == SS:
-            out[first + 1] = (dw_x * c_A - dw_z * s_A) / max(q_A, k.floor * spin)
+            out[first + 1] = (dw_x * c_A - dw_z * s_A) / max(q_A, k.floor * k.spin)
             first += 1
         first += 1
     if k.case == RS or k.case == SS or k.case == NS:
         dw_y = B_z / jmr + roll
-        bond = (q_B * c_B - w_z) / unit
+        bond = (q_B * c_B - w_z) / k.unit
         out[first] = dw_y * s_B + dw_z * c_B - bond * c_B
         power -= k.r * q_B * k.eta * B_x
         if k.case != RS:
-            out[first + 1] = (dw_y * c_B - dw_z * s_B) / max(q_B, k.floor * spin)
+            out[first + 1] = (dw_y * c_B - dw_z * s_B) / max(q_B, k.floor * k.spin)
             first += 1
         first += 1
     out[first] = power
@@ -186,15 +189,15 @@ def _guards_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
         out[0] = _rolls_on(k.R / k.g * omega_c * omega_c, abs(k.j * c * k.R / k.g * lag / (1 + 2 * k.j)), k)
         return
     A_x, A_y, A_z, B_x, B_y, B_z = _forces(omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
-    spin, G = math.sqrt(k.R * k.g) / k.r, k.m * k.g
+    G = k.m * k.g
     if k.case == RS:
-        out[0], out[1] = q_B / spin, (k.mu * A_y - math.sqrt(A_x * A_x + A_z * A_z)) / G
+        out[0], out[1] = q_B / k.spin, (k.mu * A_y - math.sqrt(A_x * A_x + A_z * A_z)) / G
     elif k.case == SR:
-        out[0], out[1], out[2] = q_A / spin, (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G, A_y / G
+        out[0], out[1], out[2] = q_A / k.spin, (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G, A_y / G
     elif k.case == SS:
-        out[0], out[1], out[2], out[3] = q_A / spin, q_B / spin, A_y / G, B_x / G
+        out[0], out[1], out[2], out[3] = q_A / k.spin, q_B / k.spin, A_y / G, B_x / G
     else:
-        slips = q_B / spin if k.case == NS else (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
+        slips = q_B / k.spin if k.case == NS else (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
         out[0], out[1] = z[1] / k.R, slips
 
 

@@ -34,31 +34,41 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the sequence of cases gets
     stuck.
     """
-    t_end = float(recorder.times[-1])
     simulator = _Simulator(p, settings, recorder)
-    at, case, at_once = Moment(0.0, theta_0, x0), None, 0
-    for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
-        fluid = Fluid.of(flow, start)
-        step = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
-        if case is None or step > _LEAST_JUMP * np.abs(flow.value).max():
-            before, (case, at, impulse) = case, simulator.settle(at, fluid)
-            if (before is not None and before is not case) or impulse is not NOTHING:
-                recorder.events.append(Event(start, case if before is None else before, case, impulse))
-        while at.time < end:
-            since, (guard, at) = at.time, simulator.follow(case, at, end, fluid)
-            if guard:
-                before, (case, at, impulse) = case, simulator.react(guard, case, at, fluid)
-                recorder.events.append(Event(at.time, before, case, impulse))
-            at_once = at_once + 1 if at.time - since <= 1e-14 * end else 0
-            if at_once > MAX_EVENTS_AT_ONCE:
-                raise StalledError(f"no way on from case {case.name} at state {at.x}")
+    try:
+        simulator.run(Moment(0.0, theta_0, x0), flow)
+    finally:
+        simulator.hand_over()
 
 
 class _Simulator:
     def __init__(self, p: Parameters, settings: Settings, recorder: Recorder) -> None:
         self.p, self.settings, self.recorder, self.steps = p, settings, recorder, 0
+        self.sampled: list[tuple[Case, Path, Array]] = []
+        """Stretches of samples: the case, the path, and omega_0 along it."""
+        self.taken = 0
         self.still = 10 * settings.rtol * math.sqrt(p.g * p.R) / p.r
         """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
+
+    def run(self, at: Moment, flow: Flow) -> None:
+        """From a moment to the last sample."""
+        t_end, events = float(self.recorder.times[-1]), self.recorder.events
+        case, at_once = None, 0
+        for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
+            fluid = Fluid.of(flow, start)
+            step = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
+            if case is None or step > _LEAST_JUMP * np.abs(flow.value).max():
+                before, (case, at, impulse) = case, self.settle(at, fluid)
+                if (before is not None and before is not case) or impulse is not NOTHING:
+                    events.append(Event(start, case if before is None else before, case, impulse))
+            while at.time < end:
+                since, (guard, at) = at.time, self.follow(case, at, end, fluid)
+                if guard:
+                    before, (case, at, impulse) = case, self.react(guard, case, at, fluid)
+                    events.append(Event(at.time, before, case, impulse))
+                at_once = at_once + 1 if at.time - since <= 1e-14 * end else 0
+                if at_once > MAX_EVENTS_AT_ONCE:
+                    raise StalledError(f"no way on from case {case.name} at state {at.x}")
 
     def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
         """Collide if the ball moves into something it touches, then find the case."""
@@ -105,15 +115,15 @@ class _Simulator:
         p, wanted = self.p, self.recorder.times
         if case is Case.RR and p.drag == STOKES:
             end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
-            stop, first = until if end is None else end, not self.recorder.taken
+            stop, first = until if end is None else end, not self.taken
             times = wanted[slice(*np.searchsorted(wanted, [-1.0 if first else at.time, stop], side="right"))]
             path = two_point_rolling.path(np.append(times, stop), at, p, fluid)
-            self._record(case, path, np.arange(len(times) + 1) < len(times), fluid)
+            self._keep(case, path, np.arange(len(times) + 1) < len(times), fluid)
             return None if end is None else "RR ends", _last(path)
         motion = charts.chart(case, at, p, fluid, self.settings.rtol, self.settings.leave_rolling)
         lands, until = motion.landing <= until, min(until, motion.landing)
         reached, states = [at.time], [motion.start]
-        sampled, guard = [self.recorder.taken == 0], None
+        sampled, guard = [self.taken == 0], None
         stretch = Stretch(motion, at.time, until, wanted, self.settings.rtol, not (fluid.slope or fluid.waves))
         x, hop = at.x, math.inf
         if (x.y == 0 < x.v_y and motion.landing == math.inf) or x.h == 0 < x.v_h:  # it is just rebounding
@@ -132,15 +142,26 @@ class _Simulator:
                     self.recorder.reached(step.time)
         finally:
             path = motion.path(np.array(reached), np.array(states).T)
-            self._record(case, path, np.array(sampled), fluid)
+            self._keep(case, path, np.array(sampled), fluid)
         return guard or ("A lands" if lands else None), _last(path)
 
-    def _record(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
-        if not np.any(wanted):
-            self.recorder.reached(float(path.time[-1]))
+    def _keep(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
+        self.recorder.reached(float(path.time[-1]))
+        if np.any(wanted):
+            path = Path(*(column[wanted] for column in path))
+            self.sampled.append((case, path, np.asarray(fluid(path.time))))
+            self.taken += len(path.time)
+
+    def hand_over(self) -> None:
+        """Record all samples: forces of one case after the other, since that is quicker than of one path."""
+        if not self.sampled:
             return
-        path = Path(*(column[wanted] for column in path))
-        forces = path_forces(case, path, self.p, fluid(path.time))
+        cases, paths, fluids = zip(*self.sampled, strict=True)
+        path, omega_0 = Path(*map(np.concatenate, zip(*paths, strict=True))), np.concatenate(fluids)
+        case, forces = np.repeat(cases, [len(each.time) for each in paths]), np.empty((len(omega_0), 6))
+        for each in set(cases):
+            here = case == each
+            forces[here] = path_forces(each, Path(*(column[here] for column in path)), self.p, omega_0[here])
         self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
 
 

@@ -40,7 +40,7 @@ INSIDE, CLEAR = 8, 2.0
 """The stage, .65 of the step on, at which guards are looked at, too; and by how many times what they vary by they have
 to be positive for a step not to be looked into."""
 ROOT_STEPS = 200
-COLUMNS, USUAL = 10, 6
+COLUMNS, USUAL = 12, 9
 """Most columns of an extrapolation, and how many steps aim at."""
 EPS = math.ulp(1.0)
 
@@ -403,7 +403,7 @@ def implicit(
             samples[taken] = z
             taken += 1
         if length == h or error < 0.01:
-            h = length * (4.0 if columns < USUAL - 2 else 2.0 if columns < USUAL else 1.0 if columns == USUAL else 0.6)
+            h = length * min(4.0, 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns))
         least = math.inf
         for i in slips:
             least = min(least, z[i] / unit)
