@@ -94,26 +94,24 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
         at_A, at_B = np.hypot((a + 1) * q - 1, z * q), np.hypot(2 * q - 1, z * q)
         return at_A, p.mu * (1 - q), at_B, p.eta * np.maximum((k - 2) * q + 1, 0.0)
 
-    def excess_of_A(q: Array) -> Array:
-        """Positive where the utilisation of A is the larger one."""
+    def excess_of_A(q: Array) -> tuple[Array, Array]:
+        """Positive where the utilisation of A is the larger one; and its derivative."""
         at_A, limit_A, at_B, limit_B = friction(q)
-        return np.asarray(at_A * limit_B - at_B * limit_A)
+        turn_A = (((a + 1) ** 2 + z**2) * q - (a + 1)) / np.where(at_A > 0, at_A, np.inf)
+        turn_B = ((4 + z**2) * q - 2) / np.where(at_B > 0, at_B, np.inf)
+        slope = turn_A * limit_B + at_A * p.eta * (k - 2) * (limit_B > 0) - turn_B * limit_A + at_B * p.mu
+        return at_A * limit_B - at_B * limit_A, slope
 
-    def slope(q: Array) -> Array:
-        """Derivative of that."""
-        at_A, limit_A, at_B, limit_B = friction(q)
-        turn_A = np.where(at_A > 0, ((a + 1) ** 2 + z**2) * q - (a + 1), 0.0) / np.where(at_A > 0, at_A, 1.0)
-        turn_B = np.where(at_B > 0, (4 + z**2) * q - 2, 0.0) / np.where(at_B > 0, at_B, 1.0)
-        return np.asarray(turn_A * limit_B + at_A * p.eta * (k - 2) * (limit_B > 0) - turn_B * limit_A + at_B * p.mu)
-
-    A_binds, B_binds = excess_of_A(q_A) >= 0, excess_of_A(q_B) <= 0
-    high = np.where(A_binds, q_A, q_B)
-    q = roots.rising(excess_of_A, slope, np.where(A_binds | B_binds, high, q_A), high)
+    A_binds, B_binds = excess_of_A(q_A)[0] >= 0, excess_of_A(q_B)[0] <= 0
+    end = np.where(A_binds, q_A, q_B)
+    q = roots.rising(excess_of_A, np.where(A_binds | B_binds, end, q_A), end)
     at_A, limit_A, at_B, limit_B = friction(q)
     use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(at_A, limit_A))
     use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(at_B, limit_B))
     jams = q == 0
-    B_y = np.where(jams, admissible_interval(omega_c, p, omega_0)[1], p.m * p.g * (2 - 1 / np.where(jams, 1.0, q)))
+    B_y = np.asarray(p.m * p.g * (2 - 1 / np.where(jams, 1.0, q)))
+    if np.any(jams):
+        B_y = np.where(jams, admissible_interval(omega_c, p, omega_0)[1], B_y)
     return LeastUtilisation(B_y, np.maximum(use_A, use_B))
 
 

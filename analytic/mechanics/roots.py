@@ -32,17 +32,18 @@ _HALVINGS = 200
 """More than enough for roots whose size is above 1e-44 of the interval."""
 
 
-def rising(f: Callable[[Array], Array], slope: Callable[[Array], Array], start: Array, end: Array) -> Array:
-    """Where f rises through zero on the way from start to end, to the last digits: Newton's method, or halving where
-    that leaves what is known to hold the root."""
-    below, above = np.array(start, dtype=float), np.array(end, dtype=float)
-    x = (below + above) / 2
+def rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array) -> Array:
+    """Where f, given with its derivative, rises through zero on the way from start to end, to the last digits.
+
+    By Newton's method, or halving where that leaves what is known to hold the root.
+    """
+    below, above = start, end
+    root = (start + end) / 2
     for _ in range(_HALVINGS):
-        value, rate = f(x), slope(x)
-        below, above = np.where(value < 0, x, below), np.where(value < 0, above, x)
-        newton = x - value / np.where(rate == 0, np.inf, rate)
-        better = np.where((newton - below) * (newton - above) <= 0, newton, (below + above) / 2)
-        if np.all(np.abs(better - x) <= 2 * np.finfo(float).eps * np.abs(x)):
+        before, (value, slope) = root, f(root)
+        below, above = np.where(value < 0, root, below), np.where(value < 0, above, root)
+        root = root - value / np.where(slope == 0, np.inf, slope)
+        root = np.where((root - below) * (root - above) <= 0, root, (below + above) / 2)
+        if np.all(np.abs(root - before) <= 2 * np.finfo(float).eps * np.abs(before)):
             break
-        x = better
-    return np.asarray(better)
+    return np.asarray(root)

@@ -122,7 +122,8 @@ class _Simulator:
             return None if end is None else "RR ends", _last(path)
         motion = charts.chart(case, at, p, fluid, self.settings.rtol, self.settings.leave_rolling)
         lands, until = motion.landing <= until, min(until, motion.landing)
-        reached, states = [at.time], [motion.start]
+        times: list[Array | list[float]] = [[at.time]]
+        states: list[Array | list[list[float]]] = [[motion.start]]
         sampled, guard = [self.taken == 0], None
         stretch = Stretch(motion, at.time, until, wanted, self.settings.rtol, not (fluid.slope or fluid.waves))
         x, hop = at.x, math.inf
@@ -132,8 +133,11 @@ class _Simulator:
             hop = min((2 * v / -a for gap, v, a in hops if gap == 0 < v and a < 0), default=math.inf)
         try:
             for step in stretch.steps(hop / 20 if hop < until - at.time else None):
-                reached += [*step.sample_times, step.time]
-                states += [*step.samples, step.z]
+                if len(step.samples):
+                    times.append(step.sample_times)
+                    states.append(step.samples)
+                times.append([step.time])
+                states.append([step.z])
                 sampled += [True] * len(step.samples) + [False]
                 guard = step.guard
                 self.steps += step.stands_for
@@ -141,7 +145,7 @@ class _Simulator:
                     self.steps = 0
                     self.recorder.reached(step.time)
         finally:
-            path = motion.path(np.array(reached), np.array(states).T)
+            path = motion.path(np.concatenate(times), np.concatenate(states).T)
             self._keep(case, path, np.array(sampled), fluid)
         return guard or ("A lands" if lands else None), _last(path)
 

@@ -53,15 +53,18 @@ class StalledError(ArithmeticError):
     """A solver can't go on, or the run makes no progress."""
 
 
+NONE = np.empty(0)
+
+
 class Step(NamedTuple):
     """A step of an integrator."""
 
     time: float
     z: list[float]
-    sample_times: Sequence[float] = ()
-    """Times to sample within the step."""
-    samples: Sequence[list[float]] = ()
-    """Coordinates then."""
+    sample_times: Array = NONE
+    """Times to sample within the step, shape (m,)."""
+    samples: Array = NONE
+    """Coordinates then, shape (m, n)."""
     guard: str | None = None
     """The guard that fired at its end."""
     stands_for: int = 1
@@ -158,9 +161,7 @@ class Stretch:
             t = self.until if why == solvers.DONE else start + tau
             self._level = level.tolist()
             name = chart.ends[guard] if why == solvers.FIRED else None
-            yield Step(
-                t, here.tolist(), times[before:taken].tolist(), samples[before:taken].tolist(), name, REPORT_EVERY
-            )
+            yield Step(t, here.tolist(), times[before:taken], samples[before:taken], name, REPORT_EVERY)
 
     def _straight(self, t: float, z: Sequence[float]) -> Step | None:
         """All the rest, if a straight line solves the equations to the tolerance and no guard fires; else None.
@@ -178,7 +179,7 @@ class Stretch:
             if np.any(bent > enough) or min(chart.guards(t + ahead, there)) < 0:
                 return None
         due = self.times[slice(*np.searchsorted(self.times, [t, self.until], side="right"))]
-        return Step(self.until, there, due.tolist(), (here + np.outer(due - t, rates)).tolist())
+        return Step(self.until, there, due, here + np.outer(due - t, rates))
 
     def _solve(self, method: Any, start: float, z: list[float], first_step: float | None) -> Iterator[Step]:
         """Steps of one solver; its time runs from zero, for directions settle in less than the round-off of `start`."""
@@ -229,8 +230,8 @@ class Stretch:
                 end, guard = min((self._root(k, between, start, *span), chart.ends[k]) for k in fired)
                 t, z = start + end, between(end).tolist()
             due = int(np.searchsorted(times, t, side="right"))
-            samples = between(times[taken:due] - start).T.tolist() if due > taken else []
-            yield Step(t, z, times[taken:due].tolist(), samples, guard)
+            samples = between(times[taken:due] - start).T if due > taken else NONE
+            yield Step(t, z, times[taken:due], samples, guard)
             if guard:
                 return
             taken = due
