@@ -147,7 +147,9 @@ def fall_time(y: float, v_y: float, p: Parameters) -> float:
 
 def ramp_lag(s: Any) -> Any:
     """(s - 1 + exp(-s))/s^2, by its series where that cancels: how a ball with linear drag lags behind a ramp."""
+    series = 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
+    if isinstance(s, float):
+        return series if abs(s) < 1e-2 else (s + math.expm1(-s)) / s**2
     small = np.abs(s) < 1e-2
     safe = np.where(small, 1.0, s)
-    series = 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
     return np.where(small, series, (safe + np.expm1(-safe)) / safe**2)

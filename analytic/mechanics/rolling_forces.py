@@ -63,7 +63,7 @@ def slip_margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | 
     `last_share` of the weight. Continuous; never beyond the zero of `margin`. docs/theory.md derives it.
     """
     u, z = _loads(omega_c, p, omega_0)
-    share = last_share(omega_c, p, omega_0)
+    share = _last_share(u, z, p)
     return np.asarray(np.minimum(p.eta * (1 + p.j) * u - z, p.mu * (1 - share) - np.hypot(p.j * u - share, z)))
 
 
@@ -72,9 +72,12 @@ def last_share(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | N
 
     0 where the cone has nothing left, beyond (66).
     """
-    u, z = _loads(omega_c, p, omega_0)
+    return _last_share(*_loads(omega_c, p, omega_0), p)
+
+
+def _last_share(u: Array, z: Array, p: Parameters) -> Array:
     k = (1 + p.j) * u
-    return np.asarray(np.clip(k - _normal_forces(k, z, p.eta)[0], 0.0, p.j * u))
+    return np.asarray(np.minimum(np.maximum(k - _normal_forces(k, z, p.eta)[0], 0.0), p.j * u))
 
 
 def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> LeastUtilisation:
@@ -91,7 +94,8 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
 
     def friction(q: Array) -> tuple[Array, Array, Array, Array]:
         """Friction at A and its limit, the same at B, in one unit."""
-        at_A, at_B = np.hypot((a + 1) * q - 1, z * q), np.hypot(2 * q - 1, z * q)
+        sideways = (z * q) ** 2
+        at_A, at_B = np.sqrt(((a + 1) * q - 1) ** 2 + sideways), np.sqrt((2 * q - 1) ** 2 + sideways)
         return at_A, p.mu * (1 - q), at_B, p.eta * np.maximum((k - 2) * q + 1, 0.0)
 
     def excess_of_A(q: Array) -> tuple[Array, Array]:
@@ -102,9 +106,12 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
         slope = turn_A * limit_B + at_A * p.eta * (k - 2) * (limit_B > 0) - turn_B * limit_A + at_B * p.mu
         return at_A * limit_B - at_B * limit_A, slope
 
-    A_binds, B_binds = excess_of_A(q_A)[0] >= 0, excess_of_A(q_B)[0] <= 0
+    first, last = excess_of_A(q_A)[0], excess_of_A(q_B)[0]
+    A_binds, B_binds = first >= 0, last <= 0
     end = np.where(A_binds, q_A, q_B)
-    q = roots.rising(excess_of_A, np.where(A_binds | B_binds, end, q_A), end)
+    start = np.where(A_binds | B_binds, end, q_A)
+    guess = start + first / np.where(first == last, np.inf, first - last) * (end - start)
+    q = roots.rising(excess_of_A, start, end, guess)
     at_A, limit_A, at_B, limit_B = friction(q)
     use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(at_A, limit_A))
     use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(at_B, limit_B))

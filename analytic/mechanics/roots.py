@@ -32,13 +32,12 @@ _HALVINGS = 200
 """More than enough for roots whose size is above 1e-44 of the interval."""
 
 
-def rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array) -> Array:
+def rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, guess: Array) -> Array:
     """Where f, given with its derivative, rises through zero on the way from start to end, to the last digits.
 
-    By Newton's method, or halving where that leaves what is known to hold the root.
+    By Newton's method from a guess, or halving where that leaves what is known to hold the root.
     """
-    below, above = start, end
-    root = (start + end) / 2
+    below, above, root = start, end, guess
     for _ in range(_HALVINGS):
         before, (value, slope) = root, f(root)
         below, above = np.where(value < 0, root, below), np.where(value < 0, above, root)

@@ -122,7 +122,7 @@ class _Simulator:
             return None if end is None else "RR ends", _last(path)
         motion = charts.chart(case, at, p, fluid, self.settings.rtol, self.settings.leave_rolling)
         lands, until = motion.landing <= until, min(until, motion.landing)
-        times: list[Array | list[float]] = [[at.time]]
+        moments: list[Array | list[float]] = [[at.time]]
         states: list[Array | list[list[float]]] = [[motion.start]]
         sampled, guard = [self.taken == 0], None
         stretch = Stretch(motion, at.time, until, wanted, self.settings.rtol, not (fluid.slope or fluid.waves))
@@ -134,9 +134,9 @@ class _Simulator:
         try:
             for step in stretch.steps(hop / 20 if hop < until - at.time else None):
                 if len(step.samples):
-                    times.append(step.sample_times)
+                    moments.append(step.sample_times)
                     states.append(step.samples)
-                times.append([step.time])
+                moments.append([step.time])
                 states.append([step.z])
                 sampled += [True] * len(step.samples) + [False]
                 guard = step.guard
@@ -145,16 +145,16 @@ class _Simulator:
                     self.steps = 0
                     self.recorder.reached(step.time)
         finally:
-            path = motion.path(np.concatenate(times), np.concatenate(states).T)
+            path = motion.path(np.concatenate(moments), np.concatenate(states).T)
             self._keep(case, path, np.array(sampled), fluid)
         return guard or ("A lands" if lands else None), _last(path)
 
     def _keep(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
-        self.recorder.reached(float(path.time[-1]))
         if np.any(wanted):
-            path = Path(*(column[wanted] for column in path))
-            self.sampled.append((case, path, np.asarray(fluid(path.time))))
-            self.taken += len(path.time)
+            kept = Path(*(column[wanted] for column in path))
+            self.sampled.append((case, kept, np.asarray(fluid(kept.time))))
+            self.taken += len(kept.time)
+        self.recorder.reached(float(path.time[-1]))
 
     def hand_over(self) -> None:
         """Record all samples: forces of one case after the other, since that is quicker than of one path."""

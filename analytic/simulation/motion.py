@@ -139,14 +139,12 @@ class Recorder:
         self.events: list[Event] = []
         self.time = 0.0
         """How far the run has come, s."""
-        self.taken = 0
-        """Number of samples so far: ``times[taken]`` is the next one."""
         self._blocks: list[npt.NDArray[np.void]] = []
         self._progress = progress
         self._first, self._residual, self._scale = math.nan, 0.0, 0.0
 
     def add(self, time: Array, theta: Array, x: Array, forces: Array, case: npt.ArrayLike, work: Array) -> None:
-        """Add samples.
+        """Add samples, one at least.
 
         Shapes: time, theta (n,), states x (n, 8), forces (n, 6) in the order A_x … B_z, case (n,) or a single one;
         work is that of drag and contacts since the start (n,), J.
@@ -155,15 +153,11 @@ class Recorder:
         block = samples(time, theta, state, self.p)
         block["force_A"], block["force_B"], block["case"] = forces[:, :3], forces[:, 3:], case
         self._blocks.append(block)
-        self.taken += len(block)
-        if not len(time):
-            return
         energy = rigid_body.energy(state.y, rigid_body.velocities(state, self.p), self.p)
         if math.isnan(self._first):
             self._first = float(energy[0] - work[0])  # an impact may precede the first sample
         self._residual = max(self._residual, float(np.max(np.abs(energy - work - self._first))))
         self._scale = max(self._scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
-        self.reached(float(time[-1]))
 
     def reached(self, time: float) -> None:
         """Note how far the run has come."""

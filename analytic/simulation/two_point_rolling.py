@@ -11,13 +11,12 @@ import math
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic.mechanics import drag, rolling_forces
 from analytic.simulation.motion import Fluid, Moment, Path
 from model import Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Real
 
 _SCAN = 256
 """Points in a stretch of RR, or in each period of its waves, at which its end is looked for: margins that are negative
@@ -27,22 +26,21 @@ MARGINS = {"slip-stability": rolling_forces.slip_margin, "infeasible": rolling_f
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
-def omega_c(t: npt.ArrayLike, at: Moment, p: Parameters, omega_0: Fluid) -> Array:
+def omega_c(t: Real, at: Moment, p: Parameters, omega_0: Fluid) -> Real:
     """omega_c at times t of a stretch that starts at a moment, same shape: (23) solved for a line and waves."""
-    t = np.asarray(t, dtype=float)
     k, tau = p.c / (1 + 2 * p.j), t - at.time
     a, b = omega_0.value + omega_0.slope * (at.time - omega_0.start), omega_0.slope
-    start = at.x.omega_c - float(_forced(at.time, k, omega_0))
+    start = at.x.omega_c - _forced(at.time, k, omega_0)
     # k tau^2 (1 - tau k/3 + …): the lag behind a ramp, without the cancellation of tau - (1 - exp(-k tau))/k.
     line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * drag.ramp_lag(k * tau)
-    return np.asarray(line + _forced(t, k, omega_0))
+    return line + _forced(t, k, omega_0)
 
 
-def _forced(t: npt.ArrayLike, k: float, omega_0: Fluid) -> Array:
+def _forced(t: Real, k: float, omega_0: Fluid) -> Real:
     """The periodic part of omega_c: each wave times k/(k + i omega)."""
-    swing = np.zeros_like(t, dtype=float)
+    swing = 0.0 * t
     for amplitude, omega, phase in omega_0.waves:
-        swing += amplitude * np.imag(k / (k + 1j * omega) * np.exp(1j * (omega * np.asarray(t) + phase)))
+        swing = swing + amplitude * (k / (k + 1j * omega) * np.exp(1j * (omega * t + phase))).imag
     return swing
 
 
