@@ -34,7 +34,8 @@ EXCEPTIONS = {
     *("compare/validation.py:validate", "compare/view/render.py:write", "compare/view/viewer.py:run"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
     *("analytic/simulation/charts.py:_motion", "analytic/simulation/equations.py:_forces"),
-    *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "explicit", "_extrapolated", "implicit")),
+    *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "explicit")),
+    *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "implicit")),
     *(f"analytic/simulation/stepping.py:{name}" for name in ("solve", "_stretch", "advance", "follow")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
     *("mjsim/compiled.py:drive", "mjsim/compiled_free.py:_advance", "mjsim/compiled_free.py:advance"),
