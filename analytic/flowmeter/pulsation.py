@@ -143,16 +143,15 @@ def mean_error(
     amplitude: float,
     frequency: float,
     settled: float = SETTLED,
-    rtol: float = PERIODIC_RTOL,
     leave_rolling: str = "slip-stability",
 ) -> float:
     """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
 
     0 if the ball rolls on; else from the gain of azimuth in the event-driven simulation. Each period starts from an
     extrapolation of the last few (Anderson's method), until the motion repeats itself to `settled` times the flow.
-    `rtol` and `leave_rolling` as in `Settings`. Raises `SimulationError` if it never does.
+    `leave_rolling` as in `Settings`. Raises `SimulationError` if it never does.
     """
-    settings = Settings(rtol=rtol, leave_rolling=leave_rolling)
+    settings = Settings(rtol=PERIODIC_RTOL, leave_rolling=leave_rolling)
     flow = Flow.sine(p.omega_0, amplitude, frequency)
     x = State(omega_c=swing(p, amplitude, frequency, 0.0)[0]).stacked()
     starts, ends = np.empty((0, 4)), np.empty((0, 4))
