@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -13,7 +14,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.stationary import slipping_branch
 from compare.kit import style
 from compare.kit.style import UNSTABLE, Place
-from model import Case, Parameters, State
+from model import Case, InputError, Parameters, State
 from model.arrays import Array
 
 Drawn = Callable[[Array, Array], Array]
@@ -52,6 +53,13 @@ def ends(p: Parameters) -> tuple[float, float]:
     """The flows up to which RR and from which SR is stable, rad s-1: for eta > j they are one."""
     t = bifurcation.thresholds(p)
     return (t.omega_01, t.omega_02) if p.eta < p.j else (t.omega_03, t.omega_03)
+
+
+def check_thresholds(p: Parameters) -> None:
+    """Raise `InputError` where a set lacks a threshold that figures need, as without friction or drag."""
+    t = bifurcation.thresholds(p)
+    if not math.isfinite(t.omega_02 + (t.omega_04 if p.eta < p.j else t.omega_03)):
+        raise InputError(f"a set with mu = {p.mu:g}, eta = {p.eta:g} and c = {p.c:g} 1/s has not all thresholds")
 
 
 def slipping_curve(p: Parameters, count: int) -> tuple[State, Array, npt.NDArray[np.bool_]]:

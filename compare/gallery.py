@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,18 +14,16 @@ from matplotlib.textpath import text_to_path
 
 from compare import subjects
 from compare.kit import drawing, style
-from compare.kit.drawing import Diagram, Drawing, Figures, GapError, Material
+from compare.kit.drawing import Drawing, Figures, GapError, Material
 from compare.kit.record import Check
 from compare.kit.statistics import COVERAGE
-from compare.subjects.flowmeter import figures as flowmeter
-from compare.subjects.thresholds.figures import Plane
 from model import InputError, Parameters, StorageError
 from model.files import make_directory, write_text
 
-_WIDEST = 1.5
-"""Deviations beyond this multiple of the tolerance are drawn at the edge, as arrows."""
+_FRAME = 1e-6, 10.0
+"""Deviations, in parts of the tolerance, that are drawn where they are; what is less or more stands at the edge."""
 _MANY = 100
-"""From so many points on, they are drawn as pixels: a page of many figures stays small."""
+"""From so many points on, marks are small and hollow."""
 _WIDTH, _BELOW = 7.0, 0.48
 """Of a figure of deviations, and of what is below its frame, inches."""
 Checks = tuple[Check, ...]
@@ -46,15 +45,20 @@ def figures_of(claim: str) -> Figures:
 
 
 def measured(material: Material, claim: str) -> Checks:
-    """The checks of a claim that have a tolerance; `GapError` if there are none, since counts need no figure."""
-    checks = tuple(c for c in material.checks.get(claim, ()) if c.tolerance > 0 and np.isfinite(c.deviation))
-    if not checks:
+    """The checks of a claim; `GapError` if none has a tolerance, since counts need no figure."""
+    checks = tuple(material.checks.get(claim, ()))
+    if not any(map(_has_tolerance, checks)):
         raise GapError("nothing with a tolerance was measured")
     return checks
 
 
+def _has_tolerance(check: Check) -> bool:
+    return check.tolerance > 0 and bool(np.isfinite(check.deviation))
+
+
 def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     """As high as there are quantities."""
+    every, checks = checks, tuple(filter(_has_tolerance, checks))
     names = list(dict.fromkeys(c.measurement.quantity for c in checks))
     engines = list(dict.fromkeys(c.measurement.engine for c in checks))
     strip = 1 / len(engines)
@@ -62,29 +66,25 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     figure = Figure(figsize=(_WIDTH, height))
     axes = figure.add_subplot()
     for band, grey in ((1, "0.93"), (1 / COVERAGE, "0.86")):
-        axes.axvspan(-band, band, color=grey, lw=0, zorder=0)
-    axes.axvline(0, **style.GUIDE)
+        axes.axvspan(_FRAME[0] / 2, band, color=grey, lw=0, zorder=0)
     for k in range(1, len(names)):
         axes.axhline(k - 0.5, color="white", lw=1.5, zorder=0.5)
-    many = len(checks) > _MANY
     row = np.array([names.index(c.measurement.quantity) for c in checks])
     engine = np.array([engines.index(c.measurement.engine) for c in checks])
     # Points are spread vertically against overlap; a single point stays centred.
     kind = row * len(engines) + engine
     spread = np.where(np.bincount(kind)[kind] == 1, 0.0, (np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5)
     lanes = row + strip * (engine + 0.5 + 0.6 * spread) - 0.5
-    ratio = np.array([c.deviation / c.tolerance for c in checks])
+    parts = np.clip([abs(c.deviation) / c.tolerance for c in checks], *_FRAME)
+    agrees = np.array([c.agrees for c in checks])
     for k, name in enumerate(engines):
-        own = (np.abs(ratio) <= _WIDEST) & (engine == k)
-        look = style.mark_of(name) | ({"ms": 3, "mfc": "none"} if many else {"ms": 4.5})
-        axes.plot(ratio[own], lanes[own], ls="none", label=name, rasterized=many, **look)
-    for side, arrow in ((-1, "<"), (1, ">")):
-        beyond = side * ratio > _WIDEST
-        at = np.full(beyond.sum(), side * _WIDEST)
-        axes.plot(at, lanes[beyond], marker=arrow, ms=7, color="#B3261E", ls="none", rasterized=many)
+        for fine, bad in ((agrees, {}), (~agrees, {"color": style.FORCE, "label": f"_{name}"})):
+            own = fine & (engine == k)
+            look = style.mark_of(name) | ({"ms": 3, "mfc": "none"} if len(checks) > _MANY else {"ms": 4.5})
+            axes.plot(parts[own], lanes[own], ls="none", clip_on=False, **{"label": name} | look | bad)
     axes.set_yticks(range(len(names)), [style.symbol(name) for name in names])
-    edge = 1.08 * _WIDEST
-    axes.set(xlim=(-edge, edge), ylim=(len(names) - 0.5, -0.5), xlabel="(measured − predicted)/tolerance")
+    axes.set(xscale="log", xlim=_FRAME, ylim=(len(names) - 0.5, -0.5), xlabel="|measured − predicted|/tolerance")
+    axes.minorticks_off()  # of which there would be more than marks
     above = 0.04
     if len(engines) > 1:
         style.legend(figure, loc="upper center", ncols=4)
@@ -96,25 +96,24 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     axes.set_position((left / _WIDTH, _BELOW / height, 1 - (left + 0.04) / _WIDTH, 1 - (_BELOW + above) / height))
     sets = dict.fromkeys(c.measurement.set for c in checks)
     alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
+    counts = Counter(c.measurement.engine for c in every)
+    shown = Counter(c.measurement.engine for c in checks)
+    told = ", ".join(
+        f"{counts[name]} number{'s' if counts[name] > 1 else ''} of {name}"
+        + (f", of which {shown[name]} have a tolerance" if shown[name] < counts[name] else "")
+        for name in engines
+    )
     return figure, (
-        f"Measured less predicted, divided by the tolerance of each of the {len(checks)} numbers "
+        f"By how much what was measured differs from what is predicted, in parts of the tolerance: {told} "
         f"({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each quantity, and in it one for "
-        "each engine. Shaded: within tolerance, three standard uncertainties; darker: within one; arrows: beyond the "
-        "frame."
+        "each engine. Shaded: within tolerance, three standard uncertainties; darker: within one; red: not as "
+        f"predicted. What is less than {_FRAME[0]:g} or more than {_FRAME[1]:g} stands at the edge."
     )
 
 
 def of_set(p: Parameters) -> Selected:
     """What the figures show of one set that theory alone can draw."""
-    folds = p.eta < p.j
-    planes = {name: Plane(p, equal, ()) for name, equal in (("fig-7", False), ("fig-8", True))}
-    names = ("fig-9", "fig-10", "fig-13-left") if folds else ("fig-9", "fig-11", "fig-13-right")
-
-    def of(name: str) -> Any:
-        flowmeter.top_flow(p)  # raises an error where there are no thresholds
-        return Diagram(name, p)
-
-    return {name: partial(planes.__getitem__, name) for name in planes} | {name: partial(of, name) for name in names}
+    return {name: partial(each.of_set, p) for name, each in FIGURES.items() if each.of_set}
 
 
 def of_results(material: Material) -> Selected:

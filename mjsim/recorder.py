@@ -52,7 +52,10 @@ def contacts(sensors: Array) -> Contacts:
 
 
 def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
-    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), raw (n, `COLUMNS`)."""
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), raw (n, `COLUMNS`).
+
+    Places that are ahead by half a step h are brought back by the velocity: that leaves h^2/8 times the acceleration.
+    """
     qpos, qvel, sensors, lead = np.split(raw, [NQ, SENSORS, COLUMNS - 1], axis=1)
     axes = frame(qpos[:, 0])
     qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)

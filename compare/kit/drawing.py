@@ -64,6 +64,12 @@ class GapError(Exception):
     """Why a figure can't be drawn, in a sentence for the reader."""
 
 
+def only_where(p: Parameters, folds: bool) -> None:
+    """Raise `GapError` unless the wall of a set has less friction than j (`folds`), or more."""
+    if (p.eta < p.j) != folds:
+        raise GapError(f"it is for η {'<' if folds else '>'} j, here η = {p.eta:g} and j = {p.j:g}")
+
+
 @dataclass(frozen=True)
 class Drawing:
     """One figure: a record of the registry."""
@@ -75,6 +81,8 @@ class Drawing:
     """The figure, and its caption: what is shown, with the parameters."""
     claims: tuple[str, ...] = ()
     """The claims beside which it stands."""
+    of_set: Callable[[Parameters], Any] | None = None
+    """What theory alone has of a set, as `select` gives it; raises `GapError` where the set has no such thing."""
 
 
 SUFFIXES = (".svg", ".pdf", ".png")

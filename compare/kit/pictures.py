@@ -26,6 +26,8 @@ from matplotlib.ticker import FixedFormatter
 from compare.kit.pages import typeset
 
 _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
+_FEW = 4
+"""Fewer marks that look alike stay as matplotlib writes them."""
 _UNNAMED = re.compile(r"_child\d+|_nolegend_|")
 _TEX = {r"\omega": "ω", r"\Omega": "Ω", r"\eta": "η", r"\mu": "μ", r"\rho": "ρ", r"\nu": "ν"}
 _TEX |= {r"\Delta": "Δ", r"\sqrt{R/g}": "√(R/g)", r"^0": "⁰"}
@@ -51,7 +53,7 @@ def svg(figure: Figure) -> str:
                 group.set("data-axes", json.dumps(_scales(figure, artist), ensure_ascii=False))
             else:
                 group.set("data-series", name)
-        _join_styles(group)
+        _join_marks(group)
     _renumber(root)
     return _rounded(ElementTree.tostring(root, encoding="unicode"))
 
@@ -125,14 +127,22 @@ def _scale(
     return about
 
 
-def _join_styles(group: ElementTree.Element) -> None:
-    """Give a group the style that all of its marks have."""
-    styles = {child.get("style") for child in group}
-    if len(group) > 1 and {child.tag for child in group} == {f"{_SVG}use"} and len(styles) == 1:
-        for child in group:
-            child.attrib.pop("style", None)
-        if style := styles.pop():
-            group.set("style", style)
+def _join_marks(group: ElementTree.Element) -> None:
+    """Make marks that look alike one path with a mark at each of its points, which is a tenth as long."""
+    looks = {(mark.tag, mark.get(f"{_XLINK}href"), mark.get("style"), *sorted(mark.keys())) for mark in group}
+    if len(group) < _FEW or len(looks) > 1 or group[0].tag != f"{_SVG}use" or {"x", "y"} - {*group[0].keys()}:
+        return
+    first = group[0]
+    name = f"{first.attrib[f'{_XLINK}href'][1:]}marks"
+    shape = ElementTree.Element(f"{_SVG}marker", {"id": name, "overflow": "visible", "markerUnits": "userSpaceOnUse"})
+    look = {key: first.attrib[key] for key in (f"{_XLINK}href", "style") if key in first.attrib}
+    ElementTree.SubElement(shape, f"{_SVG}use", look)
+    way = "M " + " ".join(f"{mark.get('x')} {mark.get('y')}" for mark in group)
+    ends = dict.fromkeys(("marker-start", "marker-mid", "marker-end"), f"url(#{name})")
+    for mark in list(group):
+        group.remove(mark)
+    group.append(shape)
+    ElementTree.SubElement(group, f"{_SVG}path", {"d": way, "fill": "none", "stroke": "none", **ends})
 
 
 def _renumber(root: ElementTree.Element) -> None:
@@ -143,7 +153,7 @@ def _renumber(root: ElementTree.Element) -> None:
         return found[1] + (found[2] if "-" in found[2] else names.setdefault(found[2], f"n{len(names)}"))
 
     for each in root.iter():
-        for attribute in (f"{_XLINK}href", "clip-path", "style", "mask", "fill"):
+        for attribute in (f"{_XLINK}href", "clip-path", "style", "marker-start", "marker-mid", "marker-end"):
             if "#" in (text := each.get(attribute, "")):
                 each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", named, text))
     for each in root.iter():

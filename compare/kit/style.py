@@ -162,6 +162,8 @@ def curve(
         points, (at, offset) = np.transpose([x, y]), place
         steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
         way = steps.cumsum()
+        if not way[-1]:  # there is nothing to name
+            return
         k = int(np.searchsorted(way, at * way[-1]))
         here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (points[k + 1] - points[k])
         name(axes, here_x, here_y, text, offset, COLOURS[cases[-1]]).set_label(label)

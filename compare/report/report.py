@@ -75,7 +75,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
             "checks": wording.ranked(verdict.checks)[:ROWS],
             "figures": [figures[name] for name in own if name not in shown],
             "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],
-            "repeat": f"dualball validate --claim {claim.id}{option} -o {directory}",
+            "repeat": f"dualball validate --claim {claim.id}{option} -o {directory.resolve().name}",
         }
         shown = dict.fromkeys(own, claim.id) | shown  # a figure of several claims stands beside the first
         sections.setdefault(claim.section, []).append(row)
@@ -113,7 +113,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         numbers=packed(columns(material.records, {v.claim.id: v.checks for v in ran})),
         not_run=[verdict.claim for verdict in verdicts if verdict.outcome is Outcome.NOT_RUN],
         not_drawn=[f"{figure['title']}: {figure['gap']}" for figure in apart if figure["gap"]],
-        command=f"dualball validate --full -o {directory}",
+        command=f"dualball validate --full -o {directory.resolve().name}",
         errata=errata(),
         provenance={
             "made": known.get("created", ""),

@@ -123,7 +123,8 @@ def heard(witness: Witness) -> str:
     order = f", converging with order {witness.order:.1f}" if math.isfinite(witness.order) else ""
     at = f"; at 2 ms typically off by {percent(witness.typical)}, at most {percent(witness.worst)}"
     left_out = f"; {witness.left_out} not measured" if witness.left_out else ""
-    numbers = f" on {len(witness.checks)} numbers" if witness.checks else ""
+    count = len(witness.checks)
+    numbers = f" on {count} number{'s' if count > 1 else ''}" if count else ""
     errors = f"; would notice {found}" if (found := noticed(witness.resolving_power)) else ""
     off, why = at if math.isfinite(witness.worst) else "", f"; {witness.reason}" if witness.reason else ""
     return f"{witness.outcome}{numbers}{order}{errors}{off}{left_out}{why}"

@@ -38,6 +38,15 @@ def test_series_and_scales_are_in_the_picture() -> None:
     ElementTree.fromstring(text)
 
 
+def test_marks_that_look_alike_are_one_path() -> None:
+    figure = Figure(figsize=(2, 2))
+    figure.add_subplot().plot(range(30), range(30), "o", label="many")
+    text = svg(figure)
+    (way,) = re.findall('data-series="many">.*?<path d="(M[^"]*)" fill="none"', text)
+    assert len(way.split()) == 1 + 2 * 30
+    assert text.count("<use") < 20  # of ticks
+
+
 def test_pictures_of_a_page_share_letters_and_nothing_else() -> None:
     pictures, letters = embedded({"a": svg(made()), "b": svg(made())})
     of = {name: set(re.findall('id="([^"]*)"', text)) for name, text in pictures.items()}

@@ -40,15 +40,23 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
     return "".join(shown), error.end
 
 
+_SYMBOL = re.compile(
+    r"((?:(?<![\w.])[A-Za-z]|[Α-ω])\u0303?)(?:_([A-Za-z0-9]{1,3})(?![A-Za-z0-9_(])|([₀-₉]+))"  # with an index
+    r"|((?<![\w.])j(?![\w'’])|[Α-ω](?![a-z]))"  # alone
+)
+_DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
+
+
 def typeset(text: str) -> str:
-    """Text of a page with symbols such as ω_c or A_z as mathematics, in HTML; all else is escaped."""
+    """Text of a page with symbols such as ω_c, ω₀ or η as mathematics, in HTML; all else is escaped."""
     import markupsafe  # comes with jinja2
 
-    escaped = str(markupsafe.escape(text))
-    shown = re.sub(
-        r"(?<![\w.])([A-Za-zΑ-ω]\u0303?)_([A-Za-z0-9]{1,3}(?:[⁰²])?)(?![\w(])", r"<i>\1</i><sub>\2</sub>", escaped
-    )
-    return markupsafe.Markup(shown)
+    def symbol(found: re.Match[str]) -> str:
+        letter, name, digits, alone = found.groups("")
+        index = f"<sub>{name or digits.translate(_DIGITS)}</sub>" if letter else ""
+        return f"<i>{letter or alone}</i>{index}"
+
+    return markupsafe.Markup(_SYMBOL.sub(symbol, str(markupsafe.escape(text))))
 
 
 def render(package: str, template: str, **values: Any) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Any
 
@@ -13,12 +12,12 @@ from matplotlib.figure import Figure
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation import simulator
-from compare.branches import ends, fold_state, slipping
+from compare.branches import check_thresholds, ends, fold_state, slipping
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion
+from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion, only_where
 from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
-from model import Case, Contact, InputError, Parameters
+from model import Case, Contact, Parameters
 
 SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}
 """The parameter set of each panel, eta < j and eta > j."""
@@ -83,6 +82,13 @@ def select_figure_13(material: Material, figure: str) -> Diagram:
     return Diagram(figure, Parameters.named(name), tuple(m for m in rows if m.set == name))
 
 
+def curve_of_set(figure: str, p: Parameters) -> Diagram:
+    """The characteristic curve of a set, without measured states."""
+    only_where(p, figure == "fig-13-left")
+    check_thresholds(p)
+    return Diagram(figure, p)
+
+
 def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     """One panel, with both scales."""
     p, top = of.p, top_flow(of.p)
@@ -118,11 +124,9 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
 
 def top_flow(p: Parameters) -> float:
     """The fastest flow shown, rad s-1; raises `InputError` where the set has no thresholds."""
+    check_thresholds(p)
     t = bifurcation.thresholds(p)
-    top = 1.25 * t.omega_04 if p.eta < p.j else 1.6 * t.omega_03
-    if not math.isfinite(top + t.omega_02):
-        raise InputError(f"a set with mu = {p.mu:g}, eta = {p.eta:g} and c = {p.c:g} 1/s has not all thresholds")
-    return top
+    return 1.25 * t.omega_04 if p.eta < p.j else 1.6 * t.omega_03
 
 
 def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
@@ -148,8 +152,14 @@ def select_fall(material: Material) -> Motion:
     for m in material.records.select("unloading", where=lambda m: m.set == SETS["fig-13-right"]):
         if m.conditions["start"] == "unloading" and (motions := material.motions(m)):
             return motions[-1]  # with the finest step
+    return fall_of_set(Parameters.named(SETS["fig-13-right"]))
+
+
+def fall_of_set(p: Parameters) -> Motion:
+    """The fall by the event-driven simulation."""
+    only_where(p, folds=False)
+    check_thresholds(p)
     # Flows held for no longer than 5 s each: longer ones are sampled less densely.
-    p = Parameters.named(SETS["fig-13-right"])
     return Motion("held", EVENT.name, p, partial(simulator.unloading, p, 5.0))
 
 
@@ -211,11 +221,17 @@ def draw_fall(fall: Motion) -> tuple[Figure, str]:
 FIGURES = {
     "characteristic": Drawing("Characteristic curves", select_curves, draw_curves),
     **{
-        name: Drawing(title, partial(select_figure_13, figure=name), draw_figure_13, (name,))
+        name: Drawing(
+            title,
+            partial(select_figure_13, figure=name),
+            draw_figure_13,
+            (name,),
+            partial(curve_of_set, name),
+        )
         for name, title in (
             ("fig-13-left", "Fig. 13, left: hysteresis, η < j"),
             ("fig-13-right", "Fig. 13, right: η > j"),
         )
     },
-    "unloading": Drawing("Section 5.3: the fall at unloading", select_fall, draw_fall, ("fig-13-right",)),
+    "unloading": Drawing("Section 5.3: the fall at unloading", select_fall, draw_fall, ("fig-13-right",), fall_of_set),
 }

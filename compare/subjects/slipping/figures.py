@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from analytic.bifurcation.diagram import thresholds
 from analytic.simulation import simulator
+from compare.branches import check_thresholds
 from compare.kit import style
 from compare.kit.drawing import Drawing, Material, Motion
 from compare.kit.engines import EVENT
@@ -17,19 +20,26 @@ BETA = 0.9
 """Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that the path bends."""
 PUSHED = 1.0
 """Size of the push, rad s-1."""
-_ROUGH = Parameters.named("high-wall-friction")
-ROUGH_FLOWS = {"fig-4": _ROUGH.replace(omega_0=25.0), "fig-5": _ROUGH.replace(omega_0=16.0)}
-"""Above and below omega_02 = 18.1 rad/s."""
-_LASTS = 0.012
-"""Time that Fig. 5 shows, s."""
+FLOWS = {"fig-4": 1.38, "fig-5": 0.88}
+"""Flows above and below omega_02, in units of it."""
+SET = Parameters.named("high-wall-friction")
+_LASTS = 0.17
+"""Time that Fig. 5 shows, in units of sqrt(R/g)."""
+
+
+def of_set(p: Parameters, figure: str) -> Motion:
+    """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
+    check_thresholds(p)
+    p = p.replace(omega_0=FLOWS[figure] * thresholds(p).omega_02)
+    lasts = _LASTS * math.sqrt(p.R / p.g) * (20 if figure == "fig-4" else 1)  # till slip has ended
+    return Motion(
+        f"{PUSHED}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, PUSHED, BETA, t_end=lasts)
+    )
 
 
 def select(_: Material, figure: str) -> Motion:
-    """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
-    p = ROUGH_FLOWS[figure]
-    return Motion(
-        f"{PUSHED}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, PUSHED, BETA, t_end=_LASTS)
-    )
+    """That of the set of the paper's kind, measured or not."""
+    return of_set(SET, figure)
 
 
 def draw(push: Motion) -> tuple[Figure, str]:
@@ -74,6 +84,6 @@ def draw(push: Motion) -> tuple[Figure, str]:
 
 
 FIGURES = {
-    name: Drawing(title, partial(select, figure=name), draw, ("slip-NR-NS",))
+    name: Drawing(title, partial(select, figure=name), draw, ("slip-NR-NS",), partial(of_set, figure=name))
     for name, title in (("fig-4", "Fig. 4: a slip that dies out"), ("fig-5", "Fig. 5: a slip that grows"))
 }

@@ -20,9 +20,9 @@ from scipy import ndimage
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
-from compare.branches import fold_state, going_round, lifted, slipping, spin
+from compare.branches import check_thresholds, fold_state, going_round, lifted, slipping, spin
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, Material
+from compare.kit.drawing import Diagram, Drawing, GapError, Material, only_where
 from compare.kit.record import Check
 from compare.kit.style import UNSTABLE
 from model import Case, Parameters, State
@@ -52,7 +52,7 @@ class Plane:
     p: Parameters
     equal: bool
     """Whether mu = eta (Fig. 8) or fixed (Fig. 7)."""
-    checks: tuple[Check, ...]
+    checks: tuple[Check, ...] = ()
 
 
 def select_plane(material: Material, figure: str) -> Plane:
@@ -181,6 +181,16 @@ def select_diagram(material: Material, figure: str) -> Diagram:
     return Diagram(figure, Parameters.named(name), own)
 
 
+def diagram_of_set(p: Parameters, figure: str) -> Diagram:
+    """The diagram of a set, without measured states."""
+    if figure != "fig-9":
+        only_where(p, figure == "fig-10")
+    check_thresholds(p)
+    if figure == "fig-12" and not np.isfinite(slipping_branch.states(np.linspace(-16.0, 16.0, 99), p)[1]).all():
+        raise GapError(f"with (12) released its branch of SS isn't whole: that needs an η nearer to j than {p.eta:g}")
+    return Diagram(figure, p)
+
+
 def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     """One diagram, with both scales."""
     figure, p = style.figure(5.8, 4.1), of.p
@@ -253,7 +263,11 @@ _DIAGRAMS = {
     "fig-12": "Fig. 12: on the floor, η > j, (12) released",
 }
 FIGURES = {
-    name: Drawing(title, partial(select, figure=name), draw, (name,))
-    for titles, select, draw in ((_PLANES, select_plane, draw_plane), (_DIAGRAMS, select_diagram, draw_diagram))
-    for name, title in titles.items()
+    name: Drawing(title, partial(select_plane, figure=name), draw_plane, (name,), partial(Plane, equal=name == "fig-8"))
+    for name, title in _PLANES.items()
+} | {
+    name: Drawing(
+        title, partial(select_diagram, figure=name), draw_diagram, (name,), partial(diagram_of_set, figure=name)
+    )
+    for name, title in _DIAGRAMS.items()
 }

@@ -6,9 +6,10 @@ const NEAR = 12;  // pixels within which the pointer is on a mark or a line
 function read(group) {
   const found = [...group.querySelectorAll("use[x]")].map(mark => [+mark.getAttribute("x"), +mark.getAttribute("y"), false]);
   for (const path of group.querySelectorAll("path:not(defs path)")) {
+    const line = !path.hasAttribute("marker-mid");
     for (const [, letter, numbers] of (path.getAttribute("d") ?? "").matchAll(/([A-Za-z])([^A-Za-z]*)/g)) {
-      const at = numbers.trim().split(/\s+/).map(Number).slice(-2);
-      if (at.length == 2) found.push([...at, letter != "M"]);
+      const all = numbers.trim().split(/\s+/).map(Number);  // of a curve the last two, where it ends
+      for (let k = line ? all.length - 2 : 0; k >= 0 && k + 1 < all.length; k += 2) found.push([all[k], all[k + 1], line && letter != "M"]);
     }
   }
   return found;
@@ -56,7 +57,7 @@ function enliven(figure) {
   if (series.size > 1) {
     for (const [name, groups] of series) {
       const label = document.createElement("label"), box = Object.assign(document.createElement("input"), {type: "checkbox", checked: true});
-      const look = getComputedStyle(groups[0].querySelector("use, path") ?? groups[0]);
+      const look = getComputedStyle(groups[0].querySelector("use, path:not(defs path)") ?? groups[0]);
       box.style.accentColor = [look.stroke, look.fill].find(colour => colour != "none" && colour != "rgb(255, 255, 255)") ?? "gray";
       box.addEventListener("change", () => groups.forEach(group => { group.style.display = box.checked ? "" : "none"; }));
       label.append(box, Object.assign(document.createElement("span"), {innerHTML: name}));
