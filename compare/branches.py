@@ -41,12 +41,13 @@ def going_round(
     end: float,
     text: str = "RR",
     place: Place = (0.5, (-5, 5)),
+    line: style.Line = style.STABLE,
 ) -> None:
     """A branch on which the ball goes round with the fluid, RR, SR, NR or NS, from one flow to another; its name."""
     flows, case = np.linspace(begin, end, 200), cases if isinstance(cases, Case) else cases[0]
     rolls = p.R / p.r * flows
     slip_x = np.asarray(rolls if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)) - rolls
-    style.curve(axes, cases, flows, quantity(slip_x, flows), text, place)
+    style.curve(axes, cases, flows, quantity(slip_x, flows), text, place, line)
 
 
 def ends(p: Parameters) -> tuple[float, float]:
