@@ -2,9 +2,9 @@
 
 import pytest
 
-from compare.commands import cli, options
+from compare.commands import cli, options, parsers
 
-COMMANDS = [name for group in cli.GROUPS.values() for name in group]
+COMMANDS = [name for group in parsers.GROUPS.values() for name in group]
 NEEDED = {
     "basins": "--across y=0:1:2 --up h=0:0.01:2",
     "collect": "runs",
@@ -37,4 +37,4 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
 
 
 def parser_of(command: str) -> options.Parser:
-    return cli._parser([command])._subparsers._group_actions[0].choices[command]
+    return parsers.parser([command])._subparsers._group_actions[0].choices[command]

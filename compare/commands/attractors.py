@@ -12,7 +12,7 @@ import numpy as np
 
 import analytic
 from analytic.orbits import orbit_branch
-from analytic.orbits.fates import LASTING, Attractor
+from analytic.orbits.fates import Attractor
 from analytic.orbits.periodic import Orbit
 from analytic.simulation.ensemble import interval
 from compare.commands import options, running
@@ -26,40 +26,6 @@ from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
-
-
-def add(commands: options.Commands) -> None:
-    """Declare the commands."""
-    command = options.command(commands, "attractors", run, "--set hopping --random 10")
-    options.add_parameters(command)
-    running.add_engine(command)
-    command.set_defaults(engine=EVENT)
-    running.add_start(command)
-    unless, most = "N random starts, unless one is given by --start", "how long to follow a run at most"
-    command.add_argument("--random", type=options.count, default=20, help=unless)
-    command.add_argument("--seed", type=options.seed, default=0, help="seed of the random starts")
-    command.add_argument("--time", type=options.seconds, help=f"{most} (default {LASTING:g}/c)")
-    options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
-    follow = "follow each periodic motion in a parameter, to where it is born and ends"
-    options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
-    tables = "write the tables as Markdown, too (default: don't)"
-    command.add_argument("-o", "--output", type=options.MARKDOWN, dest="page", help=tables)
-    options.outputs(command, shown="print as JSON")
-
-    example = "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21"
-    command = options.command(commands, "basins", plane, example)
-    options.add_parameters(command)
-    running.add_start(command)
-    for name in ("across", "up"):
-        text = f"a state variable {name} the plane, and its range"
-        command.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
-    points = "every N-th point along both axes by MuJoCo, too; 0: none"
-    command.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
-    command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
-    running.add_workers(command)
-    command.add_argument("-o", "--output", type=options.JSON, dest="map", help="write the map as JSON")
-    command.add_argument("--plot", type=options.FIGURE, help="draw the map: png, svg or pdf (default: don't)")
-    options.outputs(command, "basins", "print the shares as JSON", ("--results",))
 
 
 def run(args: argparse.Namespace) -> int:

@@ -14,40 +14,14 @@ import mujoco
 from rich.text import Text
 
 from compare.bench import forecast, forecast_page, league, native, settled
-from compare.commands import options, running
+from compare.commands import options
 from compare.kit import pages, progress
 from model import InputError
 from model.files import check_ours, make_directory, write_text
-from model.parameters import POSITIVE, check_names
+from model.parameters import check_names
 
 LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
-
-
-def add(commands: options.Commands) -> None:
-    """Declare the commands."""
-    command = options.command(commands, "forecast", foretold, "scene.xml --try")
-    command.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
-    command.add_argument("--keyframe", metavar="NAME", help="begin with this keyframe, by name or number")
-    driven = "controls: a number for each actuator, or NAME=NUMBER for some"
-    command.add_argument("--ctrl", nargs="+", default=[], metavar="[NAME=]N", help=driven)
-    longest = "longest time to wait until the model has settled; 0 takes the state as it stands"
-    command.add_argument("--settle", type=options.moment, default=10.0, help=longest)
-    for name, unit, how in (("creep", "m s-1", "creeps faster"), ("depth", "m", "sinks in deeper")):
-        limit = options.Number(unit, POSITIVE)
-        command.add_argument(f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured")
-    command.add_argument("--try", dest="tries", action="store_true", help="follow the advice and measure again")
-    command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write")
-    options.outputs(command)
-
-    command = options.command(commands, "league", ranked, "--quick")
-    command.add_argument("--quick", action="store_true", help="one time step")
-    named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENTRIES)}"
-    command.add_argument("--engine", action="append", metavar="NAME", help=named)
-    mine = "MuJoCo with the options of an MJCF file and the contacts of its ball, too; beside it MuJoCo alone"
-    command.add_argument("--settings", type=Path, metavar="FILE.xml", help=mine)
-    running.add_processes(command)
-    options.outputs(command, "results")
 
 
 def ranked(args: argparse.Namespace) -> int:

@@ -15,15 +15,6 @@ from compare.kit import pages
 from model.parameters import check_names
 
 
-def add(commands: options.Commands) -> None:
-    """Declare the command."""
-    command = options.command(commands, "cases", listed, "-o cases")
-    command.add_argument("name", nargs="?", metavar="NAME", help="show this case")
-    files = "write JSON, HDF5, MJCF and the scoring rule (default: none)"
-    command.add_argument("-o", "--output", type=options.results, metavar="DIR", help=files)
-    options.outputs(command)
-
-
 def listed(args: argparse.Namespace) -> int:
     """List the cases, show one, or write all."""
     own = {case.name: case for case in exact.cases()}

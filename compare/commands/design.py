@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from analytic.flowmeter import design
@@ -23,15 +22,6 @@ _FLOW: Kinds = {"slowest": ("rad s-1", NOT_NEGATIVE), "fastest": ("rad s-1", POS
 _TOLERANCES: Kinds = dict.fromkeys(design.INEXACT, ("1", Range(0.0, 1.0, below=True)))
 _USUAL = {"gravity": 9.81, "j": (0.4, 0.4)}
 """What need not be given: the Earth, a uniform ball."""
-
-
-def add(commands: options.Commands) -> None:
-    """Declare the command."""
-    command = options.command(commands, "design", run, "meter.toml -o meter.html")
-    command.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
-    command.add_argument("-o", "--output", type=options.PAGE, help="HTML page to write (default: none)")
-    command.add_argument("--seed", type=options.seed, default=0, help="seed of the random numbers of the search")
-    options.outputs(command, shown="print JSON instead of tables")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -147,11 +147,23 @@ def results(text: str) -> Path:
     return Path(text)
 
 
+def engine(name: str) -> Any:
+    """An engine by its name, for argparse."""
+    from compare.kit import engines  # here, because help waits for none of them
+
+    try:
+        return engines.engine(name)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+ENGINES = "dart, drake, pybullet, rapier, sapien, siconos"
+"""Those that others have written, each as NAME and NAME-defaults: tests see to it that none is missing."""
 PREFIX = "parameter_"
 """How the destinations of options begin that are parameters of the ball."""
 
 
-class _Help(argparse.HelpFormatter):
+class Help(argparse.HelpFormatter):
     """Help that says what kind of thing an option takes, and its default if it has one."""
 
     def _get_default_metavar_for_optional(self, action: argparse.Action) -> str:
@@ -179,42 +191,11 @@ class _Help(argparse.HelpFormatter):
         return f"{text} (default {default})"
 
 
-def command(commands: Commands, name: str, run: Callable[[argparse.Namespace], int], example: str) -> Parser:
-    """Declare a command; the example is what follows its name."""
-    texts = {"help": f"as in: dualball {name} {example}", "epilog": f"Example: dualball {name} {example}"}
-    declared: Parser = commands.add_parser(name, **texts, formatter_class=_Help)
-    declared.set_defaults(run=run)
-    return declared
-
-
-def add_own_set(parser: Parser) -> None:
-    """A set of the study by its name, or one's own."""
-    own = parser.add_mutually_exclusive_group()
-    own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
-    own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
-
-
 def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
     """The set that was asked for, by its name; nothing if none was."""
     if args.parameters:
         return {args.parameters.stem: Parameters.load(args.parameters)}
     return {args.set: Parameters.named(args.set)} if args.set else {}
-
-
-def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
-    """An option, to be given once or more often, for `compare.kit.sweep.Axis`."""
-    parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
-
-
-def outputs(
-    parser: Parser, directory: str = "", shown: str = "print JSON", names: tuple[str, ...] = ("-o", "--output")
-) -> None:
-    """``--json``; and what all commands have that fill a directory: its name, workers' progress or none."""
-    if directory:
-        where = "directory of the results; what it holds already is not computed again"
-        parser.add_argument(*names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where)
-        parser.add_argument("--quiet", action="store_true", help="no progress")
-    parser.add_argument("--json", action="store_true", help=shown)
 
 
 @contextmanager
@@ -254,6 +235,109 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
         print(json.dumps(plain(data), indent=1))
     else:
         terminal(markup=False).print(*shown, sep="\n")
+
+
+def add_own_set(parser: Parser) -> None:
+    """A set of the study by its name, or one's own."""
+    own = parser.add_mutually_exclusive_group()
+    own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
+    own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
+
+
+def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
+    """An option, to be given once or more often, for `compare.kit.sweep.Axis`."""
+    parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
+
+
+def add_directory(parser: Parser, directory: str, *names: str) -> None:
+    """What all commands have that fill a directory: its name, workers' progress or none."""
+    where = "directory of the results; what it holds already is not computed again"
+    names = names or ("-o", "--output")
+    parser.add_argument(*names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where)
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def add_json(parser: Parser, shown: str = "print JSON") -> None:
+    """The option to print what there is for programs."""
+    parser.add_argument("--json", action="store_true", help=shown)
+
+
+def add_flow(parser: Parser) -> None:
+    """Options that let omega_0 change in time."""
+    group = parser.add_argument_group("flow", "omega_0 over time, in rad/s and s; steady if none is given")
+    choice = group.add_mutually_exclusive_group()
+    ramp = "rises or falls evenly within so many seconds, and stays"
+    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
+    held, wave = "levels, each held HOLD s", "a mean with waves on it, frequencies in Hz"
+    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help=held)
+    choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
+    choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
+    longest = "longest time between lines of --flow (default: ten times the usual one)"
+    group.add_argument("--longest-interval", type=seconds, help=longest)
+
+
+def add_engine(parser: Parser, default: str = "mujoco") -> None:
+    """Options that choose an engine and its accuracy."""
+    group = parser.add_argument_group("engine")
+    add_engine_name(group, default, f"analytic is event; default {default}")
+    group.add_argument("--timestep", type=seconds, help="time step (default: the engine's; event has none)")
+    group.add_argument("--rtol", type=number, help="relative tolerance of event (default 1e-9)")
+    restitution = "coefficient of restitution of event and time-stepping (default 0)"
+    group.add_argument("--restitution", type=number, help=restitution)
+
+
+def add_engine_name(parser: argparse._ActionsContainer, default: str | None, usual: str) -> None:
+    """The option that chooses an engine; `usual` says what is if none is named."""
+    known = (
+        "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as it comes; others: "
+        f"mujoco-coulomb, event, time-stepping, and NAME or NAME-defaults of {ENGINES} ({usual})"
+    )
+    parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
+
+
+def add_workers(parser: Parser) -> None:
+    """Options that say where runs are carried out, of commands that go on where they were stopped."""
+    parser.set_defaults(resumes=True)
+    group = parser.add_argument_group("workers")
+    choice = group.add_mutually_exclusive_group()
+    add_processes(choice)
+    choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
+    longest = "longest real time a run may take (default: no limit)"
+    group.add_argument("--limit", type=seconds, default=math.inf, help=longest)
+
+
+def add_processes(parser: Any) -> None:
+    """The option that says how many processes of this machine take part, for a parser or a group of one."""
+    here, all_of_them = "processes of this machine; 0: this one", os.cpu_count() or 1
+    parser.add_argument("--workers", type=count_or_none, default=all_of_them, help=here)
+
+
+def add_samples(parser: Parser) -> None:
+    """The option that says how often a run is sampled."""
+    between = "time between samples (default: duration/1000)"
+    parser.add_argument("--sample-interval", type=seconds, help=between)
+
+
+def add_start(parser: Parser) -> None:
+    """The option for the initial state."""
+    from model.kinematics import UNITS, VARIABLES  # here, because it loads numpy
+
+    units = ", ".join(f"{name} in {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True))
+    meaning = f"initial state: {units}; zero (at rest against the wall) where not named"
+    parser.add_argument("--start", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
+
+
+def add_plot(parser: Parser, what: str) -> None:
+    """The option to draw what is printed."""
+    parser.add_argument("--plot", type=FIGURE, help=f"draw {what}: png, svg or pdf (default: don't)")
+
+
+def add_verdicts(parser: Parser) -> None:
+    """Options of what is said of claims."""
+    one = "only this claim; may be repeated (default: all)"
+    parser.add_argument("--claim", action="append", metavar="ID", help=one)
+    parser.add_argument("--verbose", action="store_true", help="list every number of each claim")
+    add_json(parser, "print the verdicts as JSON")
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:

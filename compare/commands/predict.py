@@ -25,17 +25,6 @@ from model.drag import LAWS, REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES
 
 
-def add(commands: options.Commands) -> None:
-    """Declare the commands."""
-    command = options.command(commands, "parameters", catalogue, "--set steel-in-water")
-    options.add_parameters(command)
-    options.outputs(command)
-
-    command = options.command(commands, "predict", run, "--set steel-in-water --omega-0 20")
-    options.add_parameters(command)
-    options.outputs(command, shown="print JSON instead of tables")
-
-
 def catalogue(args: argparse.Namespace) -> int:
     """Show every parameter, with its value in the set that was asked for, and the names of all sets."""
     p, rows = options.parameters(args), []

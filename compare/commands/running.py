@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
-from compare.commands.options import count_or_none, given, number, seconds
+from compare.commands.options import given
 from compare.kit import engines, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import AnySettings
@@ -19,20 +16,6 @@ from compare.kit.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import REACH, Range, check_names, check_number, parse_number
-
-
-def add_flow(parser: argparse.ArgumentParser) -> None:
-    """Options that let omega_0 change in time."""
-    group = parser.add_argument_group("flow", "omega_0 over time, in rad/s and s; steady if none is given")
-    choice = group.add_mutually_exclusive_group()
-    ramp = "rises or falls evenly within so many seconds, and stays"
-    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
-    held, wave = "levels, each held HOLD s", "a mean with waves on it, frequencies in Hz"
-    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help=held)
-    choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
-    choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
-    longest = "longest time between lines of --flow (default: ten times the usual one)"
-    group.add_argument("--longest-interval", type=seconds, help=longest)
 
 
 def flow(args: argparse.Namespace) -> Flow | None:
@@ -54,36 +37,6 @@ def flow(args: argparse.Namespace) -> Flow | None:
     return Flow.from_csv(args.flow, args.longest_interval) if args.flow else None
 
 
-def add_engine(parser: argparse.ArgumentParser) -> None:
-    """Options that choose an engine and its accuracy."""
-    group = parser.add_argument_group("engine")
-    add_engine_name(group)
-    group.add_argument("--timestep", type=seconds, help="time step (default: the engine's; event has none)")
-    group.add_argument("--rtol", type=number, help="relative tolerance of event (default 1e-9)")
-    restitution = "coefficient of restitution of event and time-stepping (default 0)"
-    group.add_argument("--restitution", type=number, help=restitution)
-
-
-def add_engine_name(
-    parser: argparse._ActionsContainer,
-    default: engines.Engine | None = engines.MUJOCO,
-    usual: str = "analytic is event; default mujoco",
-) -> None:
-    """The option that chooses an engine; `usual` says what is if none is named."""
-
-    def engine(name: str) -> engines.Engine:
-        try:
-            return engines.engine(name)
-        except InputError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-
-    known = (
-        "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as it comes; others: "
-        f"{', '.join(list(engines.ENGINES)[3:])} ({usual})"
-    )
-    parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
-
-
 def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
     """Settings of the engine that the options of `add_engine` choose, for a ball."""
     chosen: engines.Engine = args.engine
@@ -102,23 +55,6 @@ def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
     return Task(engine=args.engine.name, parameters=p, **given)
 
 
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Options that say where runs are carried out, of commands that go on where they were stopped."""
-    parser.set_defaults(resumes=True)
-    group = parser.add_argument_group("workers")
-    choice = group.add_mutually_exclusive_group()
-    add_processes(choice)
-    choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
-    longest = "longest real time a run may take (default: no limit)"
-    group.add_argument("--limit", type=seconds, default=math.inf, help=longest)
-
-
-def add_processes(options: Any) -> None:
-    """The option that says how many processes of this machine take part, for a parser or a group of one."""
-    here, all_of_them = "processes of this machine; 0: this one", os.cpu_count() or 1
-    options.add_argument("--workers", type=count_or_none, default=all_of_them, help=here)
-
-
 def workers(args: argparse.Namespace) -> Workers:
     """What the options of `add_workers` name."""
     return dask(args.scheduler) if args.scheduler else processes(args.workers)
@@ -132,19 +68,6 @@ def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: 
         Campaign(args.output / directory, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
     ):
         yield made
-
-
-def add_samples(parser: argparse.ArgumentParser) -> None:
-    """The option that says how often a run is sampled."""
-    between = "time between samples (default: duration/1000)"
-    parser.add_argument("--sample-interval", type=seconds, help=between)
-
-
-def add_start(parser: argparse.ArgumentParser) -> None:
-    """Option for the initial state."""
-    units = ", ".join(f"{name} in {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True))
-    meaning = f"initial state: {units}; zero (at rest against the wall) where not named"
-    parser.add_argument("--start", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
 
 
 def start(args: argparse.Namespace) -> State:

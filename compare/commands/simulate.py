@@ -22,45 +22,6 @@ DURATION = 10.0
 """Of a run, s, unless asked otherwise."""
 
 
-def add(commands: options.Commands) -> None:
-    """Declare the commands."""
-    command = options.command(commands, "simulate", run, "--omega-0 25 -o run.h5")
-    running.add_engine(command)
-    options.add_parameters(command)
-    running.add_flow(command)
-    running.add_start(command)
-    command.add_argument("--time", type=options.seconds, help=f"duration (default {DURATION:g})")
-    running.add_samples(command)
-    command.add_argument("-o", "--output", type=options.HDF5, help="HDF5 file to write (default: none)")
-    live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
-    command.add_argument("--view", action="store_true", help=live)
-    command.add_argument("--speed", type=options.speed, help="speed of --view (default 1, real time)")
-    options.outputs(command, shown="print the description as JSON")
-
-    command = options.command(commands, "sweep", grid, "--vary omega_0=10:30:21")
-    options.add_parameters(command)
-    running.add_start(command)
-    options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
-    command.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
-    command.add_argument("--seed", type=options.seed, default=0, help="seed of the points of --random")
-    ways, meaning = ("held", "up", "down", "both"), "held: a run for each point; else one run, omega_0 in steps"
-    command.add_argument("--direction", choices=ways, default="held", help=meaning)
-    running.add_engine(command)
-    lasts = "duration of a run that is held, and else of each step"
-    command.add_argument("--time", type=options.seconds, default=30.0, help=lasts)
-    running.add_samples(command)
-    means = "store what each run settles to, for collect, and not its samples"
-    command.add_argument("--means-only", action="store_true", help=means)
-    running.add_workers(command)
-    command.add_argument("--batch", type=options.count, default=campaign.BATCH, help="runs in one MuJoCo batch")
-    options.outputs(command, "sweep", "print a summary as JSON")
-
-    command = options.command(commands, "collect", collect, "sweep -o sweep.h5")
-    command.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
-    command.add_argument("-o", "--output", type=options.HDF5, default=Path("sweep.h5"), help="HDF5 file to write")
-    running.add_processes(command)
-
-
 def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
     if args.view:

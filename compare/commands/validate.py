@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -22,31 +21,6 @@ from compare.report import results, wording
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
 
 
-def add(commands: options.Commands) -> None:
-    """Declare the commands."""
-    command = options.command(commands, "validate", run, "--quick")
-    level = command.add_mutually_exclusive_group()
-    for each, takes in ((Level.QUICK, "a minute or two"), (Level.FULL, "an hour or more")):
-        option, usual, takes = f"--{each.name.lower()}", Level.DEFAULT, f"{takes} (default: in between)"
-        level.add_argument(option, dest="level", action="store_const", const=each, default=usual, help=takes)
-    options.add_own_set(command)
-    running.add_engine_name(command, None, "only this one is heard; default: the first three")
-    command.add_argument("--list", action="store_true", help="list the claims and stop")
-    running.add_workers(command)
-
-    again = options.command(commands, "judge", judge, "results --claim prop-1")
-    again.add_argument(
-        "output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="directory of a validation"
-    )
-    running.add_processes(again)
-
-    for parser, directory in ((command, "results"), (again, "")):
-        one = "only this claim; may be repeated (default: all)"
-        parser.add_argument("--claim", action="append", metavar="ID", help=one)
-        parser.add_argument("--verbose", action="store_true", help="list every number of each claim")
-        options.outputs(parser, directory, "print the verdicts as JSON")
-
-
 def run(args: argparse.Namespace) -> int:
     """Measure and judge."""
     from compare import validation  # here, because it loads everything there is
@@ -57,7 +31,13 @@ def run(args: argparse.Namespace) -> int:
         options.terminal().print(pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left"))
         return 0
     with progress.shown(quiet=args.quiet or args.json) as show:
-        wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit, "engine": args.engine}
+        wanted = {
+            "level": Level[args.level.upper()],
+            "claims": args.claim,
+            "sets": chosen,
+            "limit": args.limit,
+            "engine": args.engine,
+        }
         wanted |= {"workers": running.workers(args), "progress": show}
         wanted |= {"announce": lambda verdict: console.print(line(verdict), soft_wrap=True)}
         verdicts = validation.validate(args.output, **wanted)

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 import xarray
 
-from compare.commands import cli
+from compare.bench import league
+from compare.commands import cli, parsers
+from compare.kit import engines
 from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
@@ -259,7 +261,7 @@ def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_exampl
     with pytest.raises(SystemExit, match="0"):
         cli.main(["--help"])
     shown = capsys.readouterr().out
-    for title, names in cli.GROUPS.items():
+    for title, names in parsers.GROUPS.items():
         assert f"{title.capitalize()}:" in shown
         assert all(f"\n  {name} " in shown for name in names)
     lacking = []
@@ -278,6 +280,12 @@ def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_exampl
         ]
         lacking += [f"{name}: example"] * (f"Example: dualball {name}" not in told)
     assert not lacking
+
+
+def test_help_names_every_engine() -> None:
+    for command, known in (("simulate", engines.ENGINES), ("league", league.ENTRIES)):
+        told = set(re.findall(r"[\w-]+", re.sub(r"-\s+", "-", parser_of(command).format_help())))
+        assert not {name for name in known if not {name, name.removesuffix("-defaults")} & told}
 
 
 def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,359 @@
+"""All commands: what runs each, what it is for, its options. Nothing here takes long to load, for help waits for it."""
+
+from __future__ import annotations
+
+import argparse
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+from compare.commands import options
+from compare.commands.options import FILM, HDF5, JSON, MARKDOWN, PAGE, Number, Parser
+from model import InputError
+from model.errors import suggestion
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range
+
+
+class Command(NamedTuple):
+    """A command of the program."""
+
+    declare: Callable[[Parser], None]
+    """Adds its options; the docstring says what it is for."""
+    run: str
+    """Module of `compare.commands` and function, loaded when it is run."""
+    example: str
+    """What may follow its name."""
+
+    @property
+    def about(self) -> str:
+        """What it is for, in words that follow a name."""
+        text = self.declare.__doc__ or ""
+        return text[:1].lower() + text[1:].rstrip(".")
+
+
+GROUPS: dict[str, dict[str, Command]] = {}
+"""The commands, as help groups them."""
+
+
+def command(group: str, run: str, example: str) -> Callable[[Callable[[Parser], None]], None]:
+    """A decorator that makes a command of the function that declares its options, and has its name."""
+
+    def register(declare: Callable[[Parser], None]) -> None:
+        GROUPS.setdefault(group, {})[declare.__name__] = Command(declare, run, example)
+
+    return register
+
+
+@command("study", "validate.run", "--quick")
+def validate(parser: Parser) -> None:
+    """Hold simulation against theory, claim by claim; the main job."""
+    level = parser.add_mutually_exclusive_group()
+    for name, takes in (("quick", "a minute or two"), ("full", "an hour or more")):
+        takes = f"{takes} (default: in between)"
+        level.add_argument(f"--{name}", dest="level", action="store_const", const=name, default="default", help=takes)
+    options.add_own_set(parser)
+    options.add_engine_name(parser, None, "only this one is heard; default: the first three")
+    parser.add_argument("--list", action="store_true", help="list the claims and stop")
+    options.add_workers(parser)
+    options.add_directory(parser, "results")
+    options.add_verdicts(parser)
+
+
+@command("study", "validate.judge", "results --claim prop-1")
+def judge(parser: Parser) -> None:
+    """Judge the stored measurements of a validation again and write report.html anew."""
+    of = "directory of a validation"
+    parser.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help=of)
+    options.add_processes(parser)
+    options.add_verdicts(parser)
+
+
+@command("study", "look.figures", "--format pdf")
+def figures(parser: Parser) -> None:
+    """Draw the paper's figures, with measured points where there are results."""
+    where = "directory to write to"
+    parser.add_argument("-o", "--output", type=options.results, default=Path("figures"), metavar="DIR", help=where)
+    stored = "directory of a validation (default results, if it is there)"
+    parser.add_argument("--results", type=Path, metavar="DIR", help=stored)
+    options.add_own_set(parser)
+    parser.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
+
+
+@command("the ball", "predict.catalogue", "--set steel-in-water")
+def parameters(parser: Parser) -> None:
+    """The parameters of the ball that commands take, their units and ranges; the sets."""
+    options.add_parameters(parser)
+    options.add_json(parser)
+
+
+@command("the ball", "predict.run", "--set steel-in-water --omega-0 20")
+def predict(parser: Parser) -> None:
+    """Stationary solutions, thresholds and operating range, from theory."""
+    options.add_parameters(parser)
+    options.add_json(parser, "print JSON instead of tables")
+
+
+@command("the ball", "simulate.run", "--omega-0 25 -o run.h5")
+def simulate(parser: Parser) -> None:
+    """One run with any engine, into an HDF5 file, or live in MuJoCo's viewer."""
+    options.add_engine(parser)
+    options.add_parameters(parser)
+    options.add_flow(parser)
+    options.add_start(parser)
+    parser.add_argument("--time", type=options.seconds, help="duration (default 10)")
+    options.add_samples(parser)
+    parser.add_argument("-o", "--output", type=HDF5, help="HDF5 file to write (default: none)")
+    live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
+    parser.add_argument("--view", action="store_true", help=live)
+    parser.add_argument("--speed", type=options.speed, help="speed of --view (default 1, real time)")
+    options.add_json(parser, "print the description as JSON")
+
+
+@command("the ball", "look.inspect", "run.h5 --plot run.png")
+def inspect(parser: Parser) -> None:
+    """What a trajectory file holds."""
+    parser.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
+    options.add_plot(parser, "the run")
+    options.add_json(parser)
+
+
+@command("the ball", "look.compare", "mine.csv theory.h5 --plot difference.png")
+def compare(parser: Parser) -> None:
+    """Two motions side by side: differences, cases, parameters."""
+    what = "a run, or time and some of its quantities from CSV or any HDF5 file"
+    parser.add_argument("a", metavar="FILE", help=what)
+    parser.add_argument("b", metavar="OTHER", help="what it is compared with, the same")
+    options.add_plot(parser, "both")
+    options.add_json(parser)
+
+
+@command("the ball", "simulate.grid", "--vary omega_0=10:30:21")
+def sweep(parser: Parser) -> None:
+    """Many runs over ranges of parameters, resumable."""
+    options.add_parameters(parser)
+    options.add_start(parser)
+    options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
+    parser.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
+    parser.add_argument("--seed", type=options.seed, default=0, help="seed of the points of --random")
+    ways, meaning = ("held", "up", "down", "both"), "held: a run for each point; else one run, omega_0 in steps"
+    parser.add_argument("--direction", choices=ways, default="held", help=meaning)
+    options.add_engine(parser)
+    lasts = "duration of a run that is held, and else of each step"
+    parser.add_argument("--time", type=options.seconds, default=30.0, help=lasts)
+    options.add_samples(parser)
+    means = "store what each run settles to, for collect, and not its samples"
+    parser.add_argument("--means-only", action="store_true", help=means)
+    options.add_workers(parser)
+    parser.add_argument("--batch", type=options.count, default=64, help="runs in one MuJoCo batch")
+    options.add_directory(parser, "sweep")
+    options.add_json(parser, "print a summary as JSON")
+
+
+@command("the ball", "simulate.collect", "sweep -o sweep.h5")
+def collect(parser: Parser) -> None:
+    """Gather the runs of a directory into one file for xarray."""
+    parser.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
+    parser.add_argument("-o", "--output", type=HDF5, default=Path("sweep.h5"), help="HDF5 file to write")
+    options.add_processes(parser)
+
+
+@command("the ball", "attractors.run", "--set hopping --random 10")
+def attractors(parser: Parser) -> None:
+    """What balls come to from many starts: stationary, periodic, chaotic motions."""
+    options.add_parameters(parser)
+    options.add_engine(parser, "event")
+    options.add_start(parser)
+    unless = "N random starts, unless one is given by --start"
+    parser.add_argument("--random", type=options.count, default=20, help=unless)
+    parser.add_argument("--seed", type=options.seed, default=0, help="seed of the random starts")
+    parser.add_argument("--time", type=options.seconds, help="how long to follow a run at most (default 60/c)")
+    options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several: grid")
+    follow = "follow each periodic motion in a parameter, to where it is born and ends"
+    options.add_axes(parser, "--follow", follow, "NAME=FROM:TO")
+    tables = "write the tables as Markdown, too (default: don't)"
+    parser.add_argument("-o", "--output", type=MARKDOWN, dest="page", help=tables)
+    options.add_json(parser)
+
+
+@command("the ball", "attractors.plane", "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21")
+def basins(parser: Parser) -> None:
+    """What becomes of the ball from each start of a plane of states, resumable."""
+    options.add_parameters(parser)
+    options.add_start(parser)
+    for name in ("across", "up"):
+        text = f"a state variable {name} the plane, and its range"
+        parser.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
+    points = "every N-th point along both axes by MuJoCo, too; 0: none"
+    parser.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
+    parser.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
+    options.add_workers(parser)
+    parser.add_argument("-o", "--output", type=JSON, dest="map", help="write the map as JSON")
+    options.add_plot(parser, "the map")
+    options.add_directory(parser, "basins", "--results")
+    options.add_json(parser, "print the shares as JSON")
+
+
+@command("the ball", "design.run", "meter.toml -o meter.html")
+def design(parser: Parser) -> None:
+    """The best meter for a fluid and a range of flows, within bounds."""
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
+    parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write (default: none)")
+    parser.add_argument("--seed", type=options.seed, default=0, help="seed of the random numbers of the search")
+    options.add_json(parser, "print JSON instead of tables")
+
+
+@command("the ball", "look.render", "run.h5 -o film.gif --at 1 --time 10")
+def render(parser: Parser) -> None:
+    """A picture or film of a run: the scene, contact forces, slip, case."""
+    parser.add_argument("file", type=Path, help="a run")
+    parser.add_argument("-o", "--output", type=FILM, required=True, help="picture.png, film.gif, or page.html")
+    pixels, rates = Number(allowed=Range(160, 1920, whole=True)), Number(allowed=Range(1, 1000, whole=True))
+    at = "time of the run: of a picture (default: the end), where a film or page begins"
+    parser.add_argument("--at", type=options.moment, help=at)
+    lasts = "duration of a film, at most (default: 6, of a page 60)"
+    parser.add_argument("--time", type=options.seconds, help=lasts)
+    speed = "speed of a film or page; 1 is real time"
+    parser.add_argument("--speed", type=options.speed, default=0.25, help=speed)
+    parser.add_argument("--rate", type=rates, help="frames a second (default: 20, of a page 60)")
+    parser.add_argument("--width", type=pixels, help="pixels (default: 960, of a film 640)")
+    radii, names = Number("radii", NOT_NEGATIVE), ("FORCE", "SLIP")
+    lengths = "lengths of the arrows of a force m g and of the fastest slip (default 3 3)"
+    parser.add_argument("--arrows", nargs=2, type=radii, default=(3.0, 3.0), metavar=names, help=lengths)
+
+
+@command("the ball", "look.explore", "--set hopping --port 8081")
+def explore(parser: Parser) -> None:
+    """A page on this machine to play with: theory as sliders move, the motion in 3-D."""
+    options.add_parameters(parser)
+    port = Number(allowed=Range(1024, 65535, whole=True))
+    parser.add_argument("--port", type=port, default=8080, help="port of 127.0.0.1")
+    parser.add_argument("--no-browser", action="store_true", help="open none")
+
+
+@command("contacts and engines", "bench.foretold", "scene.xml --try")
+def forecast(parser: Parser) -> None:
+    """What the contacts of a MuJoCo model will do: depth, creep, hovering, largest step."""
+    parser.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
+    parser.add_argument("--keyframe", metavar="NAME", help="begin with this keyframe, by name or number")
+    driven = "controls: a number for each actuator, or NAME=NUMBER for some"
+    parser.add_argument("--ctrl", nargs="+", default=[], metavar="[NAME=]N", help=driven)
+    longest = "longest time to wait until the model has settled; 0 takes the state as it stands"
+    parser.add_argument("--settle", type=options.moment, default=10.0, help=longest)
+    for name, unit, how in (("creep", "m s-1", "creeps faster"), ("depth", "m", "sinks in deeper")):
+        limit = Number(unit, POSITIVE)
+        parser.add_argument(f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured")
+    parser.add_argument("--try", dest="tries", action="store_true", help="follow the advice and measure again")
+    parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write")
+    options.add_json(parser)
+
+
+@command("contacts and engines", "cases.listed", "-o cases")
+def cases(parser: Parser) -> None:
+    """The exact contact cases: listed, shown, or as files for engines in any language."""
+    parser.add_argument("name", nargs="?", metavar="NAME", help="show this case")
+    files = "write JSON, HDF5, MJCF and the scoring rule (default: none)"
+    parser.add_argument("-o", "--output", type=options.results, metavar="DIR", help=files)
+    options.add_json(parser)
+
+
+@command("contacts and engines", "bench.ranked", "--quick")
+def league(parser: Parser) -> None:
+    """All installed engines on the exact cases, as they come and in the best settings known."""
+    parser.add_argument("--quick", action="store_true", help="one time step")
+    named = (
+        "only this one (repeatable), or a module of your own: event, time-stepping, mujoco, mujoco-plain, NAME or "
+        f"NAME-defaults of {options.ENGINES}, mujoco, mujoco-warp, newton-xpbd; newton-kamino, "
+        "newton-semiimplicit-defaults, newton-vbd-defaults"
+    )
+    parser.add_argument("--engine", action="append", metavar="NAME", help=named)
+    mine = "MuJoCo with the options of an MJCF file and the contacts of its ball, too; beside it MuJoCo alone"
+    parser.add_argument("--settings", type=Path, metavar="FILE.xml", help=mine)
+    options.add_processes(parser)
+    options.add_directory(parser, "results")
+    options.add_json(parser)
+
+
+COMMANDS = {name: each for group in GROUPS.values() for name, each in group.items()}
+MOVED = {
+    "compare -o": "--plot",
+    "compare --output": "--plot",
+    "attractors --page": "-o",
+    "attractors --starts": "--random",
+    "basins --save": "-o",
+    "sweep --hold": "--time",
+    "render --from": "--at",
+    "render --seconds": "--time",
+    "render --force-arrow": "--arrows FORCE SLIP",
+    "render --slip-arrow": "--arrows FORCE SLIP",
+}
+"""Options of earlier versions by command, and what they are called now."""
+GONE = {
+    "report": "'dualball judge' writes report.html anew, too",
+    "search": "it is 'python -m docs.studies.search' in a clone",
+    "view": "'dualball simulate --view' opens the viewer, 'dualball explore' a page with the motion in 3-D",
+    "grade": "'dualball league --settings FILE.xml' puts settings on the exact cases, 'dualball forecast' any model",
+}
+"""Commands of earlier versions, and what to use now."""
+
+
+def declare(commands: options.Commands, name: str) -> None:
+    """Add a command to those of the program."""
+    of = COMMANDS[name]
+    told = f"dualball {name} {of.example}"
+    texts = {"help": f"as in: {told}", "description": of.about, "epilog": f"Example: {told}"}
+    parser: Parser = commands.add_parser(name, **texts, formatter_class=options.Help)
+    parser.set_defaults(run=of.run)
+    of.declare(parser)
+
+
+def parser(words: Sequence[str]) -> Parser:
+    """The parser of the command that was asked for, or of their names."""
+    parser = Parser(
+        prog="dualball",
+        usage="dualball [-h] [--version] COMMAND ...",
+        description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS)
+    if words[0] == "--print-completion":
+        _complete(parser, commands, words[1:])
+    for old in (f"{words[0]} {word.partition('=')[0]}" for word in words):
+        if old in MOVED:
+            raise InputError(f"{old} is {MOVED[old]} now")
+    if words[0] in COMMANDS:
+        declare(commands, words[0])
+        return parser
+    if words[0] in GONE:
+        raise InputError(f"there is no command {words[0]!r} any more: {GONE[words[0]]}")
+    if not words[0].startswith("-"):
+        raise InputError(f"there is no command {words[0]!r}{suggestion(words[0], COMMANDS)}; see 'dualball --help'")
+    if words[0] not in ("-h", "--help", "--version"):
+        raise InputError(f"there is no option {words[0]!r}{suggestion(words[0], ['--help', '--version'])}")
+    listed = []
+    for title, group in GROUPS.items():
+        listed.append(f"\n{title.capitalize()}:")
+        for name, command in group.items():
+            commands.add_parser(name)
+            listed.append(textwrap.fill(command.about, 100, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14))
+    parser.add_argument("--version", action="store_true", help="show the version")
+    parser.add_argument(
+        "--print-completion", metavar="SHELL", help="print what bash, zsh, fish or tcsh complete words by"
+    )
+    parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
+    return parser
+
+
+def _complete(parser: Parser, commands: options.Commands, shell: Sequence[str]) -> NoReturn:
+    """Print what a shell completes commands, options and files by, and end."""
+    try:
+        import shtab  # here, because it is optional
+    except ImportError as error:
+        raise InputError("--print-completion needs shtab: pip install 'dualball[completion]'") from error
+    if tuple(shell) not in {(each,) for each in shtab.SUPPORTED_SHELLS}:
+        raise InputError(f"--print-completion takes one of {', '.join(shtab.SUPPORTED_SHELLS)}")
+    for name in COMMANDS:
+        declare(commands, name)
+    commands.help = "a command"  # what has no help isn't completed
+    print(shtab.complete(parser, shell[0]))
+    raise SystemExit(0)
