@@ -117,6 +117,13 @@ class Claim:
         return frozenset(bearing.protocol for bearing in self.bearings)
 
 
+def bearings(
+    protocol: str, quantities: Iterable[str], predict: Callable[[Measurement], Prediction], **more: Any
+) -> tuple[Bearing, ...]:
+    """Bearings of several quantities that one function predicts."""
+    return tuple(Bearing(protocol, quantity, predict, **more) for quantity in quantities)
+
+
 def claim(id: str, source: str, statement: str, *bearings: Bearing, **more: Any) -> Claim:
     """A claim on which measurements bear, and what more there is to say of it."""
     return Claim(id, source, statement, bearings, **more)

@@ -78,24 +78,19 @@ def full_verdict(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     ends = {(m.set, m.value) for m in thresholds}
     if len(steps) == 1 and not engine(name).allowance:
         said = verdict(claim, measured)
-        first = _on_trial(name, said)
+        first = Witness(
+            engine=name,
+            outcome=Outcome.NOT_ASKED if said.outcome is Outcome.NOT_RUN else said.outcome,
+            reason=said.error,
+            checks=said.checks,
+            deviations=_deviations(said.checks),
+            left_out=said.left_out,
+        )
     else:
         first = _testify(claim, engine(name), steps, ends)
         said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
     beside = (_testify(claim, engine(other), own, ends, first.checks) for other, own in others)
     return replace(said, witnesses=(first, *beside))
-
-
-def _on_trial(name: str, said: Verdict) -> Witness:
-    """What the engine on trial says, whose numbers are judged as they are."""
-    return Witness(
-        engine=name,
-        outcome=Outcome.NOT_ASKED if said.outcome is Outcome.NOT_RUN else said.outcome,
-        reason=said.error,
-        checks=said.checks,
-        deviations=_deviations(said.checks),
-        left_out=said.left_out,
-    )
 
 
 @dataclass(frozen=True)
@@ -149,9 +144,10 @@ def _testify(
         reasons = ["at this level nothing that bears on the claim was asked of it", *map(str, missing[:3])]
         return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason="; ".join(reasons))
     if by.allowance:
-        checks, order = [_allowed(check, by.allowance) for check in found[max(found)]], math.nan
+        limits = [(_allowed(check, by.allowance), math.nan) for check in found[max(found)]]
     else:
-        checks, order = _limits(found, asked.finest, ends)
+        limits = [limit for row in _aligned(found, asked.finest) if (limit := _limit(row, ends))]
+    checks, orders = tuple(check for check, _ in limits), [order for _, order in limits if math.isfinite(order)]
     most = reduce(or_, map(rows, found.values()))
     wanted = most | Counter(bearing for bearing, _ in shared) | Counter({check.bearing for check in trial})
     usual = ((c, coarse_step(c.measurement.parameters) / n) for n, own in found.items() for c in own)
@@ -159,20 +155,11 @@ def _testify(
         engine=by.name,
         outcome=outcome(claim, checks, wanted),
         reason=_too_few(claim, checks, wanted, missing),
-        checks=tuple(checks),
-        order=order,
+        checks=checks,
+        order=median(orders) if orders else math.nan,
         deviations=_deviations(c for c, step in usual if by.allowance or step == USUAL_STEP),
         left_out=sum(each.rows for each in missing) + most.total() - len(checks),
     )
-
-
-def _limits(
-    found: Mapping[int, Sequence[Check]], finest: Mapping[str, int], ends: Set[tuple[str, float]]
-) -> tuple[list[Check], float]:
-    """The checks that have a limit of no step, and the median of the orders found."""
-    limits = [limit for row in _aligned(found, finest) if (limit := _limit(row, ends))]
-    orders = [order for _, order in limits if math.isfinite(order)]
-    return [check for check, _ in limits], median(orders) if orders else math.nan
 
 
 def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]) -> str:

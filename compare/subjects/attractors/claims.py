@@ -12,7 +12,7 @@ from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import Orbit
-from compare.claim import Bearing, claim
+from compare.claim import Bearing, bearings, claim
 from compare.judge import simulated, theory
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, state
@@ -59,7 +59,7 @@ def _orbiting(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
         _, _, of = m.quantity.partition("_")
         return _ORBIT[of](theory(orbits.refine, m.parameters, state(m), m.at("period")))
 
-    return tuple(Bearing(protocol, quantity, predict, by="analytic.orbits.periodic.refine") for quantity in quantities)
+    return bearings(protocol, quantities, predict, by="analytic.orbits.periodic.refine")
 
 
 def _after_rest(m: Measurement) -> float:
@@ -82,8 +82,8 @@ CLAIMS = (
         "choice",
         "Definitions 1-3",
         "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
-        *(Bearing("choice", quantity, _after_rest, by=_RULE) for quantity in ("case", "omega_c")),
-        *(Bearing("choice", quantity, _only, by="analytic.stable_solutions") for quantity in ("case", "omega_c")),
+        *bearings("choice", ("case", "omega_c"), _after_rest, by=_RULE),
+        *bearings("choice", ("case", "omega_c"), _only, by="analytic.stable_solutions"),
     ),
     claim(
         "hopping",
@@ -96,7 +96,7 @@ CLAIMS = (
     claim(
         "hopping-multiplier",
         _PERIODIC,
-        "Disturbances of the hopping shrink from hop to hop by its largest Floquet multiplier.",
+        "Disturbances of a hop shrink from one to the next by a factor: the largest Floquet multiplier of its orbit.",
         *_orbiting("recurrent", "orbit_multiplier"),
         level=Level.DEFAULT,
     ),

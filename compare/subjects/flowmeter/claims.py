@@ -10,7 +10,7 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
-from compare.claim import Bearing, Text, claim, every, given
+from compare.claim import Bearing, Text, bearings, claim, every, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
 from compare.kit.settling import physical_case
@@ -214,10 +214,7 @@ CLAIMS = (
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
         "rolling at both points.",
         *_ends(UNLOADED),
-        *(
-            Bearing("unloading", quantity, _at_event, by=_SIMULATED)
-            for quantity in ("time", "landing_speed", "landing_impulse")
-        ),
+        *bearings("unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED),
     ),
     claim(
         "push",

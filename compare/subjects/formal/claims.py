@@ -280,7 +280,7 @@ CLAIMS = (
     Claim(
         "fig-12",
         "Fig. 12",
-        "With (12) released all bifurcations of Table 5 appear for η > j as well.",
+        "If floor and wall could pull, (12) released, all bifurcations of Table 5 would appear for η > j as well.",
         algebra=_figure_12,
         reason="The floor would have to pull: no ball and no engine does this.",
     ),
@@ -302,7 +302,7 @@ CLAIMS = (
     Claim(
         "eq-69-edge",
         "after (69)",
-        "0 < δ < 1 exactly where slip at the wall dies out on either side, (64).",
+        "The share δ is between 0 and 1 exactly where slip at the wall dies out on either side, (64).",
         algebra=_sliding,
         reason="Where it does not, no ball rolls at both points: δ is measured in between, by eq-69.",
     ),

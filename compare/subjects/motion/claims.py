@@ -9,7 +9,7 @@ from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
-from compare.claim import Bearing, Text, claim, given
+from compare.claim import Bearing, Text, bearings, claim, given
 from compare.judge import RTOL, simulated, theory
 from compare.kit.record import Condition, Measurement, state
 from compare.kit.settling import forces
@@ -48,7 +48,7 @@ def _ends(*starts: str) -> tuple[Bearing, ...]:
     def when(m: Measurement) -> bool:
         return str(m.conditions["start"]).startswith(starts)
 
-    return tuple(Bearing("runs", f"end_{name}", _end, when=when, by=_RUN) for name in VARIABLES)
+    return bearings("runs", [f"end_{name}" for name in VARIABLES], _end, when=when, by=_RUN)
 
 
 def _holds(case: Case, m: Measurement) -> bool:
@@ -174,7 +174,7 @@ LAW_CLAIMS = (
         "extension",
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
         Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
-        *(Bearing("impacts", f"after_{name}", _end, by=_RUN) for name in LANDED),
+        *bearings("impacts", [f"after_{name}" for name in LANDED], _end, by=_RUN),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
 )

@@ -132,7 +132,7 @@ CLAIMS = (
     claim(
         "eq-58",
         "(58)",
-        "Out of rolling on the wall alone, slip grows the most along β₁, whatever the state.",
+        "A ball that rolls on the wall alone begins to slip the fastest in the direction β₁, whatever its state.",
         Bearing("steepest", "steepest", _steepest, by="slip_bounds.steepest_nr"),
     ),
     claim(
@@ -197,7 +197,7 @@ CLAIMS = (
     claim(
         "eq-69",
         "(69)",
-        "Rolling at both points is the convex combination of slipping to either side that doesn't slip.",
+        "Rolling is the mean of slipping to one side and to the other, weighted so that no slip is left.",
         Bearing("growth", "filippov_share", _share, by="slip_bounds.filippov_share"),
     ),
     claim(

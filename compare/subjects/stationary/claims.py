@@ -9,7 +9,7 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
-from compare.claim import Bearing, Text, When, claim, every, given
+from compare.claim import Bearing, Text, When, bearings, claim, every, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
@@ -54,16 +54,16 @@ def _exists(case: Case, m: Measurement) -> bool:
     return any(s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters))
 
 
-def bearings(
+def _values(
     quantities: Iterable[str], when: When, by: str, of: Case | None = None, protocol: str = "settled"
 ) -> tuple[Bearing, ...]:
-    """Bearings of settled states on a claim, one a quantity; predicted by the state of a case, or of that detected."""
+    """Values of settled states, predicted by the state of a case, or of that detected."""
 
     def predict(m: Measurement) -> float:
         state = theory(analytic.solution, m.parameters, of) if of else reached(m)
         return number(m.quantity, state, m.parameters)
 
-    return tuple(Bearing(protocol, quantity, predict, when=when, by=by) for quantity in quantities)
+    return bearings(protocol, quantities, predict, when=when, by=by)
 
 
 def _cases(when: When) -> Bearing:
@@ -127,7 +127,7 @@ CLAIMS = (
         "Prop. 1, (30)-(32)",
         "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
         "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
-        *bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
+        *_values((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
         _cases(_ROLLS),
         _with_fluid(),
     ),
@@ -135,22 +135,22 @@ CLAIMS = (
         "prop-1-rough",
         "Prop. 1, (83), (86)",
         "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
-        *bearings(("omega_c",), every(lifts_first, _ROLLS), "(32)"),
+        *_values(("omega_c",), every(lifts_first, _ROLLS), "(32)"),
         _with_fluid(lifts_first),
     ),
     claim(
         "prop-2-forces",
         "Prop. 2, (33), (34)",
         "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
-        *bearings(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
+        *_values(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
     ),
     claim(
         "prop-3-5",
         "Props. 3 and 5, (35), (36), (46), (47)",
         "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
         "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
-        *bearings(_STATE, _LIFTED, "(46), (47)"),
-        *bearings(_STATE, _LEANS, "(35), (36)", Case.SR),
+        *_values(_STATE, _LIFTED, "(46), (47)"),
+        *_values(_STATE, _LEANS, "(35), (36)", Case.SR),
         _cases(_LIFTED),
         text=Text.CORRECTED,
         reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
@@ -160,7 +160,7 @@ CLAIMS = (
         "Prop. 4, (37)-(42)",
         "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
         "its contact forces are (42)-(44).",
-        *bearings(_STATE, _SLIPS, "(37)-(44)"),
+        *_values(_STATE, _SLIPS, "(37)-(44)"),
         _cases(_SLIPS),
     ),
     claim(
@@ -178,9 +178,8 @@ CLAIMS = (
         "(42), (43)",
         "Slipping at both points, the normal forces at floor and wall are the closed forms in α, and friction holds "
         "the ball back along its orbit.",
-        *(
-            Bearing("settled", force, _along_branch, when=_SLIPS, by="slipping_branch.branch")
-            for force in ("force_Ay", "force_Bx", "force_Az")
+        *bearings(
+            "settled", ("force_Ay", "force_Bx", "force_Az"), _along_branch, when=_SLIPS, by="slipping_branch.branch"
         ),
     ),
     claim(
@@ -188,7 +187,7 @@ CLAIMS = (
         "Prop. 6, (49), (50)",
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
-        *bearings(_STATE, _SINKS, "(49), (50)"),
+        *_values(_STATE, _SINKS, "(49), (50)"),
         _cases(_SINKS),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
@@ -197,8 +196,8 @@ CLAIMS = (
         "mirrored",
         "Props. 1, 4 and 5",
         "In a flow the other way round the ball settles in the mirror images of the same states.",
-        *bearings(_STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"),
-        *bearings((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
+        *_values(_STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"),
+        *_values((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
         Bearing("mirrored", "case", case, by="analytic.stable_solutions"),
     ),
 )
@@ -208,22 +207,22 @@ DIAGRAMS = (
         "fig-9",
         "Fig. 9",
         "Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
-        *bearings(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
+        *_values(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
     ),
     claim(
         "fig-10",
         "Fig. 10",
         "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall lie on the curves "
         "of Fig. 10.",
-        *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
-        *bearings(("wall_spin",), every(slips_first, _LEANS), "(91)", Case.SR),
+        *_values(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
+        *_values(("wall_spin",), every(slips_first, _LEANS), "(91)", Case.SR),
     ),
     claim(
         "fig-11",
         "Fig. 11",
         "For η > j rolling ends at ω₀₃, where it meets SR, whose spin on the wall falls like 1/ω₀.",
-        *bearings(("wall_spin",), every(lifts_first, _ROLLS), "(91)"),
-        *bearings(("wall_spin",), every(lifts_first, _LEANS), "(91)", Case.SR),
+        *_values(("wall_spin",), every(lifts_first, _ROLLS), "(91)"),
+        *_values(("wall_spin",), every(lifts_first, _LEANS), "(91)", Case.SR),
         _with_fluid(lifts_first),
     ),
     *(

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import rolling_forces
-from compare.claim import Bearing, When, claim, given
+from compare.claim import Bearing, When, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.settled import number
@@ -32,14 +32,10 @@ def _known(m: Measurement) -> analytic.Thresholds:
     return theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
 
 
-def _edge(name: str) -> Bearing:
+def _edge(m: Measurement) -> float:
     """A quantity of the unstable state."""
-    return Bearing(
-        "edge",
-        f"edge_{name}",
-        lambda m: number(name, theory(analytic.solution, m.parameters, Case.SS, stable=False), m.parameters),
-        by="analytic.solution: SS beyond the fold, (37)-(41)",
-    )
+    unstable = theory(analytic.solution, m.parameters, Case.SS, stable=False)
+    return number(m.quantity.removeprefix("edge_"), unstable, m.parameters)
 
 
 _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
@@ -110,7 +106,12 @@ CLAIMS = (
         "sub-branches",
         "Prop. 7, (87)-(90), Fig. 10",
         "Between ω₀₂ and ω₀₄ an unstable state of slipping at both points divides two attractors.",
-        *(_edge(name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")),
+        *bearings(
+            "edge",
+            [f"edge_{name}" for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")],
+            _edge,
+            by="analytic.solution: SS beyond the fold, (37)-(41)",
+        ),
     ),
     claim(
         "eta-critical",

@@ -79,7 +79,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     found = [_changes(lab, name, p, records) for name, p in sets.items()]
     found = _narrowed(lab, found, _end_of_rolling, careful=sure)
     found = _narrowed(lab, found, _sinking_and_slipping)
-    found = _settled_beside(lab, [each if lab.effort.granted else _seen(each) for each in found])
+    found = _settled_beside(lab, found)
     found = _narrowed(lab, found, _riding_and_leaning, careful=sure)
     found = _narrowed(lab, found, _fold)
     for each in found:
@@ -215,14 +215,14 @@ def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
         yield each.search("slipping", change, "rest", COARSE * change.low)
 
 
-def _seen(each: Findings) -> Findings:
-    """The same with those brackets alone beyond which something was seen."""
-    brackets = {kind: b for kind, b in each.brackets.items() if b.runs[1] or b.high in each.cases[kind]}
-    return replace(each, brackets=brackets)
-
-
 def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
-    """Findings with settled states beside every change; only those that did settle in the case that belongs."""
+    """Findings with settled states beside every change; only those that did settle in the case that belongs.
+
+    A bracket is taken for a change only if something was seen beyond it, or that may be taken for granted.
+    """
+    if not lab.effort.granted:
+        seen = [{k: b for k, b in each.brackets.items() if b.runs[1] or b.high in each.cases[k]} for each in found]
+        found = [replace(each, brackets=own) for each, own in zip(found, seen, strict=True)]
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
     places = [_beside(each) for each in found]
     starts = [
@@ -505,8 +505,19 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     lags: dict[str, Measured] = {}
     drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
     for _ in (FIRST_DRAGS, NEARER_DRAGS):
-        for (name, _), end in zip(drags, _branch_ends(lab, sets, ranges, drags), strict=True):
-            found[name] += [end] if end else []
+        starts = [
+            [
+                named_start(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest")
+                for part in BEFORE_END
+            ]
+            for name, c in drags
+            for low, high in [ranges[name]]
+        ]
+        for (name, c), states in zip(drags, settle_groups(lab, starts), strict=True):
+            if not any(state.failure or state.case is not Case.SS for state in states):
+                flows = np.array([state.start.p.omega_0 for state in states])
+                slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
+                found[name].append(BranchEnd(1 / c, slope, [state.task for state in states]))
         for name, own in found.items():
             if len(own) >= len(FIRST_DRAGS):
                 values, noise = zip(*((end.slope.value, end.slope.uncertainty) for end in own), strict=True)
@@ -522,24 +533,3 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             tasks = [task for end in found[name] for task in end.tasks]
             row = measurement(lab, "birth", name, p, "critical_drag", drag, tasks)
             yield if_found(row, "no drag gives birth to a fold")
-
-
-def _branch_ends(
-    lab: Lab,
-    sets: Mapping[str, Parameters],
-    ranges: Mapping[str, tuple[float, float]],
-    drags: Sequence[tuple[str, float]],
-) -> Iterator[BranchEnd | None]:
-    """From states that settle near the ends of the ranges of slipping; None where one does not, or not in SS."""
-    starts = [
-        [named_start(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
-        for name, c in drags
-        for low, high in [ranges[name]]
-    ]
-    for (_, c), states in zip(drags, settle_groups(lab, starts), strict=True):
-        if any(state.failure or state.case is not Case.SS for state in states):
-            yield None
-        else:
-            flows = np.array([state.start.p.omega_0 for state in states])
-            slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
-            yield BranchEnd(1 / c, slope, [state.task for state in states])
