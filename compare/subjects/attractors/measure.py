@@ -44,20 +44,6 @@ SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
 
 
-WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
-"""eta of the walls along which the hop is followed, in units of that of the set. The first steps are short: their
-starts are extrapolated from one or two hops, which attract from nearby only."""
-FOLLOWED_FOR, ALONE_FOR = 10.0, 60.0
-"""How long a hop is followed at a wall, and then left alone, s."""
-RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
-"""From which coefficient of restitution to the next a rebounding ball is followed."""
-REBOUNDING, REBOUNDS_ALONE = (0.0, 0.2, 0.4, 0.48, 0.6), 20.0
-"""At which of them it is run without further change, and how long, s. (0.6 is among them since results had been seen:
-at 0.56 disturbances grow so slowly that this doesn't show it.)"""
-SWINGING, SWUNG = 24.0, 4.0
-"""How long a ball swings, and the last part of it that is measured, s."""
-
-
 def hopping(
     lab: Lab,
     sets: Mapping[str, Parameters],
@@ -169,6 +155,13 @@ def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
     return Measured(parabola, abs(parabola - line))
 
 
+WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
+"""eta of the walls along which the hop is followed, in units of that of the set. The first steps are short: their
+starts are extrapolated from one or two hops, which attract from nearby only."""
+FOLLOWED_FOR, ALONE_FOR = 10.0, 60.0
+"""How long a hop is followed at a wall, and then left alone, s."""
+
+
 def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The wall beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
     p = Parameters.named(SET)
@@ -200,6 +193,13 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
     again = [task(walls[k], np.array(tasks[k][1].x0), ALONE_FOR, MARGINAL[0]) for k in (-4, -1)]
     yield from _left_alone(lab, "followed", SET, again)
+
+
+RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
+"""From which coefficient of restitution to the next a rebounding ball is followed."""
+REBOUNDING, REBOUNDS_ALONE = (0.0, 0.2, 0.4, 0.48, 0.6), 20.0
+"""At which of them it is run without further change, and how long, s. (0.6 is among them since results had been seen:
+at 0.56 disturbances grow so slowly that this doesn't show it.)"""
 
 
 def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -238,6 +238,10 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured
     """
     slow, fast, later = (float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True))
     return finer(slow, Measured(fast, abs(fast - later)))
+
+
+SWINGING, SWUNG = 24.0, 4.0
+"""How long a ball swings, and the last part of it that is measured, s."""
 
 
 def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

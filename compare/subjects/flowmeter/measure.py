@@ -50,12 +50,6 @@ ACROSS = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
 """Distances from the flow at which slipping sets in, relative to it."""
 SHARPNESS = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
 """Factor on the drift limit of settled states, by what is measured: for the jump the states lie close together."""
-LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
-"""Names of the trials."""
-ABOVE, BELOW = 1.02, 0.95
-"""Flows before and after the unloading, in units of the measured omega_02."""
-PUSH = 1e-2
-"""How hard a ball is pushed: speed in units of sqrt(g R), or more spin in units of its spin on the wall."""
 
 
 def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -220,6 +214,14 @@ class Shown:
     trial: str
     quantity: str
     event: str
+
+
+LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
+"""Names of the trials."""
+ABOVE, BELOW = 1.02, 0.95
+"""Flows before and after the unloading, in units of the measured omega_02."""
+PUSH = 1e-2
+"""How hard a ball is pushed: speed in units of sqrt(g R), or more spin in units of its spin on the wall."""
 
 
 def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

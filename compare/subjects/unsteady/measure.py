@@ -45,9 +45,6 @@ PHASES = 8
 ROLLS_AT, SLIPS_AT, RAMP_ENDS = 0.85, 0.3, (0.75, 1.35)
 """Flows of rolling, in units of that at which it ends; of slipping, as parts of the way from there to where the wall
 carries the ball; and ends of a ramp, as parts of the way to where slipping ends in a jump."""
-JUMP = 1e-3
-"""Size of a jump from rolling divided by the flow, and from slipping by a third of the range of flows in which it is:
-the response to a small jump is wanted, and near the ends of that range it is far from linear."""
 
 
 def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -292,6 +289,11 @@ def limit(values: Array) -> float:
     """The limit of the last three values of a geometric sequence; the last one if they diverge."""
     first, second = values[-2] - values[-3], values[-1] - values[-2]
     return float(values[-1] + (second**2 / (first - second) if abs(second) < abs(first) else 0.0))
+
+
+JUMP = 1e-3
+"""Size of a jump from rolling divided by the flow, and from slipping by a third of the range of flows in which it is:
+the response to a small jump is wanted, and near the ends of that range it is far from linear."""
 
 
 def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,61 +35,72 @@ FLUIDS: Mapping[str, Mapping[str, float]] = {
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """How far the laws are off, the ratio of friction to normal force, and the speed at which balls sink in a fluid."""
-    refined = lab.effort.laws_refined
+    yield from _laws(lab, sets)
     balls = {name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2) for name, fluid in FLUIDS.items()}
+    yield from _sinking(lab, balls)
+
+
+class Law(NamedTuple):
+    """A law of a contact, by the quantity that shows how far it is off."""
+
+    quantity: str
+    law: str
+    contact: str
+
+
+def _laws(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Measurement | Missing]:
+    """Every law at its worst in motions from rest in a flow that rises, high on the wall in one that falls, and along
+    the floor towards the wall.
+    """
     tasks = []
     for p in sets.values():
-        step, fast = coarse_step(p), 3.0 / time_unit(p)
-        t_end = RUN_LENGTH * step
-        # From rest in a flow that rises; high on the wall in one that falls; and along the floor towards the wall.
+        t_end, fast = RUN_LENGTH * coarse_step(p), 3.0 / time_unit(p)
         up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
         down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
         half = Flow.steady(fast / 2)
         starts = (up, State()), (down, State(y=2 * p.R, omega_c=fast)), (half, State(omega_c=fast / 3, h=p.R / 2))
-        finer = [(step / parts, *start) for parts in refined for start in starts]
+        finer = [(coarse_step(p) / parts, *start) for parts in lab.effort.laws_refined for start in starts]
         tasks.append([lab.task(p, x, t_end, h, flow=flow, samples=RUN_LENGTH) for h, flow, x in finer])
-    falls = []
-    for p in balls.values():
-        # In the middle of still fluid, off floor and wall, from rest and sinking already.
-        step, middle = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
-        falling = middle, middle._replace(v_y=-math.sqrt(p.g * p.R))
-        falls.append([lab.task(p, x, 64 * step, step / parts, samples=64) for parts in refined for x in falling])
-    runs = lab.groups([*tasks, *falls])
-    for (name, p), own in zip(sets.items(), tasks, strict=True):
-        if isinstance(got := next(runs), str):
-            yield Missing(PROTOCOL, name, f"the run {got}")
+    for (name, p), own, runs in zip(sets.items(), tasks, lab.groups(tasks), strict=True):
+        if isinstance(runs, str):
+            yield Missing(PROTOCOL, name, f"the run {runs}")
             continue
-        coarse, fine = deviations(got[: len(got) // 2]), deviations(got[len(got) // 2 :])
-        for key, value in fine.items():
-            quantity, law, contact = key
-            if math.isnan(value) or math.isnan(coarse[key]):
-                yield Missing(PROTOCOL, name, f"no sample at {contact} to test: {law}", 0)
+        coarse, fine = deviations(runs[: len(runs) // 2]), deviations(runs[len(runs) // 2 :])
+        for law, value in fine.items():
+            if math.isnan(value) or math.isnan(coarse[law]):
+                yield Missing(PROTOCOL, name, f"no sample at {law.contact} to test: {law.law}", 0)
                 continue
             # Halving the step may by chance change little: the larger change of the two contacts counts.
-            changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == key[:2]]
-            sure = Measured(value, math.hypot(np.nanmax(changes), ROUNDING))
-            row = measurement(lab, PROTOCOL, name, p, quantity, sure, own[len(own) // 2 :], law=law, contact=contact)
-            yield row
-    for (name, p), own, got in zip(balls.items(), falls, runs, strict=True):
-        if isinstance(got, str):
-            yield Missing(PROTOCOL, name, f"the run {got}")
+            changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == law[:2]]
+            sure, at = Measured(value, math.hypot(np.nanmax(changes), ROUNDING)), law._asdict()
+            yield measurement(lab, PROTOCOL, name, p, at.pop("quantity"), sure, own[len(own) // 2 :], **at)
+
+
+def _sinking(lab: Lab, balls: Mapping[str, Parameters]) -> Iterator[Measurement | Missing]:
+    """The speed at which each ball sinks in the middle of still fluid, off floor and wall."""
+    falls = []
+    for p in balls.values():
+        step, rest = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
+        starts = rest, rest._replace(v_y=-math.sqrt(p.g * p.R))
+        refined = lab.effort.laws_refined
+        falls.append([lab.task(p, x, 64 * step, step / parts, samples=64) for parts in refined for x in starts])
+    for (name, p), own, runs in zip(balls.items(), falls, lab.groups(falls), strict=True):
+        if isinstance(runs, str):
+            yield Missing(PROTOCOL, name, f"the run {runs}")
             continue
-        (before, _), (speed, lasts) = _sinking_speed(*got[:2]), _sinking_speed(*got[2:])
+        (before, _), (speed, lasts) = _sinking_speed(*runs[:2]), _sinking_speed(*runs[2:])
         # What is left of a fall that has only just begun is a difference of speeds, each of them rounded in every step.
         sinking = Measured(speed, math.hypot(speed - before, ROUNDING * abs(speed) / (p.c * lasts)))
         yield measurement(lab, PROTOCOL, name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name])
 
 
-def deviations(runs: Sequence[Trajectory]) -> dict[tuple[str, str, str], float]:
-    """How far runs of one set are from every law, dimensionless: by quantity, law and contact.
-
-    nan where no sample can show it.
-    """
+def deviations(runs: Sequence[Trajectory]) -> dict[Law, float]:
+    """How far runs of one set are from every law, dimensionless; nan where no sample can show it."""
 
     def farthest(values: Array, off: float) -> float:
         return float(values[np.argmax(np.abs(values - off))]) if len(values) else math.nan
 
-    worst: dict[tuple[str, str, str], float] = {}
+    worst: dict[Law, float] = {}
     for contact in "AB":
         rows = [_rows(run, contact) for run in runs]
         normal, friction, against, speed, gap, letter = (np.concatenate(row) for row in zip(*rows, strict=True))
@@ -99,10 +111,10 @@ def deviations(runs: Sequence[Trajectory]) -> dict[tuple[str, str, str], float]:
             ("where it is closed there is no gap", np.abs(gap[(letter == "R") | (letter == "S")])),
             ("(14), (15): friction opposes the slip", against[slides]),
         ):
-            worst["law_in_motion", law, contact] = farthest(values, 0.0)
+            worst[Law("law_in_motion", law, contact)] = farthest(values, 0.0)
         ratios = friction[slides] / normal[slides]
         usual = float(np.median(ratios)) if len(ratios) else 0.0
-        worst["friction_ratio", "friction over normal force", contact] = farthest(ratios, usual)
+        worst[Law("friction_ratio", "friction over normal force", contact)] = farthest(ratios, usual)
     return worst
 
 

@@ -58,38 +58,6 @@ MOVING = {
 STATE_PART, RATES_PART, FORCES_PART = slice(0, 8), slice(8, 16), slice(16, 22)
 """Parts of what is read at the centre of a window (22,): state, rates of change in SI, and forces at A and B in N."""
 
-STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
-    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
-    (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
-    # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
-    (1.03, (0.0, 0.0, -1.62, -0.005, 0.47, -0.14, 0.3, -0.12)),
-    # Long stays in the other cases.
-    (1.43, (0.0,) * 8),
-    (1.80, (0.0, 0.0, 1.02, -0.02, 0.03, 0.12, 0.0, 0.0)),
-    (1.07, (0.0, 0.0, 1.07, 0.34, 0.0, 0.0, 0.0, 0.0)),
-    (1.80, (10.0, 0.0, 1.80, 0.0, 0.17, 0.17, 0.0, 0.0)),
-    (0.60, (0.0, 0.0, 0.60, 0.0, 0.1, 0.0, 0.3, 0.0)),
-    (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
-)
-"""omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-LENGTH = 40
-"""Samples in a piece."""
-APART = 10
-"""Samples between the ends of a piece and any change of case: three until a force has built up, three until the case
-is taken to have changed, and a few by which a change comes too early or late."""
-
-LANDINGS: dict[str, tuple[float, ...]] = {
-    "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
-    "floor, no slip": (0.05, -0.5, 0.3, 0.0, 0.1, 0.5, 0.5, 0.0),
-    "floor, at a slant": (0.04, -0.4, 0.8, -0.3, 0.3, 0.2, 0.6, -0.5),
-    "wall, with slip": (0.5, 0.2, 0.6, 0.3, 0.8, -0.7, 0.04, -0.5),
-    "wall, no slip": (0.4, 0.0, 0.5, 0.2, 0.0, 0.0, 0.04, -0.5),
-    "wall, at a slant": (0.6, -0.5, 0.9, -0.4, -0.2, 0.1, 0.05, -0.3),
-}
-"""States in the units of `STARTS`."""
-LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
-"""Variables that a landing changes."""
-
 
 def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
@@ -203,6 +171,27 @@ def _forces(case: Case, forces: Array) -> dict[str, float]:
     return floor | ({} if case.B is Contact.N else {"Bx": B_x, "By": B_y, "Bz": B_z})
 
 
+STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
+    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
+    (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
+    # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
+    (1.03, (0.0, 0.0, -1.62, -0.005, 0.47, -0.14, 0.3, -0.12)),
+    # Long stays in the other cases.
+    (1.43, (0.0,) * 8),
+    (1.80, (0.0, 0.0, 1.02, -0.02, 0.03, 0.12, 0.0, 0.0)),
+    (1.07, (0.0, 0.0, 1.07, 0.34, 0.0, 0.0, 0.0, 0.0)),
+    (1.80, (10.0, 0.0, 1.80, 0.0, 0.17, 0.17, 0.0, 0.0)),
+    (0.60, (0.0, 0.0, 0.60, 0.0, 0.1, 0.0, 0.3, 0.0)),
+    (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
+)
+"""omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+LENGTH = 40
+"""Samples in a piece."""
+APART = 10
+"""Samples between the ends of a piece and any change of case: three until a force has built up, three until the case
+is taken to have changed, and a few by which a change comes too early or late."""
+
+
 def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The case at the end of every piece, with the state at its beginning."""
     starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
@@ -270,6 +259,19 @@ def _start(name: str, p: Parameters, Omega_0: float, state: tuple[float, ...], h
     if x.y == x.v_y == x.slip_x == 0 and x.h > 0:  # it rolls on the floor
         x = x._replace(slip_z=-x.v_h / p.r)
     return Start(name, p.replace(omega_0=Omega_0 / time_unit(p)), how, x.stacked())
+
+
+LANDINGS: dict[str, tuple[float, ...]] = {
+    "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
+    "floor, no slip": (0.05, -0.5, 0.3, 0.0, 0.1, 0.5, 0.5, 0.0),
+    "floor, at a slant": (0.04, -0.4, 0.8, -0.3, 0.3, 0.2, 0.6, -0.5),
+    "wall, with slip": (0.5, 0.2, 0.6, 0.3, 0.8, -0.7, 0.04, -0.5),
+    "wall, no slip": (0.4, 0.0, 0.5, 0.2, 0.0, 0.0, 0.04, -0.5),
+    "wall, at a slant": (0.6, -0.5, 0.9, -0.4, -0.2, 0.1, 0.05, -0.3),
+}
+"""States in the units of `STARTS`."""
+LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
+"""Variables that a landing changes."""
 
 
 def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

@@ -40,23 +40,6 @@ BEYOND, FOLLOWED = 2.1, 100.0
 divided by the largest of the first flows."""
 HANGING = (1.05, 1.6, 1.3)
 """Flows at which a ball hangs on the wall, divided by the measured one at which it ceases to."""
-ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
-    (Case.RR, Case.NR): (0.0, 0.0, 0.0),
-    (Case.RS, Case.NS): (0.0, 0.8, 0.0),
-    (Case.SR, Case.NR): (-0.6, 0.0, 0.0),
-    (Case.SS, Case.NS): (0.3, 0.1, 0.8),
-}
-"""Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
-LEADS = 1.5
-"""How much faster than the ball the fluid goes round where a contact slips."""
-ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
-"""The first orbits, omega_c sqrt(R/g)."""
-LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
-"""Relative distances of the later orbits below the one at which the first ones show the ball to leave."""
-STEPS, SKIPPED, FEWEST = 16, 4, 5
-"""Steps of a run, those at its start in which contact forces build up, and the fewest that must be left."""
-DEGREES = (3, 2)
-"""Degrees of the polynomials; the lower one shows what the degree changes."""
 
 
 def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -213,6 +196,25 @@ def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
             for flow, orbit in zip(flows, orbits, strict=True)
         )
         yield Crossing(tuple(Push(start, Case.RR, outer, np.array(n)) for start in starts))
+
+
+ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
+    (Case.RR, Case.NR): (0.0, 0.0, 0.0),
+    (Case.RS, Case.NS): (0.0, 0.8, 0.0),
+    (Case.SR, Case.NR): (-0.6, 0.0, 0.0),
+    (Case.SS, Case.NS): (0.3, 0.1, 0.8),
+}
+"""Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
+LEADS = 1.5
+"""How much faster than the ball the fluid goes round where a contact slips."""
+ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
+"""The first orbits, omega_c sqrt(R/g)."""
+LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
+"""Relative distances of the later orbits below the one at which the first ones show the ball to leave."""
+STEPS, SKIPPED, FEWEST = 16, 4, 5
+"""Steps of a run, those at its start in which contact forces build up, and the fewest that must be left."""
+DEGREES = (3, 2)
+"""Degrees of the polynomials; the lower one shows what the degree changes."""
 
 
 def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

@@ -39,11 +39,6 @@ FIGURES = ("fig-7", "fig-8")
 WAYS = ("rest", "half as fast", "with the fluid", "on the wall")
 """How balls start at each point of a plane."""
 
-FAR_AWAY, ARRIVED = 0.1, 0.01
-"""Distances divided by that of the attractors: a long way, in two fifths of a run, and where a ball has arrived."""
-CLOSING = (0.1, 0.17, 0.26, 0.38)
-"""Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
-
 
 def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
@@ -102,6 +97,12 @@ def added(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     rows = zip_longest(*(sorted(edges) for _, edges in sorted(borders.items())))
     turns = [edge for row in rows for edge in row if edge]
     return [(places[a] + places[b]) / 2 for _, a, b in turns]
+
+
+FAR_AWAY, ARRIVED = 0.1, 0.01
+"""Distances divided by that of the attractors: a long way, in two fifths of a run, and where a ball has arrived."""
+CLOSING = (0.1, 0.17, 0.26, 0.38)
+"""Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
 
 
 def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

@@ -56,11 +56,6 @@ SLIPPING_SPEED = 3e-8
 short by a millionth reaches it within a run."""
 CREEPS = 100.0
 """Slip, in units of that, at which a ball may creep while it comes to rest jammed between floor and wall."""
-FIRST_DRAGS, NEARER_DRAGS = (2.0, 4.0), (1.6, 2.6)
-"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), then multiples of the drag extrapolated
-from those two, so far off that states still settle soon."""
-BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
-"""Distances of the states from omega_02 there, in parts of the range of slipping."""
 
 FOUND = {"rolling": ("omega_01", "omega_03"), "sinking": ("omega_02",), "slipping": ("omega_04",)}
 """The thresholds at which each ends or begins."""
@@ -478,6 +473,13 @@ def extrapolated(
         values = [Measured(flow - orbit.value, orbit.uncertainty) for flow, orbit in zip(flows, values, strict=True)]
     place = to(np.array(flows), values)
     return place if math.isfinite(place.uncertainty) else None
+
+
+FIRST_DRAGS, NEARER_DRAGS = (2.0, 4.0), (1.6, 2.6)
+"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), then multiples of the drag extrapolated
+from those two, so far off that states still settle soon."""
+BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
+"""Distances of the states from omega_02 there, in parts of the range of slipping."""
 
 
 @dataclass(frozen=True, eq=False)
