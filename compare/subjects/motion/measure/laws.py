@@ -40,7 +40,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     yield from _sinking(lab, balls)
 
 
-class Law(NamedTuple):
+class ContactLaw(NamedTuple):
     """A law of a contact, by the quantity that shows how far it is off."""
 
     quantity: str
@@ -94,13 +94,13 @@ def _sinking(lab: Lab, balls: Mapping[str, Parameters]) -> Iterator[Measurement 
         yield measurement(lab, PROTOCOL, name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name])
 
 
-def deviations(runs: Sequence[Trajectory]) -> dict[Law, float]:
+def deviations(runs: Sequence[Trajectory]) -> dict[ContactLaw, float]:
     """How far runs of one set are from every law, dimensionless; nan where no sample can show it."""
 
     def farthest(values: Array, off: float) -> float:
         return float(values[np.argmax(np.abs(values - off))]) if len(values) else math.nan
 
-    worst: dict[Law, float] = {}
+    worst: dict[ContactLaw, float] = {}
     for contact in "AB":
         rows = [_rows(run, contact) for run in runs]
         normal, friction, against, speed, gap, letter = (np.concatenate(row) for row in zip(*rows, strict=True))
@@ -111,10 +111,10 @@ def deviations(runs: Sequence[Trajectory]) -> dict[Law, float]:
             ("where it is closed there is no gap", np.abs(gap[(letter == "R") | (letter == "S")])),
             ("(14), (15): friction opposes the slip", against[slides]),
         ):
-            worst[Law("law_in_motion", law, contact)] = farthest(values, 0.0)
+            worst[ContactLaw("law_in_motion", law, contact)] = farthest(values, 0.0)
         ratios = friction[slides] / normal[slides]
         usual = float(np.median(ratios)) if len(ratios) else 0.0
-        worst[Law("friction_ratio", "friction over normal force", contact)] = farthest(ratios, usual)
+        worst[ContactLaw("friction_ratio", "friction over normal force", contact)] = farthest(ratios, usual)
     return worst
 
 
