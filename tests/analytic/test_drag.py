@@ -1,11 +1,11 @@
-"""Each law of drag has the coefficient of its source, and both simulators move by it."""
+"""Each law of drag has the coefficient of its source, and time stepping moves by it as the event-driven simulation."""
 
 import math
 
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate
+from analytic import simulate
 from analytic.mechanics import drag
 from model import Case, Parameters
 from model.drag import LAWS
@@ -61,26 +61,6 @@ def test_a_ball_with_the_drag_10_sinks_at_stokes_speed(nu_f, rho_f, rho_b, r):
     p = Parameters.from_fluid(nu_f=nu_f, rho_f=rho_f, rho_b=rho_b, r=r, R=5 * r, mu=0.2, eta=0.2, gravity=9.81)
     assert p.m * p.c * speed == pytest.approx(p.m * p.g, rel=1e-14)
     assert 6 * math.pi * nu_f * rho_f * r * speed == pytest.approx(p.m * p.g, rel=1e-14)
-
-
-# --- motions -------------------------------------------------------------------------------------------------
-
-
-METHODS = [Settings(), Settings(method="time-stepping", timestep=1e-4)]
-
-
-@pytest.mark.parametrize("settings", METHODS, ids=lambda s: s.method)
-def test_rolling_after_the_fluid_under_quadratic_drag(settings):
-    """(23) with c|w| for c: the lag L falls as L/(1 + K L t)."""
-    p = BY_LAW["quadratic"].replace(mu=2.0, eta=2.0)
-    K, t_end, lag = p.c * p.C_D / 24 * 2 * p.r / p.nu_f * p.R / (1 + 2 * p.j), 2.0, 10.0
-    run = simulate(p, [0, 0, p.omega_0 - lag, 0, 0, 0], t_end, settings=settings, sample_interval=0.02)
-    assert set(run.cases) == {Case.RR}
-    expected = p.omega_0 - lag / (1 + K * lag * run.time)
-    step = 0.0 if settings.method == "event" else 1e-4
-    # Global error of the midpoint rule, t/24 h^2 max|f'''| and as much from the products of lower derivatives.
-    allowed = 1e-8 * p.omega_0 + 2 * t_end / 24 * step**2 * 6 * K**3 * lag**4
-    np.testing.assert_allclose(run.omega_c, expected, rtol=0, atol=allowed)
 
 
 @pytest.mark.parametrize("law", LAWS)

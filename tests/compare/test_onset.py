@@ -12,15 +12,15 @@ from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
 from compare.kit.fits import turning, vanishing
-from compare.kit.lab import coarse_step, time_unit
+from compare.kit.lab import time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
-from compare.kit.settling import PRESSES, lasting, named_start
+from compare.kit.settling import PRESSES
 from compare.kit.statistics import Measured
 from compare.subjects.thresholds.measure import thresholds
 from compare.subjects.thresholds.measure.basins import Edge, ends_slipping
-from compare.subjects.thresholds.measure.thresholds import DISTANCES, TURNS, settles
+from compare.subjects.thresholds.measure.thresholds import DISTANCES, TURNS
 from model import Case, Parameters, State
 from tests.measured import measured
 
@@ -123,28 +123,6 @@ def test_a_line_has_no_maximum(bend):
     where = np.linspace(1.0, 2.0, 6)[::-1]
     order = [Measured(float(w), 0.0) for w in where]
     assert not math.isfinite(turning(where - bend * where**2, order).value)
-
-
-def _ran(lab, p, omega, x0=None, units=5.0):
-    """A run at a flow from a state, rolling with the fluid if none is given."""
-    q = p.replace(omega_0=omega)
-    x0 = named_start("", q, "with the fluid").x0 if x0 is None else x0
-    return lab.campaign.run([lab.task(q, x0, lasting(q, units), coarse_step(q))])[0]
-
-
-def test_what_runs_away_beyond_the_fold_does_not_settle(lab):
-    omega_04 = analytic.thresholds(REFERENCE).omega_04
-    x = analytic.solution(REFERENCE.replace(omega_0=0.99 * omega_04), Case.SS).x
-    assert settles(_ran(lab, REFERENCE, 0.985 * omega_04, x, 20.0))
-    assert settles(_ran(lab, REFERENCE, 1.02 * omega_04, x, 20.0)) is False
-
-
-def test_a_short_run_says_only_what_a_long_one_would(lab):
-    omega_04 = analytic.thresholds(REFERENCE).omega_04
-    x = analytic.solution(REFERENCE.replace(omega_0=0.9 * omega_04), Case.SS).x
-    for share, short, long in ((0.95, True, True), (1.003, None, False), (1.1, False, False)):
-        said = [thresholds.may_settle(_ran(lab, REFERENCE, share * omega_04, x, units)) for units in (10.0, 40.0)]
-        assert said == [short, long]
 
 
 def test_edge_tells_by_the_way_a_run_still_goes():

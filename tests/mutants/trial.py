@@ -82,58 +82,8 @@ BY_HAND = {
     "square_of_the_step",
 }
 """Faults in compiled code, in methods and in MuJoCo's corrections, put in by hand, and the test that saw each."""
-_PAGE = """\
-# What the verdicts notice
-
-Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,
-and stored measurements ({levels}) are judged again{until}.
-Then MuJoCo is replaced by slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim
-changes. A prediction that takes longer than {patience:g} s of processor time is given up: its claim says nothing of the
-fault, and faults that hang some claim are counted apart.
-Written by `make mutants`.
-
-## Wrong theories that others wrote
-
-The wrong theories below were written beside the claims that notice them. How many are noticed of lists that others
-wrote, without these claims in mind, says more: each was judged once, at quick, before anything was changed for it.
-
-| list | faults | noticed by numbers | by an error alone | by hanging alone | missed |
-|---|--:|--:|--:|--:|---|
-| written here ({first}) | {tried} | {by_numbers} | {by_error} | {by_hanging} | {missed} |
-| written by others, held out | 171 | 152 | 1 | 5 | 13, of which 4 probably change nothing |
-| written by others, new | 55 | 29 | 1 | 1 | 24 |
-
-What these lists missed was about the following. Wrong theories that no measurement can show are tried by unit tests;
-those in compiled code and in methods were put in by hand, once, and a unit test saw each.
-
-{subjects}
-{trials}
-## Functions that nothing tries
-
-Public functions of `analytic` that no claim calls as measurements of the level {level} are judged, and that no wrong
-theory changes. Compiled functions and methods of classes are not watched.
-
-{untried}
-
-## Resolving power
-
-The smallest relative error of a theory that a check would notice: the largest and the median of all checks of
-a quantity, and the share of checks that resolve a tenth of the ceiling. Beyond the ceiling a check is inconclusive. The
-last column says which set and claim have the largest.
-
-{powers}
-
-A tenth of the ceiling is what the default level aims at. What keeps checks from it:
-
-* ω₀₁ to ω₀₃: on the roughest sets the contacts have to be slow (μ η above 0.13), and a bracket cannot tell a slip
-  from the contact's own motion; and ω₀₂ as the flow at which slipping meets the lifted ball is extrapolated from states
-  on the border between them. ω₀₄ as the largest flow along a branch is extrapolated, too.
-* rates: two motions that decay almost alike, or hardly decay within a turn, share the error of one fit.
-* growth of slip (γ, β₁, δ and what follows from γ): a contact follows its load with a lag of some three steps, and
-  steps cannot be shorter, since the settings are at the engine's least impedance. Records without the steps in which
-  contact forces build up leave the lag out, but have to be extrapolated over them. Records from the very start were
-  tried: they seem three times finer, and are wrong by up to twice as much as they seem to be.
-"""
+PAGE = Path(__file__).with_name("page.md")
+"""What the page says around its tables."""
 
 
 KINDS = "by_numbers", "by_error", "by_hanging", "missed"
@@ -278,7 +228,7 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
     words |= {"levels": names, "until": until, "patience": PATIENCE, "level": levels[-1].name}
     lists = {"untried": _by_module(levels[-1].untried), "powers": pages.markdown(rows)}
     lists |= {"subjects": pages.markdown(_subjects(levels[0].trials))}
-    return _PAGE.format(trials=tables, **words, **lists)
+    return PAGE.read_text("utf-8").format(trials=tables, **words, **lists)
 
 
 def _subjects(trials: Sequence[Trial]) -> list[list[str]]:
