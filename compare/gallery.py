@@ -93,7 +93,7 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     texts = [(label.get_text(), label.get_fontproperties()) for label in axes.get_yticklabels()]
     widths = [text_to_path.get_text_width_height_descent(text, font, "$" in text)[0] for text, font in texts]
     left = 0.15 + max(widths) / 72  # points
-    axes.set_position((left / _WIDTH, _BELOW / height, 1 - (left + 0.04) / _WIDTH, 1 - (_BELOW + above) / height))
+    axes.set_position((left / _WIDTH, _BELOW / height, 1 - (left + 0.16) / _WIDTH, 1 - (_BELOW + above) / height))
     sets = dict.fromkeys(c.measurement.set for c in checks)
     alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
     counts = Counter(c.measurement.engine for c in every)

@@ -21,6 +21,7 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from compare.branches import ends, slipping_curve
+from compare.kit.pages import typeset
 from compare.kit.style import COLOURS, FORCE
 from compare.subjects.thresholds.figures import TINTS
 from compare.view.geometry import orientations
@@ -82,7 +83,8 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
         for text, part, dash in (("SS", ~grows, "solid"), ("SS, unstable", grows, "dash")):
             lines.append((text, Case.SS, flows, np.where(part, x.omega_c, np.nan), dash))
     if np.isfinite(rides) and rides < fastest:
-        lines.append(("SR, NR", Case.SR, [rides, fastest], [rides, fastest], "solid"))
+        for case, dash in ((Case.SR, "solid"), (Case.NR, "12px,12px")):  # on one line their colours take turns
+            lines.append(("SR, NR", case, [rides, fastest], [rides, fastest], dash))
     data = [
         {"type": "scatter", "mode": "lines", "name": text, "x": np.asarray(x).tolist(),
          "y": [None if np.isnan(v) else v for v in np.asarray(y, float).tolist()],
@@ -95,7 +97,7 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     guide = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "line": {"color": "#999", "dash": "dot"}}
     shapes = [guide | {"x0": at, "x1": at} for _, at in shown]
     label = {"yref": "paper", "y": 0.98, "xanchor": "left", "showarrow": False, "font": {"size": 11}}
-    annotations = [label | {"x": at, "text": SYMBOLS[name]} for name, at in shown]
+    annotations = [label | {"x": at, "text": str(typeset(SYMBOLS[name]))} for name, at in shown]
     cells = np.linspace(0.0, fastest, 81).tolist()
     data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": np.zeros((81, 81)).tolist(), "opacity": 0.0,
                     "showscale": False, "hoverinfo": "none"})  # fmt: skip
@@ -141,8 +143,9 @@ def _here(x: float, y: float) -> Figure:
 
 
 def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more: Any) -> Figure:
+    across, up = ({"title": {"text": str(typeset(label))}} for label in (x, y))
     layout = {
-        "xaxis": {"title": {"text": x}, "range": [0, right]}, "yaxis": {"title": {"text": y}, "range": [0, top]},
+        "xaxis": across | {"range": [0, right]}, "yaxis": up | {"range": [0, top]},
         "margin": {"l": 50, "r": 10, "t": 30, "b": 40}, "hovermode": "closest",
         "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"}, "uirevision": "kept",
     }  # fmt: skip

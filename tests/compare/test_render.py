@@ -100,7 +100,7 @@ def test_a_page_plays_in_a_browser_without_network(run: Trajectory, tmp_path: Pa
             page.wait_for_function(f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')")
             now = geometry.resampled(run, np.array([time]))
             assert page.locator("#case").inner_text() == Case(now.case[0]).name
-            assert f"ω_c = {now.omega_c[0]:.2f} rad/s" in page.locator("#numbers").inner_text()
+            assert f"ωc = {now.omega_c[0]:.2f} rad/s" in page.locator("#numbers").inner_text()
         assert page.locator("#play").inner_text() == "Play"
         browser.close()
     assert not wrong
