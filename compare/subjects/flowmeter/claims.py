@@ -15,7 +15,7 @@ from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
 from compare.kit.settling import physical_case
 from compare.kit.statistics import Measured
-from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, reached, slips_first
+from compare.states import cases, detected, from_floor, is_in, lasting, lifts_first, reached, slips_first
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES

@@ -13,7 +13,7 @@ from compare.claim import Bearing, Text, When, bearings, claim, every, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
-from compare.settled import cases, detected, from_floor, is_in, lifts_first, number, reached, slips_first
+from compare.states import cases, detected, from_floor, is_in, lifts_first, number, reached, slips_first
 from model import Case
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")

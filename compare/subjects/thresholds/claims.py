@@ -13,7 +13,7 @@ from analytic.mechanics import rolling_forces
 from compare.claim import Bearing, When, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
-from compare.settled import number
+from compare.states import number
 from model import Case, Parameters
 
 _BY = "analytic.thresholds"

@@ -10,7 +10,7 @@ from analytic.flowmeter import pulsation, response
 from compare.claim import Bearing, claim, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
-from compare.settled import lifts_first, slips_first
+from compare.states import lifts_first, slips_first
 from compare.subjects.unsteady.measure import caught_up
 from model import Case, Flow
 from model.drag import STOKES
