@@ -64,13 +64,6 @@ class Lab:
             sample_interval=max(step, t_end / samples),
         )
 
-    def pair(self, p: Parameters, x0: npt.ArrayLike, steps: int, step: float) -> list[Task]:
-        """A run of so many steps of so many s, and one with twice as many of half; each step is a sample.
-
-        The same run twice by an engine with several time steps.
-        """
-        return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in self.effort.halves]
-
     def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
         """The trajectories of each group, or why one failed: carried out together, not held in memory together."""
         failures = self.campaign.complete([task for group in groups for task in group])

@@ -88,7 +88,7 @@ class Assignment:
 
 # fmt: off
 ASSIGNMENTS: dict[str, Assignment] = {
-    # protocol            on trial         in the limit     steps   as it comes
+    # protocol                 on trial, quick  in the limit     steps   as it comes
     "settled":    Assignment(VARIED,          WITNESSED,       (4, 4), ONE_BALL),
     "mirrored":   Assignment(ONE_BALL),
     "plane":      Assignment(ONE_BALL),
@@ -102,22 +102,22 @@ ASSIGNMENTS: dict[str, Assignment] = {
     "bounds":     Assignment(VARIED,          ONE_BALL),
     "laws":       Assignment(VARIED,          ONE_BALL),
     "field":      Assignment(VARIED,          WITNESSED),
-    "motions":    Assignment(ONE_BALL,       ONE_BALL),
+    "motions":    Assignment(ONE_BALL,        ONE_BALL),
     "runs":       Assignment(DRAG_LAWS,       ONE_BALL),
     "torque":     Assignment(ONE_BALL),
     "impacts":    Assignment(ENDS_OF_ROLLING, ONE_BALL),
-    "hysteresis": Assignment(ONE_BALL,       ONE_BALL,       (4, 4)),
+    "hysteresis": Assignment(ONE_BALL,        ONE_BALL,        (4, 4)),
     "unloading":  Assignment(ENDS_OF_ROLLING),
     "slope":      Assignment(VARIED),
     "pulsation":  Assignment(DRAG_LAWS,       ONE_BALL),
     "unsteady":   Assignment(DRAG_LAWS,       ONE_BALL),
     "recurrent":  Assignment(ONE_BALL),
     "stepped":    Assignment(ONE_BALL),
-    "choice":     Assignment(ONE_BALL,       ONE_BALL,       (4, 4)),
-    "followed":   Assignment(ONE_BALL, level=Level.DEFAULT),
-    "rebounding": Assignment(ONE_BALL, level=Level.DEFAULT),
-    "swing":      Assignment(ONE_BALL, level=Level.DEFAULT),
-    "calm":       Assignment(ONE_BALL, level=Level.DEFAULT),
+    "choice":     Assignment(ONE_BALL,        ONE_BALL,        (4, 4)),
+    "followed":   Assignment(ONE_BALL,        level=Level.DEFAULT),
+    "rebounding": Assignment(ONE_BALL,        level=Level.DEFAULT),
+    "swing":      Assignment(ONE_BALL,        level=Level.DEFAULT),
+    "calm":       Assignment(ONE_BALL,        level=Level.DEFAULT),
 }
 # fmt: on
 """Who measures what, by protocol. One that isn't listed has the default."""

@@ -37,8 +37,6 @@ STEPS_A_SAMPLE = 8
 """A coarse time step is a twentieth of sqrt(R/g) or so, and the ball goes round in more than that."""
 SOLVED = 1e-12
 """Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a time 1/c."""
-LOOSE = 1000.0
-"""Factor on the settling tolerance where only the case matters."""
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
 """What mechanics determine of the forces where both contacts roll: the rest is a family of one parameter."""

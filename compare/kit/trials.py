@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from compare.kit.lab import Lab, coarse_step
-from compare.kit.record import Condition, Measurement, Missing, Records, measurement
+from compare.kit.record import Condition, Measurement, Missing, measurement
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from model import Flow, Parameters
@@ -79,11 +79,6 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Tria
         else:
             half = len(runs) // 2
             yield TrialResult(protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:]))
-
-
-def known_flow(records: Records, set: str, threshold: str) -> float | None:
-    """The flow that was measured first as a threshold of a set, rad s-1; None if it was not."""
-    return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
 
 
 def finer(coarse: float, fine: Measured) -> Measured:

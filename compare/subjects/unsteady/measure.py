@@ -29,7 +29,7 @@ from compare.kit.record import Measurement, Missing, Records, if_found, measurem
 from compare.kit.settling import lasting, settle
 from compare.kit.statistics import COVERAGE, Measured, peaks, top
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, TrialResult, carry_out, finer, known_flow
+from compare.kit.trials import Start, Trial, TrialResult, carry_out, finer
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -49,7 +49,7 @@ carries the ball; and ends of a ramp, as parts of the way to where slipping ends
 
 def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
-    ends = {name: known_flow(records, name, "omega_01") for name in sets}
+    ends = {name: _known(records, name, "omega_01") for name in sets}
     why = "no flow was measured at which two-point rolling ends by slipping"
     yield from (Missing("pulsation", name, why) for name, end in ends.items() if end is None)
     small = [each for name, end in ends.items() if end is not None for each in _small(lab, name, sets[name], end)]
@@ -285,6 +285,11 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         yield if_found(row, f"{at} is none")
 
 
+def _known(records: Records, set: str, threshold: str) -> float | None:
+    """The flow that was measured first as a threshold of a set, rad s-1; None if it was not."""
+    return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
+
+
 def limit(values: Array) -> float:
     """The limit of the last three values of a geometric sequence; the last one if they diverge."""
     first, second = values[-2] - values[-3], values[-1] - values[-2]
@@ -301,7 +306,7 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     flows: dict[str, tuple[float, float, float]] = {}  # where slipping begins, the wall carries the ball, a jump ends
     trials, starts = list[Trial](), list[Start]()  # from rest, to settle slipping before a jump or a ramp
     for name, p in sets.items():
-        begins, holds, ends = (known_flow(records, name, f"omega_0{n}") for n in (1, 2, 4))
+        begins, holds, ends = (_known(records, name, f"omega_0{n}") for n in (1, 2, 4))
         if begins is None or holds is None:
             yield Missing("unsteady", name, "no flows were measured between which the ball slips at both points")
             continue

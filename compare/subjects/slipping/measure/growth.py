@@ -123,10 +123,11 @@ class Push:
         return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
 
     def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
-        """The runs with one size of slip, in units of `start_unit`, with either step, each divided by `refine`."""
+        """The runs with one size of slip, in units of `start_unit`, with either step divided by `refine`, each a sample."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        return lab.pair(p, x, STEPS * refine, coarse_step(p) / (REFINED * refine))
+        steps, step = STEPS * refine, coarse_step(p) / (REFINED * refine)
+        return [lab.task(p, x, steps * step, step / n, samples=steps * n) for n in lab.effort.halves]
 
     def tasks(self, lab: Lab) -> list[Task]:
         """The pairs of every size."""
