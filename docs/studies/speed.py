@@ -1,11 +1,21 @@
-"""Write the tables on speed: ``python -m docs.studies.speed docs/speed.md``."""
+"""Write the tables on speed: ``python -m docs.studies.speed docs/speed.md``.
+
+The table "before" is measured with ``--before DIRECTORY``, a checkout of an earlier commit: c8dc858 is the last one
+before anything was compiled. Its runs and those of this checkout take turns.
+"""
 
 from __future__ import annotations
 
+import argparse
+import os
+import statistics
+import subprocess
 import sys
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -13,51 +23,51 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from analytic import simulate
-from analytic.simulation import charts, integrator
-from analytic.simulation.motion import Fluid, Moment
+from analytic.simulation import hybrid, integrator
+from analytic.simulation.integrator import StalledError, Step
+from analytic.simulation.motion import FINER, Chart
 from analytic.stationary.solutions import solution
 from compare.kit.pages import Rows
-from docs.studies.tables import write_all
-from model import Case, Flow, Parameters, State
+from docs.studies.tables import write
+from model import Case, Flow, Parameters, SimulationError, State
+from model.arrays import Array
 from model.kinematics import SLIP_XYZ
 
 REPEATS, BEST = 5, 1e-13
 """Runs of which the quickest counts, and the tolerance of the one that others are held against."""
 TOLERANCES = [10.0**-k for k in range(6, 14)]
+METHODS = "LSODA", "Radau"
 P = Parameters.named("reference")
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A run of theory; `case` where it stays in one, so that a solver with events can do it, too."""
+    """A run of theory."""
 
     p: Parameters
     x: State
     t_end: float
     flow: Flow
-    case: Case | None = None
 
 
 _ON_THE_WALL = solution(P.replace(omega_0=45.0), Case.NR).state
 MOTIONS = {
     "slipping at both points, 20 s": Motion(
-        P, State(omega_c=13.0, slip_x=-3.0, slip_y=0.08, slip_z=8.7), 20.0, Flow.steady(25.0), Case.SS
+        P, State(omega_c=13.0, slip_x=-3.0, slip_y=0.08, slip_z=8.7), 20.0, Flow.steady(25.0)
     ),
-    "rolling on the wall alone, 20 s": Motion(
-        P, _ON_THE_WALL._replace(y=0.5, omega_c=44.5), 20.0, Flow.steady(45.0), Case.NR
-    ),
+    "rolling on the wall alone, 20 s": Motion(P, _ON_THE_WALL._replace(y=0.5, omega_c=44.5), 20.0, Flow.steady(45.0)),
     "rolling at both points, Schiller and Naumann's drag, 20 s": Motion(
         P.replace(drag="schiller-naumann", nu_f=1e-5), State(omega_c=4.0), 20.0, Flow.steady(6.0)
     ),
     "staircase of five flows, 30 s": Motion(P, State(omega_c=5.0), 30.0, Flow.staircase([10, 25, 40, 25, 10], 6.0)),
     "pulsation, 20 events in 20 s": Motion(P, State(omega_c=20.0), 20.0, Flow.sine(25.0, 8.0, 0.5)),
-}  # fmt: skip
+}
 
 
-def seconds(work: Callable[[], Any]) -> float:
+def seconds(work: Callable[[], Any], repeats: int = REPEATS) -> float:
     """Processor time, s, of the quickest of some."""
     spent = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         begin = time.process_time()
         work()
         spent.append(time.process_time() - begin)
@@ -75,28 +85,57 @@ def plainly(motion: Motion, rtol: float = 1e-9) -> Any:
         return run(motion, rtol)
 
 
-def by_scipy(motion: Motion, case: Case, rtol: float) -> Any:
-    """By `solve_ivp` with LSODA, events and a thousand samples, the equations given as the study has them."""
-    start = Moment(0.0, 0.0, motion.x, *(float(np.arctan2(a, b)) for a, b in _slips(motion.x)))
-    chart = charts.chart(case, start, motion.p, Fluid.of(motion.flow, 0.0), 1e-9, "slip-stability")
+class _Stretch:
+    """In the place of `integrator.Stretch`: scipy's `solve_ivp`, to which what ends a case is an event."""
 
-    def guard(k: int) -> Callable[[float, Any], float]:
-        def value(t: float, z: Any) -> float:
-            return chart.guards(t, z)[k]
+    method = ""
 
-        value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
-        return value
+    def __init__(self, chart: Chart, start: float, until: float, times: Array, relative: float, steady: bool) -> None:
+        self.chart, self.start, self.span, self.relative = chart, start, until - start, relative
+        self.due = times[slice(*np.searchsorted(times, [start, until], side="right"))]
 
-    times, events = np.linspace(0, motion.t_end, 1001), [guard(k) for k in range(len(chart.ends))]
-    atol = rtol / 1e3 * np.array(chart.scale)
-    found: Any = solve_ivp(  # type: ignore[call-overload]
-        chart.rates, (0, motion.t_end), chart.start, method="LSODA", t_eval=times, events=events, rtol=rtol, atol=atol
-    )
-    return chart.path(found.t, found.y)
+    def steps(self, first_step: float | None) -> Iterator[Step]:
+        """All as one step; the time of the solver runs from zero, since a direction of slip settles very soon."""
+        chart, start = self.chart, self.start
+
+        def guard(k: int) -> Callable[[float, Any], float]:
+            def value(t: float, z: Any) -> float:
+                return chart.guards(start + t, z)[k]
+
+            value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
+            return value
+
+        found: Any = solve_ivp(  # type: ignore[call-overload]
+            lambda t, z: chart.rates(start + t, z),
+            (0.0, self.span),
+            chart.start,
+            method=self.method,
+            t_eval=np.union1d(self.due - start, [self.span]).clip(0.0, self.span),
+            events=[guard(k) for k in range(len(chart.ends))],
+            first_step=first_step,
+            rtol=self.relative,
+            atol=self.relative / FINER * np.array(chart.scale),
+        )
+        if found.status < 0:
+            raise StalledError(found.message)
+        fired = [k for k, times in enumerate(found.t_events) if len(times)]
+        end, z, name = self.span, found.y[:, -1] if found.y.size else np.array(chart.start), None
+        if fired:
+            end, z, name = float(found.t_events[fired[0]][0]), found.y_events[fired[0]][0], chart.ends[fired[0]]
+        count = int(np.searchsorted(self.due - start, end, side="right"))
+        samples = found.y.T[:count] if count else integrator.NONE
+        yield Step(start + end, z.tolist(), self.due[:count], samples, name)
 
 
-def _slips(x: State) -> tuple[tuple[float, float], tuple[float, float]]:
-    return (x.slip_x, x.slip_z), (x.slip_y, x.slip_z)
+def by_scipy(motion: Motion, method: str, rtol: float) -> Any:
+    """By a solver of `solve_ivp` and its events, the equations and what follows an event as the study has them."""
+    with (
+        mock.patch.object(hybrid, "Stretch", _Stretch),
+        mock.patch.object(_Stretch, "method", method),
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")  # it fails with one line more
+        return run(motion, rtol)
 
 
 def deviation(x: Any, right: Any) -> float:
@@ -108,29 +147,100 @@ def deviation(x: Any, right: Any) -> float:
 
 def event_driven() -> Rows:
     """What event-driven simulation costs and how exact it is, and `solve_ivp` at no greater error."""
-    rows = [["", "compiled, ms", "error", "plain Python, ms", "error", "solve_ivp with LSODA, ms", "error"]]
+    rows = [["", "compiled, ms", "error", "plain Python, ms", "error"]]
+    rows[0] += [cell for method in METHODS for cell in (f"solve_ivp with {method}, ms", "error")]
     for name, motion in MOTIONS.items():
-        right, row = run(motion, BEST).x, [name]
-        worst = 0.0
+        right, row, worst = run(motion, BEST).x, [name], 0.0
         for way in (run, plainly):
             error = deviation(way(motion).x, right)
             worst = max(worst, error)
             row += [f"{1e3 * seconds(lambda way=way, motion=motion: way(motion)):.2f}", f"{error:.0e}"]  # type: ignore[misc]
-        found = ["–", "–"]
-        for rtol in TOLERANCES:
-            if (case := motion.case) is None:
-                break
-            error = deviation(by_scipy(motion, case, rtol).x, right)
-            if error <= worst or rtol == TOLERANCES[-1]:
-                spent = seconds(lambda rtol=rtol, motion=motion, case=case: by_scipy(motion, case, rtol))  # type: ignore[misc]
-                found = [f"{1e3 * spent:.1f}", f"{error:.0e}"]
-                break
-        rows.append([*row, *found])
+        for method in METHODS:
+            row += _no_worse(motion, method, worst, right)
+        rows.append(row)
     return rows
 
 
-TABLES: dict[str, Callable[[], Rows]] = {"event-driven": event_driven}
+def _no_worse(motion: Motion, method: str, worst: float, right: Array) -> list[str]:
+    """Time and error of `solve_ivp` at the first of the tolerances that errs by no more than `worst`."""
+    for rtol in TOLERANCES:
+        try:
+            error = deviation(by_scipy(motion, method, rtol).x, right)
+        except SimulationError:
+            return ["fails", "–"]
+        if error <= worst or rtol == TOLERANCES[-1]:
+            spent = seconds(lambda rtol=rtol: by_scipy(motion, method, rtol), 2)  # type: ignore[misc]
+            return [f"{1e3 * spent:.1f}", f"{error:.0e}"]
+    raise AssertionError
+
+
+_TIMED = """
+import sys, time
+sys.path.insert(0, "")
+import numpy as np
+from analytic import simulate
+from model import Flow, Parameters, State
+for line in sys.stdin:
+    p, x, t_end, flow = eval(line)
+    *lines, waves = map(np.array, flow)
+    flow = Flow("given", *lines, waves.reshape(-1, 3))
+    begin = time.process_time()
+    simulate(p, x, t_end, flow)
+    print(time.process_time() - begin, flush=True)
+"""
+"""A process that runs motions of this study by the sources in its directory and prints what each takes, s."""
+
+
+def before(directory: Path) -> Rows:
+    """How many times as long the motions take by the sources in a directory as by these, compiled and in plain Python.
+
+    Each run is followed by one of the other sources, since a machine that slows down does so for both.
+    """
+    ways = {
+        "before": (directory, {}),
+        "compiled": (Path.cwd(), {}),
+        "plain Python": (Path.cwd(), {"NUMBA_DISABLE_JIT": "1"}),
+    }
+    rows = [["times as fast as before", *list(ways)[1:]]]
+    started = {
+        name: subprocess.Popen(
+            [sys.executable, "-c", _TIMED], cwd=path, env=os.environ | more | {"PYTHONPATH": str(path)}, text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        )
+        for name, (path, more) in ways.items()
+    }  # fmt: skip
+    for name, motion in MOTIONS.items():
+        flow = [getattr(motion.flow, key).tolist() for key in ("start", "value", "slope", "waves")]
+        p = {field.name: getattr(motion.p, field.name) for field in Parameters.quantities()} | {"drag": motion.p.drag}
+        given = f"Parameters(**{p}), State{tuple(motion.x)}, {motion.t_end}, {flow}\n"
+        turns = [{each: _answer(process, given) for each, process in started.items()} for _ in range(REPEATS + 1)][1:]
+        ratios = [statistics.median(turn["before"] / turn[way] for turn in turns) for way in list(ways)[1:]]
+        rows.append([name, *(f"{ratio:.1f}" for ratio in ratios)])
+    for process in started.values():
+        process.communicate()
+    return rows
+
+
+def _answer(process: subprocess.Popen[str], question: str) -> float:
+    assert process.stdin
+    assert process.stdout
+    process.stdin.write(question)
+    process.stdin.flush()
+    return float(process.stdout.readline())
+
+
+def main() -> int:
+    """Measure and write the tables of the page."""
+    parser = argparse.ArgumentParser(description="Write the tables on speed.")
+    parser.add_argument("page", type=Path, metavar="FILE", help="docs/speed.md")
+    parser.add_argument("--before", type=Path, metavar="DIRECTORY", help="the table of a checkout of an earlier commit")
+    args = parser.parse_args()
+    if args.before:
+        write(args.page, "before", before(args.before))
+    else:
+        write(args.page, "event-driven", event_driven())
+    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(write_all(TABLES, "Write the tables on speed.", "docs/speed.md"))
+    sys.exit(main())
