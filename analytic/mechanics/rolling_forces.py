@@ -113,8 +113,11 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
     guess = start + first / np.where(first == last, np.inf, first - last) * (end - start)
     q = roots.rising(excess_of_A, start, end, guess)
     at_A, limit_A, at_B, limit_B = friction(q)
-    use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(at_A, limit_A))
-    use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(at_B, limit_B))
+    use_A, use_B, B_alone = _ratio(at_A, limit_A), _ratio(at_B, limit_B), B_binds & ~A_binds
+    if np.any(A_binds):
+        use_A = np.where(A_binds, _least_alone(a, z, p.mu), use_A)
+    if np.any(B_alone):
+        use_B = np.where(B_alone, _least_alone(k, z, p.eta), use_B)
     jams = q == 0
     B_y = np.asarray(p.m * p.g * (2 - 1 / np.where(jams, 1.0, q)))
     if np.any(jams):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -43,6 +44,6 @@ def rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, 
         below, above = np.where(value < 0, root, below), np.where(value < 0, above, root)
         root = root - value / np.where(slope == 0, np.inf, slope)
         root = np.where((root - below) * (root - above) <= 0, root, (below + above) / 2)
-        if np.all(np.abs(root - before) <= 2 * np.finfo(float).eps * np.abs(before)):
+        if np.all(np.abs(root - before) <= 2 * math.ulp(1.0) * np.abs(before)):
             break
     return np.asarray(root)

@@ -39,6 +39,8 @@ LOOKS_A_STEP = 4
 INSIDE, CLEAR = 8, 2.0
 """The stage, .65 of the step on, at which guards are looked at, too; and by how many times what they vary by they have
 to be positive for a step not to be looked into."""
+DYING = 1e-7
+"""Slip in natural units that goes straight to zero: what is left of it takes no time in which its rate would change."""
 ROOT_STEPS = 200
 COLUMNS, USUAL = 12, 9
 """Most columns of an extrapolation, and how many steps aim at."""
@@ -180,6 +182,19 @@ def _first_fall(
     return fired, end
 
 
+@register_jitable  # type: ignore[untyped-decorator]
+def _left(z: Array, rate: Array, slips: npt.NDArray[np.int64], unit: float, rtol: float) -> float:
+    """The time that a slip which dies has left, along a straight line; inf if a direction turns too much for it."""
+    left = math.inf
+    for i in slips:
+        if z[i] < DYING * unit and rate[i] < 0:
+            left = min(left, -z[i] / rate[i])
+    for i in slips:
+        if left < math.inf and (rate[i + 1] * left) ** 2 > rtol:
+            return math.inf
+    return left
+
+
 @_compiled
 def explicit(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
@@ -268,6 +283,12 @@ def explicit(
         for i in slips:
             least = min(least, z[i] / unit)
         slow = slow + 1 if least <= small else 0
+        left = _left(z, K[0], slips, unit, rtol) if least < DYING else math.inf
+        if tau + left <= span and (taken == len(times) or times[taken] > start + tau + left):
+            for i in range(n):
+                z[i] += left * K[0, i]
+            equations.guards(start + tau + left, z, k, values)
+            return FIRED, tau + left, h, int(np.argmin(values)), taken
         if slow > patience:
             return OTHER, tau, h, -1, taken
     return PAUSED, tau, h, -1, taken
