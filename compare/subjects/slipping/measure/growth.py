@@ -123,7 +123,7 @@ class Push:
         return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
 
     def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
-        """The runs with one size of slip, in units of `start_unit`, with either step divided by `refine`, each a sample."""
+        """The runs with one size of slip, in units of `start_unit`, with either step divided by `refine`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
         steps, step = STEPS * refine, coarse_step(p) / (REFINED * refine)
