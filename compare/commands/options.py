@@ -136,13 +136,13 @@ MARKDOWN = Output("Markdown", (".md",))
 PAGE = Output("an HTML page", (".html", ".htm"))
 FIGURE = Output("a figure", (".png", ".svg", ".pdf"))
 FILM = Output("a picture, a film or a page", (".png", ".gif", ".html"))
-SUFFIXES = {suffix for each in (HDF5, JSON, MARKDOWN, PAGE, FIGURE, FILM) for suffix in each.suffixes}
+ENDINGS = {suffix for each in (HDF5, JSON, MARKDOWN, PAGE, FIGURE, FILM) for suffix in each.suffixes}
 """Names of files end in these."""
 
 
 def results(text: str) -> Path:
     """A directory to be filled, for argparse; a name that promises a file is refused."""
-    if Path(text).suffix.lower() in SUFFIXES and not Path(text).is_dir():
+    if Path(text).suffix.lower() in ENDINGS and not Path(text).is_dir():
         raise argparse.ArgumentTypeError(f"{text!r} would be a directory, but its name is that of a file")
     return Path(text)
 
@@ -157,7 +157,7 @@ def engine(name: str) -> Any:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-ENGINES = "dart, drake, pybullet, rapier, sapien, siconos"
+FOREIGN = "dart, drake, pybullet, rapier, sapien, siconos"
 """Those that others have written, each as NAME and NAME-defaults: tests see to it that none is missing."""
 PREFIX = "parameter_"
 """How the destinations of options begin that are parameters of the ball."""
@@ -290,7 +290,7 @@ def add_engine_name(parser: argparse._ActionsContainer, default: str | None, usu
     """The option that chooses an engine; `usual` says what is if none is named."""
     known = (
         "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as it comes; others: "
-        f"mujoco-coulomb, event, time-stepping, and NAME or NAME-defaults of {ENGINES} ({usual})"
+        f"mujoco-coulomb, event, time-stepping, and NAME or NAME-defaults of {FOREIGN} ({usual})"
     )
     parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
 

@@ -263,7 +263,7 @@ def league(parser: Parser) -> None:
     parser.add_argument("--quick", action="store_true", help="one time step")
     named = (
         "only this one (repeatable), or a module of your own: event, time-stepping, mujoco, mujoco-plain, NAME or "
-        f"NAME-defaults of {options.ENGINES}, mujoco, mujoco-warp, newton-xpbd; newton-kamino, "
+        f"NAME-defaults of {options.FOREIGN}, mujoco, mujoco-warp, newton-xpbd; newton-kamino, "
         "newton-semiimplicit-defaults, newton-vbd-defaults"
     )
     parser.add_argument("--engine", action="append", metavar="NAME", help=named)

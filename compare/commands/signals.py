@@ -12,7 +12,7 @@ from typing import NoReturn
 
 from model.files import leave
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_BOTH = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interrupted(KeyboardInterrupt):
@@ -29,7 +29,7 @@ def answered(answer: Callable[[int], None]) -> Iterator[None]:
 
     Signals that are ignored stay so, as in what a shell runs in the background; and all in a thread, which gets none.
     """
-    here = SIGNALS if threading.current_thread() is threading.main_thread() else ()
+    here = _BOTH if threading.current_thread() is threading.main_thread() else ()
     before = {each: handler for each in here if (handler := signal.getsignal(each)) is not signal.SIG_IGN}
 
     def restore() -> None:

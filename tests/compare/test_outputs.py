@@ -54,7 +54,7 @@ def test_an_output_that_is_read_is_refused(command, option, kind, tmp_path, caps
 @OUTPUTS
 def test_an_output_whose_name_promises_something_else_is_refused(command, option, kind, tmp_path, capsys):
     """A model, a set, a program, or what another option writes."""
-    names = {f"mine{suffix}" for suffix in {".xml", ".toml", ".csv", ".py", "", *options.SUFFIXES} - {*kind.suffixes}}
+    names = {f"mine{suffix}" for suffix in {".xml", ".toml", ".csv", ".py", "", *options.ENDINGS} - {*kind.suffixes}}
     for name in names:
         (tmp_path / name).write_text("mine")
         said = refused(capsys, *reading(command, tmp_path / "other"), option, tmp_path / name)
