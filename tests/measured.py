@@ -1,8 +1,12 @@
-"""Measurements made up for tests, and wrong theories that they are judged by."""
+"""Measurements and motions made up for tests."""
+
+import numpy as np
+import numpy.typing as npt
 
 import analytic
 from compare.kit.record import Condition, Measurement, Records
-from model import Parameters
+from model import Events, Flow, Header, Parameters, Trajectory
+from model.trajectory import SAMPLE
 
 
 def measured(
@@ -25,6 +29,14 @@ def measured(
         parameters=p or Parameters.named("reference"),
         conditions=conditions,
     )
+
+
+def motion(p: Parameters, time: npt.ArrayLike, **columns: npt.ArrayLike) -> Trajectory:
+    """A motion of these columns in a steady flow; all others are zero."""
+    block = np.zeros(len(np.asarray(time)), SAMPLE)
+    for name, values in {"time": time, **columns}.items():
+        block[name] = values
+    return Trajectory.from_blocks(Header("made up", p, Flow.steady(p.omega_0)), [block], Events())
 
 
 def thresholds(set: str, p: Parameters, *names: str) -> Records:

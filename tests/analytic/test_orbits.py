@@ -11,9 +11,9 @@ from analytic.orbits.fates import Kind
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import NoOrbitError
 from analytic.simulation import ensemble
-from model import Case, Events, Flow, Header, InputError, Parameters, State, Trajectory
+from model import Case, InputError, Parameters, State
 from model.kinematics import state_units
-from model.trajectory import SAMPLE
+from tests.measured import motion
 
 HOPPING = Parameters.named("hopping")
 TOP = (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0)
@@ -197,11 +197,8 @@ def slipping_by(rates):
         size, unit = state_units(p)[2:6], (p.R / p.g) ** 0.5
         time = np.arange(round(duration / interval) + 1) * interval
         z = solve_ivp(rates, (0, time[-1] / unit), x0[2:6] / size, "DOP853", time / unit, rtol=1e-10, atol=1e-12).y
-        block = np.zeros(len(time), SAMPLE)
-        block["time"], block["case"] = time, Case.SS
-        for name, values in zip(("omega_c", "slip_x", "slip_y", "slip_z"), size[:, None] * z, strict=True):
-            block[name] = values
-        return Trajectory.from_blocks(Header("made up", p, Flow.steady(p.omega_0)), [block], Events())
+        columns = zip(("omega_c", "slip_x", "slip_y", "slip_z"), size[:, None] * z, strict=True)
+        return motion(p, time, case=Case.SS, **dict(columns))
 
     return run
 

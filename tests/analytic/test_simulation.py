@@ -7,7 +7,6 @@ import math
 import os
 import signal
 import threading
-import time
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -85,18 +84,10 @@ def test_random_states_end_lawfully(seed):
 
 
 @pytest.mark.slow
-def test_ten_thousand_random_runs(capsys):
-    """All seeds run, whatever fails among them; the rate is printed."""
-    start, faults = time.perf_counter(), []
+def test_ten_thousand_random_runs():
+    """All seeds run, whatever fails among them."""
     with ProcessPoolExecutor() as pool:
-        for line in pool.map(fault, range(RUNS), chunksize=20):
-            if line:
-                faults.append(line)
-                with capsys.disabled():
-                    print(f"\n{line}", flush=True)
-    seconds = time.perf_counter() - start
-    with capsys.disabled():
-        print(f"\n{RUNS} runs of 5 s, {len(faults)} with faults; {RUNS / seconds:.3g} a second")
+        faults = [line for line in pool.map(fault, range(RUNS), chunksize=20) if line]
     assert not faults, "\n".join(faults)
 
 

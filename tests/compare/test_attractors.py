@@ -10,10 +10,14 @@ from compare.commands.cli import main
 from compare.kit.statistics import hops
 from compare.kit.trials import finer
 from compare.subjects.attractors import measure as attractors
-from model import Events, Flow, Header, Parameters, Trajectory
-from model.trajectory import SAMPLE
+from model import Parameters
+from tests.measured import motion
 
 HOPPING = Parameters.named("hopping")
+
+
+def run_of(time, y, theta):
+    return motion(HOPPING, time, y=y, theta=theta, omega_c=np.gradient(theta, time))
 
 
 def test_undecided_with_what_it_did_last(capsys, tmp_path):
@@ -40,13 +44,13 @@ def test_tops_of_known_hops():
     period, height = 0.2217, 4e-3
     time = np.arange(0, 5, 1e-3)
     phase = np.mod(time, period) / period - 0.5
-    run = _run(time, height * (1 - 4 * phase**2), 57.0 * time)
+    run = run_of(time, height * (1 - 4 * phase**2), 57.0 * time)
     tops = attractors.tops(run, 1.0, 4.0)
     # The parabola through three samples is the hop itself.
     assert tops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
     assert tops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
     assert max(value.uncertainty for value in tops.values.values()) < 1e-9
-    assert len(attractors.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
+    assert len(attractors.tops(run_of(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
 
 
 @pytest.mark.parametrize("size", [0.9, 1.05])
@@ -79,11 +83,5 @@ def test_which_balls_hop():
     """Those that come down again and again, but none that swings on the wall, sinks, or hardly leaves the floor."""
     t = np.arange(0, 5, 1e-3)
     hop = 4e-3 * np.abs(np.sin(12 * t))
-    assert all(hops(_run(t, y, t)) for y in (hop, np.exp(-t) * hop))
-    assert not any(hops(_run(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000))
-
-
-def _run(time, y, theta):
-    block = np.zeros(len(time), SAMPLE)
-    block["time"], block["y"], block["theta"], block["omega_c"] = time, y, theta, np.gradient(theta, time)
-    return Trajectory.from_blocks(Header("mujoco", HOPPING, Flow.steady(HOPPING.omega_0)), [block], Events())
+    assert all(hops(run_of(t, y, t)) for y in (hop, np.exp(-t) * hop))
+    assert not any(hops(run_of(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from compare.subjects.motion.measure import laws
-from model import Case, Flow, Parameters, Trajectory
-from model.trajectory import SAMPLE, Events, Header
+from model import Case, Parameters
+from tests.measured import motion
 
 P = Parameters.named("high-wall-friction")
 SAMPLES = 50
@@ -16,19 +16,15 @@ SAMPLES = 50
 def sliding(**changes):
     """A ball that slips at both points as (14) and (15) say, with some of it changed."""
     rng = np.random.default_rng(4)
-    block = np.zeros(SAMPLES, SAMPLE)
-    block["time"] = np.linspace(0.0, 1.0, SAMPLES)
-    slips = rng.uniform(5.0, 20.0, (3, SAMPLES))
-    block["slip_x"], block["slip_y"], block["slip_z"] = slips
-    block["case"] = Case.SS
-    w_x, w_y, w_z = slips
+    w_x, w_y, w_z = slips = rng.uniform(5.0, 20.0, (3, SAMPLES))
     normal = P.m * P.g * rng.uniform(0.5, 1.0, SAMPLES)
-    for name, coefficient, first, second in (("force_A", P.mu, w_z, -w_x), ("force_B", P.eta, -w_z, w_y)):
-        friction = -coefficient * normal * np.stack([first, second]) / np.hypot(first, second)
-        rows = (friction[0], normal, friction[1]) if name == "force_A" else (normal, *friction)
-        block[name] = np.stack(rows, axis=-1)
-    header = Header("mujoco", P, Flow.steady(1.0))
-    return replace(Trajectory.from_blocks(header, [block], Events()), **changes)
+    (A_x, A_z), (B_y, B_z) = (
+        -coefficient * normal * np.stack([first, second]) / np.hypot(first, second)
+        for coefficient, first, second in ((P.mu, w_z, -w_x), (P.eta, -w_z, w_y))
+    )
+    made = dict(zip(("slip_x", "slip_y", "slip_z"), slips, strict=True))
+    made |= {"force_A": np.stack([A_x, normal, A_z], axis=-1), "force_B": np.stack([normal, B_y, B_z], axis=-1)}
+    return replace(motion(P, np.linspace(0.0, 1.0, SAMPLES), case=Case.SS, **made), **changes)
 
 
 def values(run):
