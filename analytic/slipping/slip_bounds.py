@@ -102,7 +102,7 @@ def rr_to_rs(p: Parameters, omega_c: float, side: int) -> HeldBound:
 
     For Stokes' law zero at omega_0 = omega_c + side * eta (1+j)(1+2j) omega_c^2/(j c).
     """
-    return HeldBound(p, omega_c, side, -rr_to_rs_stationary(p).slope * omega_c**2)
+    return HeldBound(p, omega_c, side, p.eta * (1 + 2 * p.j) * p.R * omega_c**2 / (p.j * p.r))
 
 
 def rr_to_rs_stationary(p: Parameters) -> SlipBound:
@@ -115,8 +115,8 @@ def rr_to_sr(p: Parameters, omega_c: float, side: int) -> HeldBound:
 
     For Stokes' law zero at omega_0 = omega_c - side * (1+2j) mu (g - j R omega_c^2)/(j R c).
     """
-    bound = rr_to_sr_stationary(p)
-    return HeldBound(p, omega_c, -side, -bound.offset - bound.slope * omega_c**2)
+    weight = p.g - p.j * p.R * omega_c**2
+    return HeldBound(p, omega_c, -side, p.mu * (1 + 2 * p.j) * weight / (p.j * (1 + p.j) * p.r))
 
 
 def rr_to_sr_stationary(p: Parameters) -> SlipBound:

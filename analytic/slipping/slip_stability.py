@@ -14,8 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.mechanics import dynamics, roots
-from analytic.slipping import slip_bounds
-from analytic.slipping.slip_bounds import SlipBound
 from model import Case, Contact, Parameters, State
 from model.arrays import Array, Real
 from model.cases import TRAITS
@@ -114,19 +112,19 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
     on a slight slip, over all directions along which the contacts stay closed; on a threshold, to round-off, it is
     neutral.
     """
+    Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     match case:
         case Case.RR:
-            apart = slip_bounds.rr_to_ss(p) if p.eta < p.j else slip_bounds.rr_to_sr_stationary(p)
-            bounds = [slip_bounds.rr_to_rs_stationary(p), apart]
-        case Case.SR if p.mu == 0:  # the floor then carries the weight, the wall nothing
-            bounds = [SlipBound(0.0, slip_bounds.nr_to_ns(p).slope)]
+            divisor = p.mu * p.eta * (1 + p.j) + p.j - p.eta
+            slip = (Omega2 * divisor, p.mu * (1 + p.eta)) if p.eta < p.j else (p.mu * p.j * Omega2, p.mu)
+            kinds = {_sign(0.0, p.eta * Omega2), _sign(*slip)}
         case Case.SR | Case.NR:
-            bounds = [slip_bounds.nr_to_ns(p)]
+            smooth_floor = case is Case.SR and p.mu == 0  # the floor then carries the weight, the wall nothing
+            kinds = {_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
         case Case.RS:
-            bounds = [SlipBound(-p.mu * p.g, p.j * p.R)]
+            kinds = {_sign(p.j * Omega2, p.mu)}
         case _:
-            bounds = []
-    kinds = {_sign(bound, p.omega_0 if omega_c is None else omega_c) for bound in bounds}
+            kinds = set()
     worst_first = SlipStability.UNSTABLE, SlipStability.NEUTRAL
     return next((kind for kind in worst_first if kind in kinds), SlipStability.STABLE)
 
@@ -145,9 +143,8 @@ def neutral_flow(case: Case, p: Parameters) -> float:
     return float(roots.bisected(side, 1e-3 * unit, 1e3 * unit))
 
 
-def _sign(bound: SlipBound, flow: float) -> SlipStability:
-    """What the sign of gamma says, whose two terms carry a few round-offs each."""
-    turning = bound.slope * flow**2
-    if abs(bound.offset + turning) <= 8 * np.finfo(float).eps * max(abs(bound.offset), abs(turning)):
+def _sign(drive: float, hold: float) -> SlipStability:
+    """What the sign of drive - hold says; both are >= 0 and carry the few round-offs of their products."""
+    if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):
         return SlipStability.NEUTRAL
-    return SlipStability.UNSTABLE if bound.offset + turning > 0 else SlipStability.STABLE
+    return SlipStability.UNSTABLE if drive > hold else SlipStability.STABLE
