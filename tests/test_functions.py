@@ -36,7 +36,6 @@ EXCEPTIONS = {
     *("analytic/simulation/charts.py:_motion", "analytic/simulation/equations.py:_forces"),
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "explicit")),
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "implicit")),
-    *(f"analytic/simulation/stepping.py:{name}" for name in ("solve", "_stretch", "advance", "follow")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
     *("mjsim/compiled.py:drive", "mjsim/compiled_free.py:_advance", "mjsim/compiled_free.py:advance"),
     *("mjsim/coulomb/compiled.py:_holds", "mjsim/coulomb/compiled.py:_put_back", "mjsim/corrections.py:corrections"),

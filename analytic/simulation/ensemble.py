@@ -95,7 +95,8 @@ def simulate_many(
         fluid = flows[k] or Flow.steady(sets[k].omega_0)
         check_duration(sets[k], fluid, t_end)
         ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
-        end[k] = stepping.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k], over)
+        rows = stepping.Rows(x[k], case[k], landings[k], over)
+        end[k] = stepping.follow(ball, stretches, still, omega_0, given, rows)
         if end[k] < 0:
             end[k] *= -1
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"

@@ -120,6 +120,43 @@ def whole(parts: Any) -> Ball:
     return Ball(At._make([*place, Velocities(*u)]), Forces(*P), Forces(*impact), *rest)
 
 
+class Touching(NamedTuple):
+    """Which contacts touch, and the normal velocities at which they aim, m s-1."""
+
+    A: bool
+    B: bool
+    to_A: float
+    to_B: float
+
+
+class Stretches(NamedTuple):
+    """Stretches of equal steps from each sample or knot of the flow to the next; arrays (n,)."""
+
+    start: Array
+    dt: Array
+    steps: npt.NDArray[np.int64]
+    sampled: npt.NDArray[np.bool_]
+    """Whether the end is a sample."""
+
+
+class Steps(NamedTuple):
+    """Steps of dt each, of which the first begins at `start`, from one on and up to another."""
+
+    start: float
+    dt: float
+    first: int
+    end: int
+
+
+class Rows(NamedTuple):
+    """The rows of an `Ensemble` that belong to a run, and whether nobody wants it any more, shape (1,)."""
+
+    x: Array
+    case: npt.NDArray[np.int8]
+    landings: npt.NDArray[np.int64]
+    over: npt.NDArray[np.bool_]
+
+
 class Solved(NamedTuple):
     """Velocities after a step or an impact, and what brought them about."""
 
@@ -133,34 +170,21 @@ class Solved(NamedTuple):
 
 
 @compiled
-def solve(
-    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, to_A: float, to_B: float, start: Forces, p: Constants
-) -> Solved:
-    """Velocities after dt, 0 for an impact, with closed contacts A, B whose normal velocities aim at to_A, to_B.
+def solve(at: At, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants) -> Solved:
+    """Velocities after dt, 0 for an impact, with closed contacts.
 
     Smooth forces, at the mean of both velocities, and contacts are iterated together; `start` guesses the impulses.
     """
     v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
-    m, r, j = p.m, p.r, p.j
+    (in_A, in_B, to_A, to_B), m, r, j = touching, p.m, p.r, p.j
     fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
     rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
-    # Old and new slip are added, since friction opposes their mean where a contact slides on. Where slip may stop
-    # within the step, friction opposes the final slip, so that it cannot reverse.
-    slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
-    load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
-    if dt == 0 or rest * _size(slip_A[0], slip_A[1]) <= p.mu * load:
-        slip_A = (0.0, 0.0)
-    if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
-        slip_B = (0.0, 0.0)
+    slip_A, slip_B = _sliding(at, dt, p)
     on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
     for tolerance in (TOLERANCE, BARELY):
         enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
         still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
-        A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
-        if in_A:
-            A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
-        if in_B:
-            B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
+        A, B = _guess(touching, start, m)
         new, last, change = old, 0.0, p.g * dt
         for _ in range(MAX_ITERATIONS):
             u = mean(old, new)
@@ -210,6 +234,34 @@ def solve(
 
 
 @compiled
+def _sliding(at: At, dt: float, p: Constants) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Old slip at floor and wall, m s-1, that is added to the new, since friction opposes the mean of both where a
+    contact slides on. None where it may stop within the step: friction then opposes the final slip, so that it can't
+    reverse.
+    """
+    v_h, v_y, v_k, o_x, o_y, o_z = at.u
+    r, rest = p.r, p.j / (1 + p.j)
+    slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
+    load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
+    if dt == 0 or rest * _size(slip_A[0], slip_A[1]) <= p.mu * load:
+        slip_A = (0.0, 0.0)
+    if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
+        slip_B = (0.0, 0.0)
+    return slip_A, slip_B
+
+
+@compiled
+def _guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impulse]:
+    """The impulses per mass from which a solution is looked for; none at an open contact."""
+    A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
+    if touching.A:
+        A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
+    if touching.B:
+        B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
+    return A, B
+
+
+@compiled
 def _size(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)  # several times as fast as math.hypot
 
@@ -220,11 +272,11 @@ def _sum(a: Forces, b: Forces) -> Forces:
 
 
 @compiled
-def _moved(at: At, dt: float, s: Solved, in_A: bool, in_B: bool, R: float) -> At:
+def _moved(at: At, dt: float, s: Solved, touching: Touching, R: float) -> At:
     """Where the ball comes within dt; a closed contact that carries load stays, or is now, closed."""
     u, new = mean(at.u, s.new), s.new
-    y = 0.0 if in_A and s.P.A_y > 0 else at.y + dt * u.v_y
-    if in_B:
+    y = 0.0 if touching.A and s.P.A_y > 0 else at.y + dt * u.v_y
+    if touching.B:
         return At(at.theta + dt * s.spin, y, 0.0 if s.P.B_x > 0 else at.h + dt * u.v_h, new)
     x_i, x_k = at.h - R + dt * u.v_h, dt * u.v_k
     rho = _size(x_i, x_k)
@@ -246,21 +298,21 @@ def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
 
 @compiled
 def _stretch(
-    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, start: Forces, p: Constants
+    at: At, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants
 ) -> tuple[At, Solved, float]:
     """The ball after dt, or at its first landing on floor or wall; and the time of that."""
     time = dt
-    s = solve(at, dt, omega_0, in_A, in_B, 0.0, 0.0, start, p)
-    after = _moved(at, dt, s, in_A, in_B, p.R)
-    to_floor = _crossing(at.y, at.u.v_y, after.y, dt) if not in_A and after.y < 0 else math.inf
-    to_wall = _crossing(at.h, at.u.v_h, after.h, dt) if not in_B and after.h < 0 else math.inf
+    s = solve(at, dt, omega_0, touching, start, p)
+    after = _moved(at, dt, s, touching, p.R)
+    to_floor = _crossing(at.y, at.u.v_y, after.y, dt) if not touching.A and after.y < 0 else math.inf
+    to_wall = _crossing(at.h, at.u.v_h, after.h, dt) if not touching.B and after.h < 0 else math.inf
     floor, better = to_floor <= to_wall, min(to_floor, to_wall)
     if better == math.inf or s.residual != 0:
         return after, s, dt
     for _ in range(LOCATING):
         time = better
-        s = solve(at, time, omega_0, in_A, in_B, 0.0, 0.0, start, p)
-        after = _moved(at, time, s, in_A, in_B, p.R)
+        s = solve(at, time, omega_0, touching, start, p)
+        after = _moved(at, time, s, touching, p.R)
         if time == 0:
             break
         better = _crossing(at.y, at.u.v_y, after.y, time) if floor else _crossing(at.h, at.u.v_h, after.h, time)
@@ -276,39 +328,52 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     at, P, impact, case, work, landings, residual = ball.at, nothing, nothing, ball.case, ball.work, ball.landings, 0.0
     q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
     start = Forces(q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z)
-    left, count, still = dt, 0, ZERO_SLIP * math.sqrt(p.g * p.R)
+    left, count = dt, 0
     while left > 0 and residual == 0:
         in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0
         speed = max(-at.u.v_y if in_A else 0.0, -at.u.v_h if in_B else 0.0)
         if speed > 0:
-            # Newton's restitution; a rebound that would last less than a hundredth of a step is none.
-            to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
-            to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > p.g * dt / 200 else 0.0
-            hit = solve(at, 0.0, 0.0, in_A, in_B, to_A, to_B, nothing, p)
-            if hit.residual != 0 and p.mu >= 1 and p.eta >= 1:  # friction may lock the ball in the corner: no rebound
-                hit = solve(at, 0.0, 0.0, in_A, in_B, 0.0, 0.0, nothing, p)
+            hit = _hit(at, dt, in_A, in_B, p)
             at, P, impact = At(at.theta, at.y, at.h, hit.new), _sum(P, hit.P), _sum(impact, hit.P)
             work, residual = work + hit.work, _worse(hit.residual, residual)
             landings += speed > LANDED * math.sqrt(p.g * p.R)
             in_A, in_B = in_A and at.u.v_y <= 0, in_B and at.u.v_h <= 0
+        touching = Touching(in_A, in_B, 0.0, 0.0)
         if count < LANDINGS:
-            at, s, time = _stretch(at, left, omega_0, in_A, in_B, start, p)
+            at, s, time = _stretch(at, left, omega_0, touching, start, p)
         else:
-            after = _moved(at, left, solve(at, left, omega_0, in_A, in_B, 0.0, 0.0, start, p), in_A, in_B, p.R)
-            in_A, in_B, time = in_A or after.y < 0, in_B or after.h < 0, left
-            s = solve(at, left, omega_0, in_A, in_B, 0.0, 0.0, start, p)
-            after = _moved(at, left, s, in_A, in_B, p.R)
+            after, time = _moved(at, left, solve(at, left, omega_0, touching, start, p), touching, p.R), left
+            touching = Touching(in_A or after.y < 0, in_B or after.h < 0, 0.0, 0.0)
+            s = solve(at, left, omega_0, touching, start, p)
+            after = _moved(at, left, s, touching, p.R)
             at = At(after.theta, max(after.y, 0.0), max(after.h, 0.0), after.u)
         P, work, residual = _sum(P, s.P), work + s.work, _worse(s.residual, residual)
-        left, count = left - time, count + 1
-        # What the solution says of the contacts: open if it leaves with a velocity, rolling if nothing slides.
-        (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, OPEN, OPEN
-        if in_A and (s.P.A_y > 0 or v_y <= 0):
-            A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
-        if in_B and (s.P.B_x > 0 or v_h <= 0):
-            B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
-        case = 3 * A + B
+        left, count, case = left - time, count + 1, _told(s, touching, p)
     return Ball(at, P, impact, case, work, landings, residual)
+
+
+@compiled
+def _hit(at: At, dt: float, in_A: bool, in_B: bool, p: Constants) -> Solved:
+    """An impact, with Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
+    nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
+    to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > p.g * dt / 200 else 0.0
+    hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, to_A, to_B), nothing, p)
+    if hit.residual != 0 and p.mu >= 1 and p.eta >= 1:  # friction may lock the ball in the corner: no rebound
+        hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, 0.0, 0.0), nothing, p)
+    return hit
+
+
+@compiled
+def _told(s: Solved, touching: Touching, p: Constants) -> int:
+    """The case as a solution tells it: a contact is open if it leaves with a velocity, and rolls if nothing slides."""
+    (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, OPEN, OPEN
+    still = ZERO_SLIP * math.sqrt(p.g * p.R)
+    if touching.A and (s.P.A_y > 0 or v_y <= 0):
+        A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
+    if touching.B and (s.P.B_x > 0 or v_h <= 0):
+        B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
+    return 3 * A + B
 
 
 @compiled
@@ -318,17 +383,15 @@ def _worse(new: float, residual: float) -> float:
 
 
 @compiled
-def advance(
-    ball: Ball, start: float, dt: float, first: int, count: int, flow: FlowArrays, p: Constants, events: Array
-) -> tuple[Any, int, int]:
-    """Go on from step `first` of `count` that begin at `start`; return the ball, the next step, and events noted.
+def advance(ball: Ball, steps: Steps, flow: FlowArrays, p: Constants, events: Array) -> tuple[Any, int, int]:
+    """Go on through steps; return the ball, the next step, and events noted.
 
     The ball is in parts, plain tuples (`whole`): a signal would be answered while numba makes named ones, which doesn't
     look whether it has got them. A row of `events` takes time, code of the case before and after, impulses of landings.
     It ends early when no row is left, or when a step doesn't converge.
     """
-    noted, k = 0, first
-    while k < count and noted < len(events):
+    (start, dt, k, end), noted = steps, 0
+    while k < end and noted < len(events):
         before, ball = ball.case, step(ball, dt, _fluid(flow, start + (k + 0.5) * dt), p)
         k += 1
         if ball.residual != 0:
@@ -342,25 +405,13 @@ def advance(
 
 
 @compiled
-def follow(
-    ball: Ball,
-    starts: Array,
-    dts: Array,
-    counts: npt.NDArray[np.int64],
-    sampled: npt.NDArray[np.bool_],
-    quiet: float,
-    flow: FlowArrays,
-    p: Constants,
-    x: Array,
-    case: npt.NDArray[np.int8],
-    landings: npt.NDArray[np.int64],
-    over: npt.NDArray[np.bool_],
-) -> float:
-    """One run through stretches of steps, into the rows of an `Ensemble`; return its end, less than 0 if it failed.
+def follow(ball: Ball, stretches: Stretches, quiet: float, flow: FlowArrays, p: Constants, rows: Rows) -> float:
+    """One run through stretches of steps, into rows; return its end, less than 0 if it failed.
 
-    Rows beyond the end of a run that has been quiet for long repeat its last state. Once another thread sets `over`,
-    shape (1,), it ends where it is.
+    Rows beyond the end of a run that has been quiet for long repeat its last state. Once another thread sets `over` it
+    ends where it is.
     """
+    (starts, dts, counts, sampled), (x, case, landings, over) = stretches, rows
     row, now, landed, known = 1, 0.0, 0.0, 0
     for s in range(len(starts)):
         for k in range(counts[s]):

@@ -17,10 +17,8 @@ Steps and loops over them are in `stepping`, which numba compiles where it is in
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from analytic.mechanics import drag, rigid_body
 from analytic.mechanics.contact_problem import NotConvergedError
@@ -39,16 +37,6 @@ EVENTS = 1000
 """Most events between them."""
 
 
-class Stretches(NamedTuple):
-    """Stretches of equal steps from each sample or knot of the flow to the next; arrays (n,)."""
-
-    start: Array
-    dt: Array
-    steps: npt.NDArray[np.int64]
-    sampled: npt.NDArray[np.bool_]
-    """Whether the end is a sample."""
-
-
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
     """Step from state x0 and record samples and changes of case; the contract of `simulation.simulate`.
 
@@ -65,8 +53,8 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
         for start, dt, count, sampled in zip(*(column.tolist() for column in stretches), strict=True):
             taken = 0
             while taken < count:
-                until = min(count, taken + AT_ONCE)
-                parts, taken, noted = stepping.advance(now, start, dt, taken, until, fluid, given, events)
+                steps = stepping.Steps(start, dt, taken, min(count, taken + AT_ONCE))
+                parts, taken, noted = stepping.advance(now, steps, fluid, given, events)
                 now = stepping.whole(parts)
                 for time, before, after, *impulse in events[:noted].tolist():
                     recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
@@ -87,7 +75,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
 
 def prepared(
     x: State, theta: float, p: Parameters, flow: Flow, settings: Settings, times: Array
-) -> tuple[stepping.Ball, Stretches, stepping.FlowArrays, stepping.Constants]:
+) -> tuple[stepping.Ball, stepping.Stretches, stepping.FlowArrays, stepping.Constants]:
     """What the compiled loops take: the ball in a state that no step has led to, its steps, the flow, and constants.
 
     Raises `InputError` if the time step is too large for the problem.
@@ -102,7 +90,7 @@ def prepared(
     given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution, p.fluid_torque
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
-        Stretches(knots[:-1], length / steps, steps, np.isin(knots[1:], times)),
+        stepping.Stretches(knots[:-1], length / steps, steps, np.isin(knots[1:], times)),
         stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
         stepping.Constants(drag.law(p), *map(float, given)),  # an integer would be compiled for itself
     )
