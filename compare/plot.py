@@ -78,7 +78,7 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
 
 
 def basins(of: Basins, axes: Axes | None = None) -> Axes:
-    """Where balls end that start on a plane of states, as `dualball basins --save` keeps it for `Basins.load`."""
+    """Where balls end that start on a plane of states, as `dualball basins -o` keeps it and `Basins.load` reads it."""
     axes = _or_new(axes)
     planes.fill(axes, of)
     return axes

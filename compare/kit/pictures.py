@@ -91,7 +91,7 @@ def _named(figure: Figure) -> Iterator[tuple[Artist, str]]:
                  for part in _flat(box.get_children()))  # fmt: skip
         for artist, label in (*boxes, *((each, each.get_label()) for each in axes.get_children())):
             if isinstance(label, str) and not _UNNAMED.fullmatch(label):
-                yield artist, typeset(plain(label.removeprefix("_")))
+                yield artist, str(typeset(plain(label.removeprefix("_"))))
 
 
 def _flat(artists: Any) -> Iterator[Artist]:

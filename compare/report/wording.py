@@ -58,6 +58,12 @@ def conditions(of: Mapping[str, Condition]) -> str:
     return ", ".join(said)
 
 
+def where(m: Measurement) -> str:
+    """With what a number was measured: "reference, ω₀ = 25 rad/s: case SS"."""
+    flow = f"{m.set}, ω₀ = {m.parameters.omega_0:.6g} rad/s"
+    return f"{flow}: {conditions(m.conditions)}" if m.conditions else flow
+
+
 def mark(check: Check) -> str:
     """What a check comes to, in one word."""
     return "fail" if not check.agrees else "pass" if check.conclusive else "coarse"

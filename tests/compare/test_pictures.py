@@ -22,7 +22,7 @@ def made() -> Figure:
     figure = Figure(figsize=(4, 3))
     axes = figure.add_subplot()
     axes.plot([1.0, 10.0], [0.0, 4.0], label="_a line")
-    axes.errorbar([1.0, 10.0], [1.0, 3.0], [0.1, 0.2], ls="none", marker="o", label="marks")
+    axes.errorbar([1.0, 10.0], [1.0, 3.0], [0.1, 0.2], ls="none", marker="o", label="$ω_0$ marks")
     axes.set(xscale="log", xlabel="$\\omega_0$ (rad/s)", ylabel="height", xlim=(0.5, 20), ylim=(-1, 5))
     return figure
 
@@ -32,7 +32,7 @@ def test_series_and_scales_are_in_the_picture() -> None:
     assert text == svg(made())  # equal figures give equal text
     series = re.findall('data-series="([^"]*)"', text)
     assert series.count("a line") == 1
-    assert series.count("marks") == 2  # and bars
+    assert series.count("&lt;i&gt;ω&lt;/i&gt;&lt;sub&gt;0&lt;/sub&gt; marks") == 2  # and bars
     (axes,) = re.findall('data-axes="([^"]*)"', text)
     assert "&lt;i&gt;ω&lt;/i&gt;&lt;sub&gt;0&lt;/sub&gt; (rad/s)" in axes
     ElementTree.fromstring(text)
