@@ -159,7 +159,7 @@ class Witness:
 
     @property
     def resolving_power(self) -> Mapping[str, float]:
-        """As that of a verdict."""
+        """By quantity, the smallest relative error of theory that every conclusive check would notice."""
         return resolving_power(self.checks)
 
 

@@ -20,7 +20,7 @@ _ROW = "dualball"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options."""
+    """The options of the plugin."""
     group = parser.getgroup("dualball", "exact contact cases")
     engine = "test an engine on the exact cases: a module with build, step and state, or MODULE:OBJECT"
     group.addoption("--dualball-engine", metavar="MODULE", help=engine)
@@ -80,7 +80,7 @@ class ExactCase(pytest.Item):
         self.case, self.trial = case, trial
 
     def runtest(self) -> None:
-        """Run it, and keep a row of the summary."""
+        """Run the case, and keep a row of the summary."""
         from compare.bench.case import TOLERANCE  # here, because no other run needs it
 
         found = self.trial().result(self.case)

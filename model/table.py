@@ -20,7 +20,7 @@ def fields(line: str) -> list[str]:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is one."""
+    """Whether a text is a number."""
     try:
         float(text)
     except ValueError:

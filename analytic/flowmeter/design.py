@@ -213,7 +213,7 @@ class Request:
 
     @property
     def make(self) -> Make:
-        """The meter with this fluid."""
+        """A function that makes a meter with this fluid from all other values."""
         return partial(Parameters.from_fluid, **self.fluid)
 
 

@@ -89,7 +89,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
 
 
 def model_error(p: Parameters) -> float:
-    """By how much of itself omega_c in RR at p.omega_0 is off without the torque; 0 if the fluid isn't known.
+    """Relative error of omega_c in RR at p.omega_0 for want of the torque; 0 if the fluid isn't known.
 
     The larger of what Stokes and the boundary layer say, or the largest shift by the fluid's inertia if that is more.
     """

@@ -61,7 +61,7 @@ def of_velocity(w_h: Real, w_y: Real, w_k: Real, p: Parameters) -> Real:
 
 
 def speed(w_h: Real, w_y: Real, w_k: Real) -> Real:
-    """|w| of the same components, m s-1."""
+    """The speed |w| of a velocity relative to the fluid, its components as in `of_velocity`, m s-1."""
     square = w_h * w_h + w_y * w_y + w_k * w_k
     return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
 

@@ -22,7 +22,7 @@ import siconos.numerics as numerics
 
 
 def main() -> None:
-    """Answer until there is nothing more to read."""
+    """Read problems, starts and forces, and answer them, until there is nothing more to read."""
     answers, nowhere = os.fdopen(os.dup(1), "w"), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)  # Siconos prints warnings to standard output
     os.dup2(nowhere, 2)
@@ -123,12 +123,12 @@ class TurningBall(kernel.LagrangianDS):  # type: ignore[misc]
         self.fGyr()[:] = v[1] / (self.R + q[0]) * (self.across @ v)
 
     def computeJacobianFGyrq(self, *state: Any) -> None:
-        """Its derivative by the coordinates."""
+        """The derivative of M Omega x v by the coordinates."""
         q, v = state or (self.q(), self.velocity())
         self.jacobianFGyrq()[:, 0] = -v[1] / (self.R + q[0]) ** 2 * (self.across @ v)
 
     def computeJacobianFGyrqDot(self, *state: Any) -> None:
-        """Its derivative by the velocities."""
+        """The derivative of M Omega x v by the velocities."""
         q, v = state or (self.q(), self.velocity())
         jacobian = v[1] * self.across
         jacobian[:, 1] += self.across @ v
@@ -139,7 +139,7 @@ class Turning(Scene):
     """A ball in axes that turn with it, outward, along and up, so that floor and wall are planes."""
 
     def start(self, position: list[float], velocity: list[float], spin: list[float]) -> None:
-        """Position, velocity and spin in world axes."""
+        """Begin at a position with a velocity and a spin, in world axes."""
         x, y, z = position
         self.azimuth, h, r = math.atan2(y, x), self.R - math.hypot(x, y), self.r
         self.axes = turned(self.azimuth)
@@ -151,7 +151,7 @@ class Turning(Scene):
         self.simulate(ball, *(kernel.LagrangianLinearTIR(np.array(rows, float)) for rows in (floor, wall)))
 
     def advance(self, force: list[float]) -> Any:
-        """Under a force in world axes."""
+        """Take a step under a force in world axes; position, velocity and spin after it."""
         self.axes, q = turned(self.azimuth), self.ball.q()
         before, way = self.R + q[0], q[1]
         outward, along, upward = self.axes @ force
@@ -178,7 +178,7 @@ class Contact(kernel.NewtonEuler3DR):  # type: ignore[misc]
         self.r, self.surface = r, surface
 
     def computeh(self, time: float, q: Any, gap: Any) -> None:
-        """Gap, contact points and normal."""
+        """Set gap, contact points and normal of a ball at q."""
         distance, normal = self.surface(q)
         gap[0] = distance - self.r
         self.nc()[:] = normal
@@ -191,7 +191,7 @@ class FreeBall(Scene):
     directions = "jachqT"
 
     def start(self, position: list[float], velocity: list[float], spin: list[float]) -> None:
-        """Position, velocity and spin in world axes."""
+        """Begin at a position with a velocity and a spin, in world axes."""
 
         def wall(q: Any) -> Any:
             rho = math.hypot(q[0], q[1])
@@ -202,7 +202,7 @@ class FreeBall(Scene):
         self.simulate(ball, *(Contact(self.r, surface) for surface in (lambda q: (q[2], up), wall)))
 
     def advance(self, force: list[float]) -> Any:
-        """Under a force in world axes."""
+        """Take a step under a force in world axes; position, velocity and spin after it."""
         self.take_step([force[0], force[1], force[2] - self.weight])
         (x, y, z, w, *axis), velocity = self.ball.q(), self.ball.velocity()
         spin = velocity[3:]  # in the axes of the ball

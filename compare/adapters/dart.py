@@ -19,7 +19,7 @@ from model.kinematics import rotated
 
 
 class Dart(Free):
-    """As in `Free`."""
+    """A free body in DART."""
 
     TELLS = True
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")

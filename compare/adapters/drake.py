@@ -39,7 +39,7 @@ logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces 
 
 
 class Drake(Free):
-    """As in `Free`."""
+    """A free body in Drake."""
 
     TELLS = True
     RESOLUTION = STICTION

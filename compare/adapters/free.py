@@ -36,12 +36,12 @@ class Library:
 
     @property
     def missing(self) -> str:
-        """Why it can't be used here, and what to do about it; empty if it can."""
+        """Why the engine can't be used here, and what to do about it; empty if it can."""
         return "" if self.version != ABSENT else f"{self.name} is not installed: pip install {self.name}"
 
     @property
     def version(self) -> str:
-        """Or that it isn't installed."""
+        """The version that is installed, or that none is."""
         return version(self.name)
 
     def load(self, member: str) -> Free:
@@ -119,23 +119,23 @@ class Free(ABC):
             self.now += self.timestep
 
     def state(self) -> State:
-        """As it is now: positions are taken back to where velocities are."""
+        """The state now: positions are taken back to where velocities are."""
         parts = [np.array(part, float) for part in self.read()]
         for k in range(0, len(parts), 3):
             parts[k] -= self.ahead * parts[k + 1]
         return tuple(parts)
 
     def moves(self, surface: Surface) -> bool:
-        """Whether it is a cylinder for which one plane stands that goes with the body."""
+        """Whether a surface is a cylinder for which one plane stands that goes with the body."""
         return self.best and surface.radius is not None
 
     def planes(self) -> Iterator[tuple[Surface, str, Array, Array]]:
-        """As `Scene.planes`: a cylinder's are many, or the one that moves along."""
+        """The planes of the scene, as `Scene.planes`: a cylinder's are many, or the one that moves along."""
         return self.scene.planes(1 if self.best else FACETS)
 
     @abstractmethod
     def make(self) -> None:
-        """`scene`, with steps of `timestep`."""
+        """Make `scene` in the engine, with steps of `timestep`."""
 
     @abstractmethod
     def advance(self) -> None:
@@ -143,7 +143,7 @@ class Free(ABC):
 
     @abstractmethod
     def read(self) -> State:
-        """As the engine has it."""
+        """The state as the engine has it."""
 
     def push(self, force: Vector) -> None:
         """Set the force on the centre for the next step, N."""

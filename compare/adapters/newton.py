@@ -25,7 +25,7 @@ logging.getLogger("newton").setLevel(logging.ERROR)
 
 
 class Newton(Free):
-    """As in `Free`, with one of the solvers and its options."""
+    """A free body in Newton, with one of its solvers and options."""
 
     PRECISION = "f32"
 
@@ -87,7 +87,7 @@ class Newton(Free):
 
 
 def pose(point: Array, normal: Array) -> Any:
-    """Of a plane."""
+    """The pose of a plane, which has z as its normal."""
     w, x, y, z = upright(normal)
     return warp.transform(point, (x, y, z, w))
 

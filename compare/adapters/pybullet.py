@@ -20,7 +20,7 @@ from model.arrays import Array
 
 
 class PyBullet(Free):
-    """As in `Free`."""
+    """A free body in PyBullet."""
 
     TELLS = True
     FEATURES = ("disc",)

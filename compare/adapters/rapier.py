@@ -21,7 +21,7 @@ from model.arrays import Array
 
 
 class Rapier(Free):
-    """As in `Free`."""
+    """A free body in Rapier."""
 
     PRECISION = "f32"
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")

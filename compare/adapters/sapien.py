@@ -26,7 +26,7 @@ WALL = 3.0
 
 
 class Sapien(Free):
-    """As in `Free`."""
+    """A free body in PhysX."""
 
     PRECISION = "f32"
     RESOLUTION = 1e-4
@@ -86,7 +86,7 @@ class Sapien(Free):
 
 
 def pose(point: Array, normal: Array) -> Any:
-    """Of a plane: x is turned to z, then z to the normal."""
+    """The pose of a plane, which has x as its normal: x is turned to z, then z to the normal."""
     (w, x, y, z), half = upright(normal), math.sqrt(0.5)
     return engine.Pose(point, [half * (w + y), half * (x + z), half * (y - w), half * (z - x)])
 

@@ -81,7 +81,7 @@ def locate(named: str | None) -> tuple[str, str]:
 
 
 class Siconos(Free):
-    """As in `Free`: a ball in a vessel, in a process of its own."""
+    """A ball in a vessel, in a process of its own."""
 
     TELLS = True
     AHEAD = 0.0

@@ -67,7 +67,7 @@ class Vessel(Scene):
 
     @classmethod
     def of(cls, p: Parameters, x: State, flow: Flow) -> Vessel:
-        """Of parameters, and of a start at azimuth zero."""
+        """The scene of a ball with these parameters, which starts at azimuth zero."""
         ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
         return cls(name="vessel", **geometry(p, x), ball=ball, fluid=flow)
 

@@ -200,7 +200,7 @@ class Records:
 
     @property
     def rows(self) -> tuple[Measurement | Missing, ...]:
-        """All of it."""
+        """The measurements, then what is missing."""
         return (*self.measurements, *self.missing)
 
     def select(
