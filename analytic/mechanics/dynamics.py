@@ -174,7 +174,7 @@ def _drag(x: Sequence[Real], p: Parameters, omega_0: Real) -> Real:
 
 
 def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> Forces:
-    """(24): w_z stays 0 without B_y, so that A_x alone keeps the spin axis turning with the orbit."""
+    """Forces of RS (24): w_z stays 0 without B_y, so that A_x alone keeps the spin axis turning with the orbit."""
     (_, _, omega_c, *_), (sine, _) = x, slip_B
     u = p.m * p.R * omega_c**2
     B_x = (1 + p.j) * u
@@ -184,7 +184,7 @@ def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> F
 
 
 def _sr(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> Forces:
-    """(25), (29)."""
+    """Forces of SR: (25), (29)."""
     (_, _, omega_c, w_x, *_), (sine, _) = x, slip_A
     B_y = p.j * p.m * (p.R * omega_c**2 + p.r * omega_c * w_x)
     A_y = p.m * p.g - B_y
@@ -194,7 +194,7 @@ def _sr(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> F
 
 
 def _ss(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction, slip_B: Direction) -> Forces:
-    """(26), (29)."""
+    """Forces of SS: (26), (29)."""
     _, _, omega_c, *_ = x
     u, G = p.m * p.R * omega_c**2, p.m * p.g
     (sA, cA), (sB, cB) = slip_A, slip_B
@@ -205,7 +205,7 @@ def _ss(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction, slip
 
 
 def _nr(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
-    """(27)."""
+    """Forces of NR: (27)."""
     (_, v_y, omega_c, w_x, *_), c = x, _drag(x, p, omega_0)
     B_y = p.j * p.m * (p.g + c * v_y + p.R * omega_c**2 + p.r * omega_c * w_x) / (1 + p.j)
     B_z = p.j * p.m * p.R * c * (omega_c - omega_0) / (1 + p.j)
@@ -213,21 +213,21 @@ def _nr(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
 
 
 def _ns(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> Forces:
-    """(28), (29)."""
+    """Forces of NS: (28), (29)."""
     (_, _, omega_c, *_), (sine, cosine) = x, slip_B
     u = p.m * p.R * omega_c**2
     return Forces(0.0, 0.0, 0.0, u, p.eta * u * cosine, -p.eta * u * sine)
 
 
 def _rn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
-    """Rolling on the floor away from the wall: drag alone drives the friction."""
+    """Forces of a ball that rolls on the floor away from the wall: drag alone drives the friction."""
     _, _, omega_c, _, _, _, h, v_h = x
     share = p.j * p.m * _drag(x, p, omega_0) / (1 + p.j)
     return Forces(share * v_h, p.m * p.g, share * (p.R - h) * (omega_c - omega_0))
 
 
 def _sn(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> Forces:
-    """Slipping on the floor away from the wall."""
+    """Forces of a ball that slips on the floor away from the wall."""
     G, (sine, cosine) = p.m * p.g, slip_A
     return Forces(-p.mu * G * cosine, G, p.mu * G * sine)
 

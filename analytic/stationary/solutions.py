@@ -186,7 +186,7 @@ def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) ->
 
 
 def _rr(p: Parameters) -> list[StationarySolution]:
-    """Proposition 1. Without drag every omega_c is stationary."""
+    """Proposition 1: the ball rolls round with the fluid. Without drag every omega_c is stationary."""
     best = rolling_forces.least_utilisation(p.omega_0, p)
     return [_solution(Case.RR, p, State(omega_c=p.omega_0), bool(best.utilisation <= 1 and not np.isnan(best.B_y)))]
 
@@ -228,7 +228,7 @@ def _ss(p: Parameters) -> list[StationarySolution]:
 
 
 def _nr(p: Parameters) -> list[StationarySolution]:
-    """Proposition 5."""
+    """Proposition 5: the wall alone carries the ball."""
     if p.omega_0 == 0:
         return []
     x = State(omega_c=p.omega_0, slip_x=_lifting_spin(p))
