@@ -18,6 +18,8 @@ from model.errors import check_type
 from model.kinematics import TURNING, VARIABLES, full_state
 from model.parameters import POSITIVE, Range, check_number
 
+MOST_THREADS = 1024
+
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
@@ -84,7 +86,9 @@ def simulate_many(
     ]
     times = sample_times(t_end, sample_interval)
     still = np.inf if quiet is None else check_number("quiet", quiet, "s", POSITIVE)
-    workers = int(check_number("threads", threads or os.cpu_count() or 1, "threads", Range(1, whole=True)))
+    if threads is None:
+        threads = os.cpu_count() or 1
+    workers = int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True)))
 
     shape = (count, len(times))
     x, case, landings = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8), np.zeros(shape, np.int64)

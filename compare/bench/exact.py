@@ -43,6 +43,11 @@ def cases() -> tuple[Case, ...]:
     return (*one_contact.cases(), *_grooves(), *_vessel(), *mechanisms.cases())
 
 
+def listing() -> list[list[str]]:
+    """Of each case its name, how many contacts it has, its kind, what happens; templates/cases.json has them, too."""
+    return [[case.name, str(len(case.contacts[0])), case.kind, case.about] for case in cases()]
+
+
 def write(directory: Path) -> None:
     """Write JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises `StorageError`."""
     make_directory(directory)

@@ -144,6 +144,12 @@ def test_bad_input(sets, x0s, message):
         simulate_many(sets, x0s, 0.1)
 
 
+@pytest.mark.parametrize("threads", [0, -1, 1.5, 10**6])
+def test_threads_that_there_cannot_be(threads):
+    with pytest.raises(InputError, match="threads = .* is out of range"):
+        simulate_many(P, np.zeros(6), 0.1, threads=threads)
+
+
 def test_settles_on_random_sets():
     """Friction up to 3, any drag and inertia: every step of 200 runs converges."""
     rng = np.random.default_rng(5)

@@ -1,6 +1,8 @@
 """Exact contact cases are right by other ways, and would notice a wrong engine."""
 
+import json
 import math
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -8,8 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import analytic
-from compare.bench import cases
-from compare.bench.case import TIME_STEPS, TOLERANCE
+from compare.bench import cases, exact
+from compare.bench.case import TIME_STEPS, TOLERANCE, VERSION
 from compare.bench.case import reach as reached
 from model import Case as Kinds
 
@@ -42,6 +44,12 @@ def test_a_case_is_whole(case):
     assert case.wrong
     for name, states in case.wrong.items():
         assert case.error(states) > 2.5 * TOLERANCE, name
+
+
+def test_the_list_that_is_shown_is_that_of_the_cases():
+    """templates/cases.json spares the list the simulations."""
+    known = json.loads((Path(exact.__file__).with_name("templates") / "cases.json").read_text("utf-8"))
+    assert known == {"version": VERSION, "cases": exact.listing()}
 
 
 def test_there_are_enough_cases_of_each_kind():
