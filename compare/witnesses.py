@@ -244,31 +244,28 @@ def _same(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tuple[int,
 def _limit(there: Sequence[Step], ends: Set[tuple[str, float]] = frozenset()) -> tuple[Check, float] | None:
     """A check in the limit of no step, and the order found, nan where the step shows nothing.
 
-    None where it wasn't measured with three steps, or of a state so near a threshold that the step may decide on its
-    case.
+    None of a state so near a threshold that the step may decide on its case; where it wasn't measured with three steps;
+    and of a threshold that moves too far with the step.
     """
     last = there[-1][1]
     m, scale, p = last.measurement, last.scale or 1.0, last.measurement.parameters
-    wanted = quantity(m.quantity).resolves
-    if m.protocol in ("settled", "hysteresis") and any(
-        abs(p.omega_0 - end) < MARGIN * end for name, end in ends if name == m.set
-    ):
+    wanted, threshold = quantity(m.quantity).resolves, m.quantity.startswith("omega_0")
+    near = [end for name, end in ends if name == m.set and abs(p.omega_0 - end) < MARGIN * end]
+    if near and m.protocol in ("settled", "hysteresis"):
         return None
     if wanted == 0 or (math.isnan(last.predicted) and len(there) >= LEAST_STEPS):
         return last, math.nan  # what is counted, or unknown to theory, has no limit but what the finest step says
     errors = np.array([(each.measurement.value - each.predicted) / (each.scale or 1.0) for _, each in there])
     own = np.array([each.measurement.uncertainty / (each.scale or 1.0) for _, each in there])
-    if len(there) < LEAST_STEPS or not np.all(np.isfinite(errors)):
+    if len(there) < LEAST_STEPS or not np.all(np.isfinite(errors)) or (threshold and np.ptp(errors) > FAR_OFF):
         return None
     shortest = min(time_unit(p), 1 / abs(p.omega_0) if p.omega_0 else math.inf)
     value, order = extrapolated(coarse_step(p) / shortest / np.array([n for n, _ in there], float), errors, own)
     ceiling = max(wanted, min(CEILING * wanted, COARSEST))
     share = 1.0 if m.quantity == WORST else SAFETY if len(there) == LEAST_STEPS else 0.0
     taken, hidden = share * (value.value - errors[-1]), 0.0
-    if m.quantity.startswith("omega_0"):
-        if np.ptp(errors) > FAR_OFF:
-            return None
-        (before, _), (finest, _) = there[-2:]  # their brackets may hide a change
+    if threshold:  # whose last two brackets may hide a change
+        (before, _), (finest, _) = there[-2:]
         hidden = math.hypot(*own[-2:]) * before / (finest - before)
     doubt = max(math.hypot(value.uncertainty, taken, hidden), SAME * ceiling / COVERAGE)
     measured = replace(m, value=last.predicted + value.value * scale, uncertainty=doubt * scale)
