@@ -288,6 +288,12 @@ def test_help_names_every_engine() -> None:
         assert not {name for name in known if not {name, name.removesuffix("-defaults")} & told}
 
 
+def test_the_tutorial_carries_out_every_command() -> None:
+    """But for the page that waits for a browser."""
+    shown = re.findall(r"^!dualball (\S+)", (ROOT / "docs" / "tutorial.md").read_text("utf-8"), re.MULTILINE)
+    assert {*shown} | {"explore"} == {*COMMANDS}
+
+
 def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["parameters", "--mu", "0.31"]) == 0
     shown = capsys.readouterr().out
