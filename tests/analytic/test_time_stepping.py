@@ -146,7 +146,7 @@ def test_bad_input(sets, x0s, message):
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, 10**6])
 def test_threads_that_there_cannot_be(threads):
-    with pytest.raises(InputError, match="threads = .* is out of range"):
+    with pytest.raises(InputError, match=r"threads = .* is out of range"):
         simulate_many(P, np.zeros(6), 0.1, threads=threads)
 
 
