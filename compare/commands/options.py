@@ -233,8 +233,14 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
         from compare.kit.statistics import plain  # here, because help needs no arrays
 
         print(json.dumps(plain(data), indent=1))
-    else:
-        terminal(markup=False).print(*shown, sep="\n")
+        return
+    console = terminal(markup=False)
+    if sys.stdout.isatty():
+        console.print(*shown, sep="\n")
+        return
+    with console.capture() as text:  # tables are filled up with blanks, which no file needs
+        console.print(*shown, sep="\n")
+    print("\n".join(line.rstrip() for line in text.get().splitlines()))
 
 
 def add_own_set(parser: Parser) -> None:
