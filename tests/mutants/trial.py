@@ -71,7 +71,7 @@ BY_HAND = {
     "SS whose wall never opens": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
     "a floor without load that is never lost": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
     "NR that slips by B_y alone": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
-    "RN's slip limit without j": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "RN's slip limit 5 % late": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
     "onset of slip that isn't mirrored": "analytic/test_choice::test_never_beyond_what_forces_can_hold_and_continuous_"
     "where_it_ends",
     "the fluid's spin with the wrong sign of ω₀": "analytic/test_real_fluid::test_rolling_with_the_torque_obeys_newton_"
@@ -234,10 +234,10 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
 def _subjects(trials: Sequence[Trial]) -> list[list[str]]:
     """Who notices wrong theories about each of `SUBJECTS`, and the faults `BY_HAND`."""
     measured, tests = {trial.what: trial.by for trial in trials}, {wrong.what: wrong.test for wrong in FOR_TESTS}
-    rows = [["subject", "wrong theory", "noticed by measurement", "by a unit test"]]
+    rows = [["subject", "wrong theory", "noticed by a claim", "by a unit test"]]
     for subject, what in SUBJECTS.items():
         test = f"`analytic/test_{tests[what]}`" if what in tests else "–"
-        rows.append([subject, what, measured.get(what, "**nobody**"), test])
+        rows.append([subject, what, measured.get(what, "–"), test])
     return rows + [[subject, "by hand", "not tried", f"`{test}`"] for subject, test in BY_HAND.items()]
 
 
