@@ -9,6 +9,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,12 +65,12 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(address: str, tmp_pa
         def shows(text: str) -> None:
             page.wait_for_function("t => document.querySelector('.said').innerText.includes(t)", arg=text)
 
-        def click(where: str, x: float, y: float) -> None:
-            box = page.locator(where).bounding_box()
+        def click(where: str, x: float, y: float, tab: Any = page) -> None:
+            box = tab.locator(where).bounding_box()
             place = box["x"] + box["width"] * x, box["y"] + box["height"] * y
-            page.mouse.move(*place)
-            page.wait_for_timeout(300)  # plotly looks for the point below when the pointer rests
-            page.mouse.click(*place)
+            tab.mouse.move(*place)
+            tab.wait_for_timeout(300)  # plotly looks for the point below when the pointer rests
+            tab.mouse.click(*place)
 
         shows("RR at ω_c = 12")
         click("[aria-label=omega_0]", 25 / 80, 0.5)
@@ -88,6 +89,8 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(address: str, tmp_pa
         number.press("Tab")
         page.wait_for_selector("text=mu = -3 is out of range")
         assert "RR at ω_c = 12" in other.inner_text(".said")
+        click(".curve .nsewdrag", 0.75, 0.25, other)
+        other.close()  # in the middle of a run, of which the server says nothing in the end
         browser.close()
     p, run = Parameters.load(tmp_path / "set.toml"), storage.load(tmp_path / "run.h5")
     assert (p.eta, p.omega_0) == (pytest.approx(0.6, abs=0.02), pytest.approx(60, abs=1.5))
