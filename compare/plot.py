@@ -11,6 +11,7 @@ For example::
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,10 +78,13 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
     return axes
 
 
-def basins(of: Basins, axes: Axes | None = None) -> Axes:
-    """Where balls end that start on a plane of states, as `dualball basins -o` keeps it and `Basins.load` reads it."""
+def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
+    """Where balls end that start on a plane of states: what `dualball basins -o` keeps, or that file.
+
+    Raises `StorageError` for a file that isn't one.
+    """
     axes = _or_new(axes)
-    planes.fill(axes, of)
+    planes.fill(axes, of if isinstance(of, Basins) else Basins.load(of))
     return axes
 
 

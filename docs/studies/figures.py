@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
-
 from compare.kit import drawing
 from compare.subjects.attractors.basins import Basins
 from compare.view import planes
@@ -24,7 +22,6 @@ SEARCHES = DATA / "hopping-box.json", DATA / "hopping-strong-drag.json"
 
 def main() -> None:
     """Draw all of them."""
-    matplotlib.rcParams["svg.hashsalt"] = "dualball"  # equal figures make equal files
     make_directory(DOCS / "cases")
     for name, draw in (("fig-2", cases.draw_2), ("fig-3", cases.draw_3), ("fig-6", cases.draw_6)):
         drawing.save(draw(), DOCS / "cases" / f"{name}.svg")

@@ -295,6 +295,8 @@ def test_functions_that_draw_into_axes():
     mine = style.figure(3, 3).add_subplot()
     assert plot.motion(run, "slip_x", "slip_z", axes=mine) is mine
     np.testing.assert_array_equal(mine.get_lines()[1].get_ydata(), run.slip_z)
+    kept = Path(__file__).parents[2] / "docs" / "studies" / "data" / "basins.json"
+    assert "at the start" in plot.basins(kept).get_xlabel()
     of_file = plot.motion(run.to_xarray(), "force_Ay")
     np.testing.assert_array_equal(of_file.get_lines()[0].get_ydata(), run.force_A[:, 1])
     assert "N" in of_file.get_ylabel()

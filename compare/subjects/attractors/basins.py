@@ -75,9 +75,9 @@ class Basins:
         write_text(path, json.dumps(dataclasses.asdict(self), default=np.ndarray.tolist))
 
     @classmethod
-    def load(cls, path: Path) -> Self:
+    def load(cls, path: str | Path) -> Self:
         """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
-        with reading_json(path, "basins") as data:
+        with reading_json(Path(path), "basins") as data:
             arrays: dict[str, Any] = {name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")}
             p, start = Parameters.from_mapping(data.pop("parameters")), tuple(data.pop("start"))
             return cls(parameters=p, start=start, **data, **arrays)
