@@ -20,7 +20,7 @@ BETA = 0.9
 """Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that the path bends."""
 PUSHED = 1.0
 """Size of the push, rad s-1."""
-FLOWS = {"fig-4": 1.38, "fig-5": 0.88}
+FLOW_OF = {"fig-4": 1.38, "fig-5": 0.88}
 """Flows above and below omega_02, in units of it."""
 SET = Parameters.named("high-wall-friction")
 _LASTS = 0.17
@@ -30,7 +30,7 @@ _LASTS = 0.17
 def of_set(p: Parameters, figure: str) -> Motion:
     """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
     check_thresholds(p)
-    p = p.replace(omega_0=FLOWS[figure] * thresholds(p).omega_02)
+    p = p.replace(omega_0=FLOW_OF[figure] * thresholds(p).omega_02)
     lasts = _LASTS * math.sqrt(p.R / p.g) * (20 if figure == "fig-4" else 1)  # till slip has ended
     return Motion(
         f"{PUSHED}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, PUSHED, BETA, t_end=lasts)
