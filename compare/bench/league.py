@@ -54,7 +54,8 @@ ENTRY_MARKS, ENTRY_COLOURS = (
 )
 CAPTION = (
     "Errors at the shortest step in units of each case's scales; up to "
-    f"{TOLERANCE:g} an engine passes. Order: power of the step with which errors fall, the median over the cases. "
+    f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors fall, the median over the "
+    "cases. "
     "Cost: processor time divided by simulated time at the shortest step, the median. The shortest step is 1 ms, of "
     "MuJoCo on Warp and of Newton's Kamino and VBD 2 ms. A dash: the engine can't express the case, and was not tried."
 )
@@ -127,21 +128,22 @@ def tried(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]
 
 
 def cell(result: Result) -> str:
-    """An error, or why there is none, in a word."""
+    """An error, or why there is none, in a word; with a mark where it is too much to pass."""
     if result.skipped:
         return "–"
     floor = FLOORS[result.engine.precision]
-    return number(result.error, floor) if math.isfinite(result.error) else "lost"
+    told = number(result.error, floor) if math.isfinite(result.error) else "lost"
+    return told if result.passed else f"{told} ✗"
 
 
 def number(value: float, floor: float) -> str:
-    """An error to a digit; round-off is shown as such."""
+    """An error to two digits; round-off is shown as such."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):
         return "lost"
-    mantissa, exponent = f"{max(value, floor):.0e}".split("e")
-    return f"{'< ' if value < floor else ''}{mantissa}e{int(exponent)}"
+    mantissa, exponent = (f"< {floor:.0e}" if value < floor else f"{value:.1e}").split("e")
+    return f"{mantissa}e{int(exponent)}"
 
 
 def worst(results: Sequence[Result]) -> Result | None:
