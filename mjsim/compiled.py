@@ -48,39 +48,34 @@ def named_after(*modules: Any) -> Callable[..., Any]:
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 @named_after(source)
 def drive(
-    watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,
+    omega_0: Array, balls: Array, due: Any, held: Any, contact: Array, normals: Array, forces: Array, qvel: Array,
     last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
 ) -> bool:  # fmt: skip
-    """As `mjsim.balls.Balls.drive` without it, for arrays (n, runs)."""
-    runs = qpos.shape[1]
-    if not watched:
-        for k in range(runs):
-            if normals[0, k] * normals[1, k] == 0 and _eventful(
-                (qpos[0, k], qpos[1, k], qpos[2, k]),
-                Velocity(*to_fixed_tuple(qvel[:, k], _VELOCITY)),
-                Velocity(*to_fixed_tuple(last[:, k], _VELOCITY)),
-                (normals[0, k], normals[1, k]),
-                Ball(*to_fixed_tuple(balls[:, k], _BALL)),
-            ):
-                return False
-    for k in range(runs):
+    """As `mjsim.stepping.drive`."""
+    some = False
+    for k in range(qpos.shape[1]):
         ball = Ball(*to_fixed_tuple(balls[:, k], _BALL))
+        if not held[k]:
+            for i in range(6):
+                forces[i, k] = contact[i, k]
+            forces[6, k], forces[7, k] = normals[0, k], normals[1, k]
+        v, before = Velocity(*to_fixed_tuple(qvel[:, k], _VELOCITY)), Velocity(*to_fixed_tuple(last[:, k], _VELOCITY))
+        loads = forces[6, k], forces[7, k]
+        if loads[0] * loads[1] == 0:
+            due[k] |= _eventful((qpos[0, k], qpos[1, k], qpos[2, k]), v, before, loads, ball)
+        some |= due[k]
         if ball.gain > 0:
             margins[0, k] = _followed(margins[0, k], qpos[2, k], ball.gain)
             margins[1, k] = _followed(margins[1, k], qpos[1, k], ball.gain)
         turn[0, k], turn[3, k] = math.cos(qpos[0, k] / 2), math.sin(qpos[0, k] / 2)
         qpos[3, k], qpos[4:7, k] = 1.0, 0.0
-        forces, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]) = _corrections(
-            Velocity(*to_fixed_tuple(qvel[:, k], _VELOCITY)), Velocity(*to_fixed_tuple(last[:, k], _VELOCITY)),
-            ball.R - qpos[1, k], omega_0[k],
-            to_fixed_tuple(contact[:, k], 6), to_fixed_tuple(normals[:, k], 2), ball,
-        )  # fmt: skip
-        applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = forces
-        if whole:
-            for i in range(_VELOCITY):
-                last[i, k] = qvel[i, k]
-    return True
+        given, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]) = _corrections(
+            v, before, ball.R - qpos[1, k], omega_0[k], to_fixed_tuple(forces[:6, k], 6), loads, ball
+        )
+        applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = given
+    return some
 
 
-drive.compile((types.boolean, types.boolean, types.float64[::1], *[_GIVEN] * 4, *[_ROWS] * 7))
+_FLAGS = types.Array(types.boolean, 1, "C")
+drive.compile((types.float64[::1], _ROWS, _FLAGS, _FLAGS, *[_GIVEN] * 2, *[_ROWS] * 9))
 drive.disable_compile()

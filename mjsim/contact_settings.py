@@ -198,6 +198,14 @@ class ContactSettings:
         """
         return self.softness * load * (1 - self.hover_number(load, friction, slip_speed)) / self.k
 
+    def held(self, gap: float, load: float, friction: float, slip_speed: float, bears: float) -> float:
+        """Margin (m) of a contact with such a gap that bears a `load`, where the floor or wall moves along with slip
+        beyond what makes it `hover` under what it `bears` in the mean (both m s-2)."""
+        if load <= 0:
+            return 0.0
+        most = self.hover * self.fastest_slip(bears, friction) if self.hover else math.inf
+        return max(gap + self.margin(load, friction, min(slip_speed, most)), 0.0)
+
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
         """mu |w| / (R f): sliding contact is continuous below 1; `load` > 0."""
         kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
@@ -246,6 +254,11 @@ class ContactSettings:
         """Whether floor and wall get surface velocities."""
         return self.memory or self.friction_lag != 0
 
+    @property
+    def corrects(self) -> bool:
+        """Whether anything is added between the steps that needs to know the forces of the last one."""
+        return self.memory or self.servo > 0 or self.order == 2
+
     def contact_decay(self, mu: float, eta: float) -> float:
         """Largest factor by which a small displacement changes in a step, where a ball slips at both contacts.
 
@@ -286,6 +299,12 @@ class ContactSettings:
         scale, (time, ratio) = timestep / 1e-3, cls.solref
         scaled = {"solref": (time * scale, ratio), "solreffriction": cls.solreffriction * scale}
         return cls.from_mapping({"timestep": timestep, "servo": cls.servo * scale} | scaled | changes)
+
+    @classmethod
+    def rigid_at(cls, timestep: float) -> Self:
+        """Rigid contacts of a free ball, for a step of any length."""
+        own = cls(coordinates="free", law="rigid", solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
+        return dataclasses.replace(own, timestep=timestep)
 
     def suited(self, p: Parameters) -> Self:
         """With slower contacts if the friction of a ball would make these chatter, else as they are."""

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from mjsim import limits, recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
-from mjsim.stepping import Polar
+from mjsim.stepping import HUGE, Polar
 from model import Events, Flow, Header, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.errors import check_type
@@ -41,8 +41,6 @@ NOTED = 4096
 RUNS_A_THREAD = 16
 """Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's Python."""
 MOST_THREADS = 1024
-_HUGE = 1e10
-"""Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 
 Blocks = list[npt.NDArray[np.void]]
 """Samples of each run, structured arrays of dtype `model.trajectory.SAMPLE`."""
@@ -189,8 +187,7 @@ class Run:
         """Samples of each run from raw ones (samples, runs, columns), cut where a run breaks down."""
         last = first + len(raw)
         time = np.arange(first, last, dtype=np.float64) * (self._interval * self._settings.timestep)
-        sound = np.logical_and.accumulate((np.abs(raw) < _HUGE).all(axis=2)).T
-        sound &= time < self._stepper.given_up[:, None]
+        sound = np.logical_and.accumulate((np.abs(raw) < HUGE).all(axis=2)).T
         sound &= np.array([[not header.failure] for header in self.headers])
         blocks = [np.empty(0, SAMPLE)] * len(self.headers)
         for runs in self._alike:
@@ -202,8 +199,6 @@ class Run:
                 if not self.headers[i].failure and len(part) < len(time):
                     self._ends[i] = end = float(time[len(part)])
                     why = f"diverged by t = {end:g} s"
-                    if (given_up := self._stepper.given_up[i]) <= end:
-                        why = f"was given up at t = {given_up:g} s, since its steps were divided again and again"
                     names = zip(VARIABLES, UNITS, strict=True)
                     left = [f"{name} = {part[name][-1]:.6g} {unit}" for name, unit in names] if len(part) else []
                     failure = f"{why}{', after ' * bool(left)}{', '.join(left)}"

@@ -55,7 +55,7 @@ class Free:
         theta_0: float,
     ) -> None:
         self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
-        self.margins, self.given_up = np.zeros((2, len(models))), np.full(len(models), np.inf)
+        self.margins = np.zeros((2, len(models)))
 
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
         if row is not None:
@@ -100,16 +100,23 @@ class _Ball:
         self.p, self._ball, self.theta = p, Ball.of(p, settings), theta_0
         self.law = Coulomb(self.model, rigid=True) if settings.rigid else None
         self.ahead = settings.timestep / 2 if self.law else 0.0
-        now, x = to_world(x, theta_0, p), State.of(x)
-        there = x._replace(y=x.y + self.ahead * x.v_y, h=x.h + self.ahead * x.v_h)
-        place = to_world(there, theta_0 + self.ahead * float(x.omega_c), p).position
-        self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
-        self.data.qvel[:6] = [*now.velocity, *now.spin]
+        self.place(x, theta_0)
         self._turns = settings.wall == "tangent"
         wall = self.model.body("wall") if self.law else None
         self._wall = wall.quat if wall else self.data.mocap_quat[0]
         self._at = wall.pos if wall else np.zeros(3)
         self._reach = settings.touching(p.g)
+
+    def place(self, x: npt.ArrayLike, theta: float) -> None:
+        """Begin anew in a state."""
+        mujoco.mj_resetData(self.model, self.data)
+        if self.law:
+            self.law.reset()
+        now, x, self.theta = to_world(x, theta, self.p), State.of(x), theta
+        there = x._replace(y=x.y + self.ahead * x.v_y, h=x.h + self.ahead * x.v_h)
+        place = to_world(there, theta + self.ahead * float(x.omega_c), self.p).position
+        self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
+        self.data.qvel[:6] = [*now.velocity, *now.spin]
 
     def read(self) -> State:
         """The state, with a place that is `ahead` of the velocities; these are along the axes of where the ball was."""

@@ -1,129 +1,129 @@
-"""Landings: where in a step they are, and how the ball goes on from there.
+"""Landings: a ball that lands, or comes near the vessel's axis, is a free body under Coulomb's law for that step.
 
-A ball that lands is taken to the moment at which the gap closes. There `mj_forward` gives the impulses, then the
-margins, friction forces and accelerations of what follows: as at the start of a run, which is a landing, too, if the
-ball comes down on what it touches. With these accelerations it is taken back to the times of the steps.
+`mjsim.free` takes it through the step in fine ones, with the rigid law that serves any model, and no axis. From what
+comes out the ball goes on upon its joints: places, velocities, accelerations, and the forces of its contacts, from
+which the margins follow (`ContactSettings.held`).
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-import numpy.typing as npt
 
-from mjsim.balls import GAPS, Balls, Runs
-from mjsim.corrections import lands
+from mjsim import recorder, scene
+from mjsim.contact_settings import ContactSettings
+from mjsim.free import _Ball as Ball
+from mjsim.world_axes import unwrapped
+from model import Parameters, State
 from model.arrays import Array
+from model.kinematics import Motion, from_world, rotated
 
-_ROUNDS = 60
-"""Most rounds of the search for margins and forces that belong to a state, or to an impact."""
-_SAME = 1e-12
-"""Change from one round to the next with which it ends, relative to the largest acceleration."""
-_SWINGS = 0.01
-"""Change over two rounds, divided by that in the last, with which it goes back and forth for ever, and ends, too."""
-_UNDAMPED = 1e-6
-"""Factor that takes the damping from the contacts: the impulse of an impact is that of the margin alone."""
-_TOUCH = 1e-15
-"""Least margin of a ball that has just landed, m: more than the round-off of a gap, or the engine sees no contact."""
-
-Mask = npt.NDArray[np.bool_]
-
-
-def begin(balls: Balls, fluid: Array) -> None:
-    """Let all runs go on from states at one time, where positions are not yet ahead of velocities."""
-    closed = touching(balls) | ((balls.gaps <= 0) & (balls.speeds < 0))
-    balls.last[:] = balls.qvel
-    balls.qpos[:3] += balls.leads * balls.qvel[:3]
-    runs = np.arange(balls.qpos.shape[1])
-    restart(balls, runs, np.zeros(len(runs)), closed, fluid)
+FINE = 128
+"""Fine steps in one of the settings."""
+_LATEST = 16
+"""Fine steps over which accelerations are taken."""
+_FIRST = 16
+"""Fine steps after which the forces of a state are known."""
+_BLOWS = 8
+"""Most blows in a step whose moments are found."""
+_OPEN = 1e-9
+"""Gap of a contact that is open, in units of R."""
+_UPRIGHT = 1.0, 0.0, 0.0, 0.0
 
 
-def touching(balls: Balls) -> Mask:
-    """Which contacts are closed or nearly so, (2, runs)."""
-    slow = np.abs(balls.speeds) * balls.settings.timestep < balls.reach
-    return (balls.loads > 0) | ((np.abs(balls.gaps) < balls.reach) & slow)
+class Landed(NamedTuple):
+    """How a ball goes on upon its joints."""
+
+    place: Array
+    """Azimuth, h and y, (3,)."""
+    velocity: Array
+    rates: Array
+    """Velocities of the joints and what a second changes of them, (6,)."""
+    forces: Array
+    """Generalised forces of the contacts (6) and their normal forces (2), as the engine has them, N and N m."""
+    change: float
+    """What a component of the contact forces would change in a whole step at the pace of the end, at most, N."""
+    seen: Array
+    """Sensors of the fine steps, (n, `NSENSOR`)."""
 
 
-def moments(balls: Balls) -> Array:
-    """When in the coming step open contacts close, (2, runs), s after its beginning; inf for those that don't."""
-    h, lead, last = balls.steps, balls.leads, balls.last[GAPS]
-    due = (balls.loads == 0) & lands(balls.gaps, balls.speeds, last, balls.hover(slice(None)), balls.ball)
-    rates = (balls.speeds - last) / h
-    gaps = balls.gaps - lead * (balls.speeds + rates * lead / 2)  # at the beginning of the step
-    speeds, rates, gaps = balls.speeds[due], rates[due], gaps[due]
-    closing = np.sqrt(speeds**2 - 2 * rates * gaps)
-    falls = speeds < 0  # else it turns round first; of two forms of the root the one without cancellation
-    times = np.full(due.shape, np.inf)
-    times[due] = np.where(falls, 2 * gaps, closing + speeds) / np.where(falls, closing - speeds, -rates)
-    return times
+class Fine:
+    """One ball that takes steps of some settings in fine ones."""
 
+    def __init__(self, p: Parameters, settings: ContactSettings) -> None:
+        self._p, self._step = p, settings.timestep / FINE
+        rigid = ContactSettings.rigid_at(self._step)
+        self._ball = Ball(scene.build(p, rigid)[0], p, State(), rigid, 0.0)
+        self._slow = settings.slowest_fall(p.g) * self._step
+        """What a gap loses in a fine step in which the contact closes with a blow, m."""
 
-def restart(balls: Balls, runs: Runs, moment: Array, closed: Mask, fluid: Array) -> None:
-    """Let runs go on from moments (k,), s after the beginning of the step, at which contacts (2, k) are closed."""
-    h, lead, fall = balls.steps[runs], balls.leads[runs], balls.ball.fall[runs]
-    v, before = balls.qvel[:, runs], (balls.qvel - balls.last)[:, runs] / h
-    place = balls.qpos[:3, runs] + (moment - lead) * (v + before * (moment + lead) / 2)[:3]
-    place[GAPS][closed] = 0.0
-    balls.qpos[:3, runs], balls.qvel[:, runs] = place, v + moment * before
-    hits = (closed & (balls.speeds[:, runs] < -fall)).any(axis=0)
-    if hits.any():
-        _stop(balls, runs[hits], closed[:, hits], fluid)
-    balls.damp(runs)
-    _settle(balls, runs, closed & (np.abs(balls.speeds[:, runs]) <= fall), fluid)
-    after = balls.acceleration[:, runs]
-    v = balls.qvel[:, runs] - moment * after
-    balls.qvel[:, runs], balls.last[:, runs] = v, v - h * after
-    balls.qpos[:3, runs] = place + (lead - moment) * (v + after * (moment + lead) / 2)[:3]
+    def forces(self, x: State, theta: float, omega_0: float) -> Landed:
+        """What accelerates a ball in a state, and the forces of its contacts."""
+        self._ball.place(x, theta)
+        return self._advance(omega_0, _FIRST)
 
+    def step(self, x: State, theta: float, omega_0: float) -> Landed:
+        """A whole step, with the sensors of its first fine one.
 
-def _settle(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
-    """Search for the margins, friction forces and accelerations that belong to the present state, at a fixed time."""
-    if balls.settings.servo:
-        balls.margins[:, runs] *= touches
-    _balance(balls, runs, touches, fluid)
+        Where a contact closes, the fine steps begin anew so that it does in the middle of one: of a blow that two
+        share, friction, which turns, would have two directions. Those after it are late; that is taken back at the end.
+        """
+        left, late, gaps, first = FINE, 0.0, np.array([x.y, x.h]), np.empty(0)
+        for _ in range(_BLOWS):
+            self._ball.place(x, theta)
+            landed = self._advance(omega_0, left)
+            first = landed.seen[:1] if len(first) == 0 else first
+            closing = self._closing(landed.seen, gaps)
+            if closing is None:
+                break
+            count, contact = closing
+            self._ball.place(x, theta)
+            if count:
+                before = self._advance(omega_0, count)
+                place, v, rates = before.place, before.velocity, before.rates
+            else:
+                (place, v), rates = self._joints(), np.zeros(6)
+            gap = 2 - contact  # as the joints are ordered
+            wait = float(np.clip(-place[gap] / v[gap], 0.0, 2 * self._step)) - self._step / 2
+            place, v = place + wait * v[:3], v + wait * rates
+            place[gap] = -self._step / 2 * v[gap]
+            x, theta = recorder.state(np.append(place, _UPRIGHT), v, self._p), float(place[0])
+            left, late, gaps = left - count, late + wait, np.array([x.y, x.h])
+            gaps[contact] = 0.0
+        place, v = landed.place - late * landed.velocity[:3], landed.velocity - late * landed.rates
+        if left < _FIRST:  # the forces found may be those of a blow
+            x = recorder.state(np.append(place, _UPRIGHT), v, self._p)
+            landed = self.forces(x, float(place[0]), omega_0)._replace(change=np.inf)
+        return landed._replace(place=place, velocity=v, seen=first)
 
+    def _closing(self, seen: Array, gaps: Array) -> tuple[int, int] | None:
+        """The first fine step in which a contact closes, and which, or None; `gaps` are those before."""
+        loads, open_ = seen[:, recorder.NORMALS], np.abs(gaps) > _OPEN * self._p.R
+        was_open = np.vstack([open_, loads[:-1] == 0])
+        falls = np.diff(seen[:, -2:], axis=0, prepend=gaps[None]) < -self._slow
+        found = np.argwhere((loads > 0) & was_open & falls)
+        return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
 
-def _stop(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
-    """Apply the impulses that stop the given runs at the contacts that touch, (2, k), if there are such.
+    def _advance(self, omega_0: float, count: int) -> Landed:
+        """So many fine steps."""
+        seen, fluid, latest = np.empty((count, recorder.NSENSOR)), np.full(count, omega_0), min(_LATEST, count // 2)
+        self._ball.advance(fluid[latest:], seen[: count - latest])
+        _, before = self._joints()
+        self._ball.advance(fluid[:latest], seen[count - latest :])
+        place, v = self._joints()
+        rates = (v - before) / (self._step * max(latest, 1))
+        half = count - count // 2
+        forces = recorder.forces(seen[[-1, -2 % count]], place[0]).mean(axis=0)
+        change = np.abs(forces - recorder.forces(seen[-half:][:1], place[0] - v[0] * self._step * half)[0]).max()
+        (A_x, A_y, A_z), (B_x, B_y, B_z) = forces
+        given = np.array([0, A_x + B_x, A_y + B_y, -self._p.r * A_z, self._p.r * B_z, 0, A_y, B_x])
+        return Landed(place, v, rates, given, float(change) * FINE / half, seen)
 
-    Without the damping of the contacts and the other forces on the ball, `mj_forward` gives the impulses at both
-    contacts at a fixed time, while the margins are adjusted until neither contact approaches or rebounds.
-    """
-    solref = balls.solref[:, runs]
-    balls.damp(runs, np.abs(balls.speeds[:, runs]).max(axis=0) / balls.steps[runs])
-    balls.solref[1::2, runs] *= _UNDAMPED
-    balls.last[:, runs] = balls.qvel[:, runs]
-    balls.margins[:, runs] = _TOUCH * touches
-    balls.forward(runs, fluid)
-    others = np.zeros(balls.qvel.shape)
-    others[:, runs] = balls.force[:, runs]
-    _balance(balls, runs, touches, fluid, others)
-    balls.qvel[:, runs] += balls.steps[runs] * balls.acceleration[:, runs]
-    balls.solref[:, runs] = solref
-
-
-def _balance(balls: Balls, runs: Runs, touches: Mask, fluid: Array, others: Array | None = None) -> None:
-    """Search for the margins with which the gaps of contacts that touch, (2, k), have no acceleration, or no speed.
-
-    No speed after an impact, without the `others` of the forces, (6, runs). A contact that slides so fast that it
-    hovers with more than it needs would close and open in turn for ever: it is left hovering.
-    """
-    balls.last[:, runs] = balls.qvel[:, runs]
-    states = np.full((2, 8, len(balls.ticks)), np.nan)
-    for _ in range(_ROUNDS):
-        balls.forward(runs, fluid, 0.0 if others is None else others[:, runs])
-        rates, kept, stiffness = balls.acceleration[:, runs], balls.margins[:, runs], balls.stiffness[runs]
-        if others is not None:
-            excess = rates[GAPS] + balls.speeds[:, runs] / balls.steps[runs]
-        else:
-            excess = rates[GAPS] if balls.settings.servo else 0 * rates[GAPS]
-            balls.last[:, runs] = balls.qvel[:, runs] - balls.steps[runs] * rates
-        margins = balls.margins[:, runs] = touches * np.maximum(kept - excess / stiffness, 0.0)
-        state = np.concatenate([rates, margins * stiffness])
-        before, latest = states[:, :, runs]
-        states[:, :, runs] = latest, state
-        changes, swings = np.abs(state - latest).max(axis=0), np.abs(state - before).max(axis=0)
-        hovers = (swings < _SWINGS * changes) & ((state - latest)[GAPS].sum(axis=0) > 0)
-        goes_on = ~(changes <= _SAME * np.abs(rates).max(axis=0)) & ~hovers
-        runs, touches = runs[goes_on], touches[:, goes_on]
-        if len(runs) == 0:
-            return
+    def _joints(self) -> tuple[Array, Array]:
+        """Places (3,) and velocities (6,) of the joints at one time."""
+        (qpos, qvel), ball = (self._ball.data.qpos, self._ball.data.qvel), self._ball
+        place, spin = qpos[:3] - ball.ahead * qvel[:3], rotated(qpos[3:7], qvel[3:6])
+        x, azimuth = from_world(Motion(place, qvel[:3].copy(), spin), self._p)
+        place, v = recorder.joint_state(x, unwrapped(float(azimuth), ball.theta), self._p)
+        return place[:3], v

@@ -17,6 +17,8 @@ SENSORS = NQ + NV
 COLUMNS = SENSORS + NSENSOR + 1
 SLIPS = SENSORS + np.array([12, 13, 26, 27])
 """Where they hold the slip velocities of A and B."""
+NORMALS = slice(1, 28, 14)
+"""Where they hold the normal forces."""
 _COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
 
 
@@ -48,7 +50,15 @@ def contacts(sensors: Array) -> Contacts:
     each, gaps = sensors[..., :-2].reshape(*sensors.shape[:2], 2, NSENSOR // 2 - 1), sensors[..., -2:]
     normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
     slips = np.moveaxis(each[..., _SLIP], -1, 0)
-    return Contacts(normal, np.sqrt(first**2 + second**2), np.sqrt(slips[0] ** 2 + slips[1] ** 2), gaps)
+    return Contacts(normal, np.hypot(first, second), np.hypot(slips[0], slips[1]), gaps)
+
+
+def forces(sensors: Array, theta: npt.ArrayLike) -> Array:
+    """Forces at A and B in the paper's axes, (n, 2, 3), of sensors (n, `NSENSOR`) at an azimuth, or one each, N."""
+    each = sensors[:, :-2].reshape(len(sensors), 2, NSENSOR // 2 - 1)
+    (normal, first, second), n, t = np.moveaxis(each[..., _FORCE, None], 2, 0), each[..., _NORMAL], each[..., _TANGENT]
+    in_world: Array = normal * n + first * t + second * np.cross(n, t)
+    return in_world @ np.swapaxes(frame(np.asarray(theta)), -1, -2)
 
 
 def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
@@ -57,14 +67,12 @@ def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
     Places that are ahead by half a step h are brought back by the velocity: that leaves h^2/8 times the acceleration.
     """
     qpos, qvel, sensors, lead = np.split(raw, [NQ, SENSORS, COLUMNS - 1], axis=1)
-    axes = frame(qpos[:, 0])
+    loads = forces(sensors, qpos[:, 0])
     qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
     block = trajectory.samples(time, qpos[:, 0], state(qpos, qvel, p), p)
-    for contact, sensor in zip("AB", np.split(sensors[:, :-2], 2, axis=1), strict=True):
+    for k, (contact, sensor) in enumerate(zip("AB", np.split(sensors[:, :-2], 2, axis=1), strict=True)):
         gap, speed, touches = block[f"gap_{contact}"], block[f"slip_speed_{contact}"], sensor[:, _COUNT] > 0
-        force, normal, tangent = sensor[:, _FORCE, None], sensor[:, _NORMAL], sensor[:, _TANGENT]
-        in_world = force[:, 0] * normal + force[:, 1] * tangent + force[:, 2] * np.cross(normal, tangent)
-        block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, in_world)
+        block[f"force_{contact}"] = loads[:, k]
         # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
         gap[touches] = sensor[touches, _DIST]
         speed[touches] = np.hypot(*sensor[touches, _SLIP].T)

@@ -37,7 +37,8 @@ EXCEPTIONS = {
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "explicit")),
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "implicit")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
-    *("mjsim/compiled.py:drive", "mjsim/compiled_free.py:_advance", "mjsim/compiled_free.py:advance"),
+    *("mjsim/compiled.py:drive", "mjsim/stepping.py:drive"),
+    *("mjsim/compiled_free.py:_advance", "mjsim/compiled_free.py:advance"),
     *("mjsim/coulomb/compiled.py:_holds", "mjsim/coulomb/compiled.py:_put_back", "mjsim/corrections.py:corrections"),
     # lists of exact cases, one after the other
     *("compare/bench/contact_law.py:law", "compare/bench/mechanisms.py:_stacks"),

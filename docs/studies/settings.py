@@ -88,13 +88,6 @@ def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
     return states.scored(campaign, _contestants(ways), [*ERRORS, CONTACT])
 
 
-class _Unwatched(ContactSettings):
-    """Settings whose landings are left to the contacts."""
-
-    def slowest_fall(self, g: float) -> float:
-        return math.inf
-
-
 def landings(step: float) -> Rows:
     """What a landing, and motions with one, come to as corrections are taken away: relative errors of omega_c.
 
@@ -107,7 +100,7 @@ def landings(step: float) -> Rows:
         "ours (mujoco)": ContactSettings.at(step),
         "ours, memory off": ContactSettings.at(step, memory=False),
         "ours, servo 0, landings left to the contacts": ContactSettings.at(step, servo=0.0),
-        "ours, landings left to the contacts": _Unwatched(**vars(ContactSettings.at(step))),
+        "ours, landings left to the contacts": states.Unwatched(**vars(ContactSettings.at(step))),
         "ours, memory off, servo 0, order 1, integrator implicit (mujoco-plain)": bare,
         "mujoco-plain, damping ratio 2": replace(bare, solref=(2 * step, 2.0)),
         "mujoco-plain, damping ratio 2, step divided by 10": replace(plain(step / 10), solref=(step / 5, 2.0)),

@@ -24,7 +24,7 @@ from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import newcomer
 from compare.kit.pages import Rows
-from docs.studies import accuracy, confirmation, extrapolation, settings, states, witnesses
+from docs.studies import accuracy, confirmation, extrapolation, gains, settings, states, witnesses
 from docs.studies.states import Entry
 from mjsim import ContactSettings
 from model import InputError
@@ -84,6 +84,7 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "not-confirmed": lambda campaign: witnesses.not_confirmed(campaign.directory.parent),
     "chosen": lambda campaign: witnesses.chosen(campaign.directory.parent),
     "misses": lambda campaign: extrapolation.misses(),
+    "gains": lambda campaign: gains.gains(),
     "landings": lambda campaign: settings.landings(settings.STEP),
     "formulas": lambda campaign: confirmation.table(),
     "reached": accuracy.reached,

@@ -7,6 +7,7 @@ import mjsim
 from docs.studies.states import HITTING, LANDING
 from mjsim import ContactSettings
 from mjsim.classify import PERSISTENCE, Classifier, Contacts
+from mjsim.landing import FINE
 from model import Case, Parameters
 
 P = Parameters.named("reference")
@@ -67,7 +68,7 @@ def test_between_the_bands_a_contact_is_what_it_was() -> None:
 
 @pytest.mark.parametrize("motion", [LANDING, HITTING])
 def test_cases_and_events_come_from_steps_whatever_the_sampling(motion) -> None:
-    """The contacts close first, located to 1e-3 of a step of 1 ms, and stick in the end, to a tenth."""
+    """The contacts close first, located to a fine step, and stick in the end, to a tenth of a step of 1 ms."""
     exact = motion.exact.events
     runs = [
         mjsim.simulate(motion.p, motion.x0, motion.lasts, settings=SETTINGS, sample_interval=interval)
@@ -77,15 +78,16 @@ def test_cases_and_events_come_from_steps_whatever_the_sampling(motion) -> None:
         np.testing.assert_array_equal(run.events.to_case, exact.to_case)
         np.testing.assert_array_equal(run.events.time, runs[0].events.time)
         error = np.abs(run.events.time - exact.time) / SETTINGS.timestep
-        assert error[:-1].max() < 1e-3
+        assert error[:-1].max() < 1 / FINE
         assert error[-1] < 0.1
     for run in runs[1:]:
         np.testing.assert_array_equal(run.case, runs[0].case[np.rint(run.time / 1e-3).astype(int)])
 
 
 def test_a_ball_at_rest_is_not_slipping() -> None:
-    """From rest it rolls on the floor and slips on the wall, then rolls, then slips at both points."""
+    """From rest it rolls on the floor and, once it is pressed there, slips on the wall; then it rolls, then slips."""
     run = mjsim.simulate(P.replace(omega_0=25.0), np.zeros(8), 3.0, settings=SETTINGS, sample_interval=3.0)
-    assert [Case(code).name for code in run.events.to_case] == ["RR", "SS"]
-    assert run.cases[0] is Case.RS
-    assert run.events.time == pytest.approx([0.52631, 1.41356], abs=1e-4)
+    cases = [run.cases[0].name, *(Case(code).name for code in run.events.to_case)]
+    assert set(cases[:-2]) <= {"RS", "RN"}
+    assert cases[-2:] == ["RR", "SS"]
+    assert run.events.time[-2:] == pytest.approx([0.52631, 1.41356], abs=1e-4)

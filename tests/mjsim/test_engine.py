@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, backend, scene, stepping
+from mjsim import ContactSettings, scene, stepping
 from model import Case, Flow, InputError, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
 from model.trajectory import columns
@@ -42,7 +42,7 @@ def test_a_spin_under_which_the_axes_turn_stays_as_large_as_it_is() -> None:
     x0 = [1e3, -p.g / p.c, 100.0, 30.0, 0, 0]
     run = mjsim.simulate(p, x0, 4.0, settings=ContactSettings.for_problem(p, 2e-3))
     spin = np.hypot(run.slip_x + p.R / p.r * run.omega_c, run.slip_z + run.v_y / p.r)
-    np.testing.assert_allclose(spin[10:], spin[10], rtol=1e-9)
+    np.testing.assert_allclose(spin[10:], spin[10], rtol=1e-7)
 
 
 def test_batch_is_the_single_run() -> None:
@@ -149,17 +149,6 @@ def test_a_ball_that_slides_down_the_wall_as_fast_as_drag_lets_it_stays_on_it(st
     assert -p.g / p.c < run.v_y[-1] < -(p.g - p.eta * p.R * p.omega_0**2) / p.c * (1 - math.exp(-p.c * 2.0))
 
 
-def test_a_run_whose_steps_are_divided_for_ever_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The other run of the batch goes on. The bound is lowered to what one landing takes."""
-    monkeypatch.setattr(stepping, "_SHARE", 0)
-    monkeypatch.setattr(stepping, "_MOST", 20)
-    falls = [0.1 * P.R, 0, P.omega_0, 0, 0, 0]
-    lost, sound = mjsim.simulate_many([P, P], [falls, np.zeros(8)], 0.5, settings=ContactSettings.at(1e-3).suited(P))
-    assert "since its steps were divided again and again, after y = " in lost.header.failure
-    assert 0 < len(lost.time) < len(sound.time) == 501
-    assert sound.complete
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -206,6 +195,6 @@ def test_compiled_gives_the_same_run(monkeypatch: pytest.MonkeyPatch, changes: d
         return [run.x for run in (*together, *alone)]
 
     fast = runs()
-    monkeypatch.setattr(backend, "compiled", lambda: None)
+    monkeypatch.setattr(stepping, "driver", lambda: stepping.drive)
     for x, exact in zip(fast, runs(), strict=True):
         np.testing.assert_allclose(x, exact, rtol=0, atol=1e-9)
