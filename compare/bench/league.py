@@ -54,8 +54,8 @@ ENTRY_MARKS, ENTRY_COLOURS = (
 )
 CAPTION = (
     "Errors at the shortest step in units of each case's scales; up to "
-    f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors fall, the median over the "
-    "cases. "
+    f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors fall, the median over "
+    "the cases. "
     "Cost: processor time divided by simulated time at the shortest step, the median. The shortest step is 1 ms, of "
     "MuJoCo on Warp and of Newton's Kamino and VBD 2 ms. A dash: the engine can't express the case, and was not tried."
 )
