@@ -52,7 +52,8 @@ def judge(args: argparse.Namespace) -> int:
     verdicts = validation.judge_stored(args.output, args.claim, args.workers)
     for verdict in verdicts:
         console.print(line(verdict), soft_wrap=True)
-    own = any(check.measurement.set not in sets(Level.FULL) for verdict in verdicts for check in verdict.checks)
+    known = sets(Level.FULL)
+    own = any(check.measurement.set not in known for verdict in verdicts for check in verdict.checks)
     return _finish(verdicts, {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if own else {Outcome.NOT_RUN}, args, console)
 
 
