@@ -54,13 +54,32 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure speed, as ratios within one run.")
     parser.add_argument("--page", type=Path, metavar="FILE", help="write the tables there")
     parser.add_argument("--growth", action="store_true", help="also sweeps of up to 100 000 runs")
+    parser.add_argument("--results", type=Path, metavar="DIR", help="also judge and figures of a validation")
+    parser.add_argument("--only", metavar="NAME", help="one table of costs, start, growth, study")
     args = parser.parse_args()
     measured = {"costs": costs, "start": start_up} | ({"growth": growth} if args.growth else {})
+    if args.results:
+        measured["study"] = functools.partial(study, args.results)
     for name, rows in measured.items():
+        if args.only not in (None, name):
+            continue
         if args.page:
             write(args.page, name, rows())
         else:
             Console().print(pages.table(name, rows()))
+
+
+def study(results: Path) -> Rows:
+    """Processor time and memory of what is made of stored measurements, twice: at first theory may be compiled."""
+    with tempfile.TemporaryDirectory() as directory:
+        asked = {"dualball judge": ["judge", str(results)], "dualball figures": ["figures", "--results", str(results)]}
+        rows = [["", "processor time", "by import mujoco", "memory"]]
+        unit = min(_spent([sys.executable, "-c", "import mujoco"])[0] for _ in range(REPEATS))
+        for name, words in asked.items():
+            more = ["-o", directory] if name == "dualball figures" else []
+            spent, held = min(_spent([sys.executable, "-m", "compare", *words, *more]) for _ in range(2))
+            rows.append([name, f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"])
+    return rows
 
 
 def costs() -> Rows:
