@@ -10,14 +10,14 @@ from numba.extending import register_jitable
 
 from mjsim import compiled, corrections, world_axes
 from mjsim.corrections import Ball
-from mjsim.coulomb import Coulomb
 from mjsim.coulomb import compiled as kernels
 from mjsim.recorder import SENSORS, SLIPS
 from model.arrays import Array
 
-_driven, _spun, _against, _slip, _unwrapped = (
+_outwards, _driven, _spun, _against, _slip, _unwrapped = (
     register_jitable(each)
     for each in (
+        world_axes.outwards,
         world_axes.driven,
         world_axes.spun,
         world_axes.against,
@@ -31,20 +31,22 @@ _A_x, _A_y, _B_x, _B_y = (SLIPS - SENSORS).tolist()
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 @compiled.named_after(corrections, world_axes, kernels)
 def _advance(
-    m: int, d: int, head: int, ball: Any, ahead: float, fluid: Array,
-    qpos: Array, qvel: Array, applied: Array, wall: Array, at: Array, sensors: Array, seen: Array, theta: float,
+    m: int, d: int, head: int, ball: Any, ahead: float, heavy: float, fluid: Array, qpos: Array, qvel: Array,
+    last: Array, applied: Array, wall: Array, at: Array, sensors: Array, seen: Array, theta: float,
 ) -> float:  # fmt: skip
     for number in range(len(fluid)):
         x, y = qpos[0], qpos[1]
-        forces = _driven(qpos, qpos[3:], qvel, fluid[number], ball)
+        forces = _driven(qpos, qpos[3:], qvel, last, ahead, fluid[number], ball)
         for i in range(6):
             applied[i] = forces[i]
         theta = _unwrapped(math.atan2(y, x), theta)
         wall[0], wall[3] = math.cos(theta / 2), math.sin(theta / 2)
         spin = _spun(qpos[3:], qvel)
         slip = _slip(qpos, qvel, spin, ahead, ball)
-        qvel[6], qvel[7] = _against(theta, qvel, spin, ahead, ball.R, ball.r)
-        at[2], qpos[7], qpos[8] = qpos[2], 0.0, 0.0
+        inwards, onwards, up = _against(qpos, qvel, spin, ahead, ball.R, ball.r)
+        qvel[6], qvel[7], qvel[8] = -inwards, onwards, -up
+        applied[6], applied[8] = heavy / ahead * inwards, heavy / ahead * up
+        at[2], qpos[7], qpos[8], qpos[9] = qpos[2], 0.0, 0.0, 0.0
         seen[number, -2], seen[number, -1] = qpos[2] - ball.r, ball.R - math.hypot(x, y)
         kernels.mj_step1(m, d)
         kernels.control_linked(m, d, head)
@@ -57,9 +59,14 @@ def _advance(
 
 
 def advance(
-    law: Coulomb, data: Any, wall: Array, at: Array, ball: Ball, ahead: float, fluid: Array, seen: Array, theta: float
-) -> float:
-    """As `mjsim.free` takes steps, one for each omega_0, with places `ahead` of velocities, and the quaternion and the
-    place of the wall; return the azimuth before the last step."""
-    state = data.qpos, data.qvel, data.qfrc_applied, wall, at, data.sensordata
-    return float(_advance(*law.addresses(data), Ball(*map(float, ball)), ahead, fluid, *state, seen, theta))
+    served: tuple[int, ...], data: Any, wall: Array, at: Array, ball: Ball, ahead: float, fluid: Array, seen: Array,
+    theta: float,
+) -> float:  # fmt: skip
+    """As `mjsim.free` takes steps, one for each omega_0; return the azimuth before the last step.
+
+    `served` is what `Coulomb.addresses` are; places are `ahead` of velocities; `wall` and `at` are the quaternion and
+    the place of the wall.
+    """
+    heavy = float(data.model.dof_M0[6])
+    state = data.qpos, data.qvel, data.qacc_warmstart, data.qfrc_applied, wall, at, data.sensordata
+    return float(_advance(*served, ball, ahead, heavy, fluid, *state, seen, theta))

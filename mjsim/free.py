@@ -25,10 +25,10 @@ from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, followed
 from mjsim.coulomb import Coulomb
-from mjsim.world_axes import against, driven, slip, spun, unwrapped
+from mjsim.world_axes import against, driven, outwards, slip, spun, unwrapped
 from model import Parameters, State
 from model.arrays import Array
-from model.kinematics import Motion, from_world, rotated, to_world
+from model.kinematics import to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -59,10 +59,7 @@ class Free:
 
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
         if row is not None:
-            for k, ball in enumerate(self._balls):
-                x = ball.read()  # coordinates of the joint chain, with the orientation upright
-                joints = recorder.joint_state(x, ball.theta, ball.p)
-                row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = joints
+            row[:, : recorder.SENSORS] = [ball.joints() for ball in self._balls]
         fluid = np.array(list(omega_0))
         seen = np.empty((*fluid.shape, recorder.NSENSOR)) if sensors is None else sensors
         for k, ball in enumerate(self._balls):
@@ -97,7 +94,8 @@ class _Ball:
     def __init__(self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float) -> None:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)
-        self.p, self._ball, self.theta = p, Ball.of(p, settings), theta_0
+        self.p, self.theta = p, theta_0
+        self._ball = Ball(*map(float, Ball.of(p, settings)))
         self.law = Coulomb(self.model, rigid=True) if settings.rigid else None
         self.ahead = settings.timestep / 2 if self.law else 0.0
         self.place(x, theta_0)
@@ -106,6 +104,7 @@ class _Ball:
         self._wall = wall.quat if wall else self.data.mocap_quat[0]
         self._at = wall.pos if wall else np.zeros(3)
         self._reach = settings.touching(p.g)
+        self._served: tuple[int, ...] = ()
 
     def place(self, x: npt.ArrayLike, theta: float) -> None:
         """Begin anew in a state."""
@@ -118,18 +117,25 @@ class _Ball:
         self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:6] = [*now.velocity, *now.spin]
 
-    def read(self) -> State:
-        """The state, with a place that is `ahead` of the velocities; these are along the axes of where the ball was."""
-        qpos, qvel = self.data.qpos, self.data.qvel
-        place, velocity, spin = qpos[:3], qvel[:3], rotated(qpos[3:7], qvel[3:6])
-        azimuth = math.atan2(place[1], place[0])
-        if self.ahead:
-            x, y = place[:2] - self.ahead * velocity[:2]
-            half = (azimuth - math.atan2(y, x)) / 2
-            turn = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
-            velocity, spin = rotated(turn, velocity), rotated(turn, spin)
-        self.unwrap(azimuth)
-        return from_world(Motion(place, velocity, spin), self.p)[0]
+    def joints(self) -> tuple[float, ...]:
+        """Coordinates and velocities of the joint chain, with the orientation upright, as `recorder` has them.
+
+        The place is `ahead` of the velocities; these are along the axes of where the ball was.
+        """
+        place, velocity = self.data.qpos[:3].tolist(), self.data.qvel[:6].tolist()
+        spin, (out_x, out_y) = spun(self.data.qpos[3:7].tolist(), velocity), outwards(place, velocity, self.ahead)
+        self.unwrap(math.atan2(place[1], place[0]))
+        rho, (v_x, v_y, v_z) = math.hypot(place[0], place[1]), velocity[:3]
+        omega_c = (out_x * v_y - out_y * v_x) / rho if rho > 0 else math.nan
+        joints = self.theta, self.p.R - rho, place[2] - self.p.r, 1.0, 0.0, 0.0, 0.0
+        speeds = omega_c, -out_x * v_x - out_y * v_y, v_z
+        return (
+            *joints,
+            *speeds,
+            -out_x * spin[0] - out_y * spin[1],
+            spin[2] - omega_c,
+            out_x * spin[1] - out_y * spin[0],
+        )
 
     def law_state(self) -> dict[str, Array]:
         """What the law of rigid contacts remembers, if there is one."""
@@ -138,9 +144,9 @@ class _Ball:
     def advance(self, fluid: Array, seen: Array) -> None:
         """Take a step for each omega_0; `seen` (steps, `NSENSOR`) takes the sensors and the gaps of A and B, m."""
         if self.law and (loop := loops()):
-            self.theta = loop(
-                self.law, self.data, self._wall, self._at, self._ball, self.ahead, fluid, seen, self.theta
-            )
+            self._served = self._served or self.law.addresses(self.data)
+            given = self._served, self.data, self._wall, self._at, self._ball, self.ahead
+            self.theta = loop(*given, fluid, seen, self.theta)
             return
         for row, omega_0 in zip(seen, fluid.tolist(), strict=False):
             self._step(omega_0, row)
@@ -148,7 +154,8 @@ class _Ball:
     def _step(self, omega_0: float, seen: Array) -> None:
         data, p, gain = self.data, self.p, self._ball.gain
         place, turned, velocity = data.qpos[:3].tolist(), data.qpos[3:7].tolist(), data.qvel[:6].tolist()
-        data.qfrc_applied[:6] = driven(place, turned, velocity, omega_0, self._ball)
+        last = data.qacc_warmstart[:6].tolist()
+        data.qfrc_applied[:6] = driven(place, turned, velocity, last, self.ahead, omega_0, self._ball)
         gaps = place[2] - p.r, p.R - math.hypot(place[0], place[1])
         self.unwrap(math.atan2(place[1], place[0]))
         if self._turns:
@@ -159,8 +166,12 @@ class _Ball:
                     self.model.pair_margin[contact] = followed(self.model.pair_margin[contact], gap, gain)
         if self.law:
             spin = spun(turned, velocity)
-            self._at[2], data.qpos[7:] = place[2], 0.0
-            data.qvel[6:] = against(self.theta, velocity, spin, self.ahead, p.R, p.r)
+            inwards, onwards, up = against(place, velocity, spin, self.ahead, p.R, p.r)
+            self._at[2], data.qpos[7:], data.qvel[6:] = place[2], 0.0, (-inwards, onwards, -up)
+            data.qfrc_applied[[6, 8]] = (
+                self.model.dof_M0[6] / self.ahead * inwards,
+                self.model.dof_M0[8] / self.ahead * up,
+            )
             self.law.step(data)
         else:
             mujoco.mj_step(self.model, data)

@@ -47,7 +47,7 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
         half, (box, slide) = 4 * p.R, (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_SLIDE)
         moving = spec.worldbody.add_body(name="wall")
-        for axis in ([-1, 0, 0], [0, 0, 1]):
+        for axis in ([-1, 0, 0], [0, 1, 0], [0, 0, 1]):  # inwards, onwards, up
             moving.add_joint(type=slide, axis=axis, armature=_HEAVY * p.m)
         rgba = list(wall.rgba)
         spec.delete(wall)

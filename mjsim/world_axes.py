@@ -11,9 +11,19 @@ from typing import Any
 from mjsim.corrections import Ball, resistance
 
 
-def driven(place: Any, turned: Any, velocity: Any, omega_0: float, ball: Ball) -> tuple[float, ...]:
-    """Drag (9) and the torque of the fluid on a free ball, N along the vessel's axes and N m along the ball's."""
-    x, y, v_x, v_y, v_z = place[0], place[1], velocity[0], velocity[1], velocity[2]
+def driven(
+    place: Any, turned: Any, velocity: Any, last: Any, ahead: float, omega_0: float, ball: Ball
+) -> tuple[float, ...]:
+    """Drag (9) and the torque of the fluid on a free ball, N along the vessel's axes and N m along the ball's.
+
+    With velocities `ahead` s before places, and the accelerations of the `last` step, m s-2 and rad s-2, it is that
+    at the middle of the step. What is continued from now and from a step before is not the velocity, which turns fast,
+    but the lag behind the fluid, with the places then: off the chords between those known.
+    """
+    back = 1.5 * ahead * ahead
+    x, y = place[0] - back * last[0], place[1] - back * last[1]
+    v_x, v_y, v_z = velocity[0] + ahead * last[0], velocity[1] + ahead * last[1], velocity[2] + ahead * last[2]
+    o_x, o_y, o_z = velocity[3] + ahead * last[3], velocity[4] + ahead * last[4], velocity[5] + ahead * last[5]
     w, a, b, c = turned[0], turned[1], turned[2], turned[3]
     w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
     mc = resistance(w_x, w_y, v_z, ball)
@@ -22,9 +32,9 @@ def driven(place: Any, turned: Any, velocity: Any, omega_0: float, ball: Ball) -
         -mc * w_x,
         -mc * w_y,
         -mc * v_z,
-        -ball.torque * (velocity[3] - omega_0 * upright[0]),
-        -ball.torque * (velocity[4] - omega_0 * upright[1]),
-        -ball.torque * (velocity[5] - omega_0 * upright[2]),
+        -ball.torque * (o_x - omega_0 * upright[0]),
+        -ball.torque * (o_y - omega_0 * upright[1]),
+        -ball.torque * (o_z - omega_0 * upright[2]),
     )
 
 
@@ -39,24 +49,31 @@ def spun(turned: Any, velocity: Any) -> tuple[float, float, float]:
     )
 
 
-def against(azimuth: float, velocity: Any, spin: Any, ahead: float, R: float, r: float) -> tuple[float, float]:
-    """Velocity of a plane inwards and upwards, m/s, at which what is at rest against it is so against the cylinder
-    `ahead` s later, when velocities are where the place is now.
+def outwards(place: Any, velocity: Any, ahead: float) -> tuple[float, float]:
+    """Direction away from the vessel's axis where the ball is `ahead` s before."""
+    x, y = place[0] - ahead * velocity[0], place[1] - ahead * velocity[1]
+    rho = math.hypot(x, y)
+    return (x / rho, y / rho) if rho > 0 else (0.0, 0.0)
 
-    By then the azimuth has grown by ahead Omega: of the velocity along the wall ahead Omega^2 R will point into it, and
-    where ball and wall touch the turning about the normal will show as ahead Omega r o_n of slip. A plane without that
-    velocity takes h Omega^2/2 of the ball's speed a second.
+
+def against(place: Any, velocity: Any, spin: Any, ahead: float, R: float, r: float) -> tuple[float, float, float]:
+    """Velocity of a plane inwards, onwards and upwards, m/s, at which what is at rest against it is so against the
+    cylinder `ahead` s later, when velocities are where the place is now.
+
+    By then the normal has turned by ahead Omega: of the velocity Omega R along the wall the share ahead Omega will
+    point into the plane, and (ahead Omega)^2/2 will be missing along it; and where ball and wall touch the turning
+    about the normal will show as ahead Omega r o_n of slip. Without the first the ball would lose h Omega^2/2 of its
+    speed a second.
     """
-    out_x, out_y = math.cos(azimuth), math.sin(azimuth)
+    out_x, out_y = outwards(place, velocity, ahead)
     rate = (out_x * velocity[1] - out_y * velocity[0]) / R
-    return ahead * rate * rate * R, -ahead * rate * r * (out_x * spin[0] + out_y * spin[1])
+    turn = ahead * rate
+    return turn * rate * R, -turn * turn / 2 * rate * R, -turn * r * (out_x * spin[0] + out_y * spin[1])
 
 
 def slip(place: Any, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tuple[float, float, float, float]:
     """Velocities along floor (2) and wall (round, up) at the points of contact where the ball is `ahead` s before."""
-    x, y = place[0] - ahead * velocity[0], place[1] - ahead * velocity[1]
-    rho, r = math.hypot(x, y), ball.r
-    out_x, out_y = x / rho, y / rho
+    (out_x, out_y), r = outwards(place, velocity, ahead), ball.r
     return (
         velocity[0] - r * spin[1],
         velocity[1] + r * spin[0],

@@ -111,7 +111,7 @@ class Free(ABC):
                     self.push(scene.force(self.now, position, velocity))
                 for radius in radii:
                     azimuth = math.atan2(position[1], position[0])
-                    inwards, up = against(azimuth, velocity, spin, half, radius - reach, reach)
+                    inwards, _, up = against(position, velocity, spin, half, radius - reach, reach)
                     point, normal = tangent(radius, azimuth)
                     point[2] = position[2]
                     self.turn(point, normal, np.append(inwards * normal[:2], up))

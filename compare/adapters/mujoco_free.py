@@ -77,7 +77,9 @@ class Lawful(Bodies):
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
         wall = self.model.body("wall")
         wall.pos, wall.quat = point, facing(normal)
-        self.data.qpos[-2:], self.data.qvel[-2:] = 0.0, (velocity @ normal, velocity[2])
+        # From the opposite velocity on, so that in the middle of the step, which friction looks at, it has none.
+        self.data.qpos[-2:], self.data.qvel[-2:] = 0.0, (-velocity @ normal, -velocity[2])
+        self.data.qfrc_applied[-2:] = self.model.dof_M0[-2:] * 2 / self.timestep * (velocity @ normal, velocity[2])
 
 
 def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:

@@ -274,9 +274,9 @@ contacts have their forces in the axes of bodies; whether forces are still to be
 MOMENT, LASTED, LEAST, CALLED = range(38, 42)
 """Time and time step of the step under way, s; distance by which contacts must move for points to be put back, m; time
 of the last call, s."""
-RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED = range(42, 53)
+RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED, FAST = range(42, 54)
 """The numbers of a `law.Law`, in its order."""
-HEAD = 53
+HEAD = 54
 INDEX, FIRST, LENGTH, AT = range(4)
 """Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
 SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
@@ -352,6 +352,8 @@ def control(m: int, d: int, head: int) -> None:
     start = _array(d, START)
     for i in range(_number(m, DOFS)):
         start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
+    if known and over:
+        _go_along(m, d, head)
     still = known and _still(m, d, head)
     if still:
         rows = _block(head, ROWS)
@@ -381,7 +383,9 @@ def control(m: int, d: int, head: int) -> None:
     if _foresee(m, d, head, enough):
         mj_fwdActuation(m, d)
         mj_fwdAcceleration(m, d)
-        last = math.inf
+        kept, last = _block(head, KEPT), math.inf
+        for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
+            kept[W * i + law.GUESS] = -1.0
         for _ in range(numbers[MOST]):
             _refer(m, d, head)
             mj_fwdConstraint(m, d)
@@ -394,6 +398,8 @@ def control(m: int, d: int, head: int) -> None:
             if worst <= 1e-6 * enough or (worst <= enough and (not numbers[RIGID] or worst > 0.1 * last)):
                 break
             last = worst
+    elif numbers[RIGID]:
+        _slide_on(m, d, head)
     _refer(m, d, head)
     counts[PENDING] = 1
 
@@ -663,6 +669,7 @@ def _hand_on(m: int, d: int, head: int) -> float:
         kept[k + law.BORE] = max(kept[k + law.BORE], before[b + law.BORE])
         reach = numbers[FIXED] * max(bound[int(before[b])], bound[int(before[b + 1])])
         fixed = alone and least <= 2 * reach**2
+        kept[k + law.MISS] = before[b + law.MISS] if alone else 0.0
         for j in range(3):  # a contact that wanders over its bodies, or is made of several, has none
             kept[k + law.SPEED + j] = before[b + law.SPEED + j] if fixed else math.inf
         for j in range(5):
@@ -718,6 +725,20 @@ def _rotated(a: Any, turn: Any) -> Any:
 
 
 @compiled
+def _go_along(m: int, d: int, head: int) -> None:
+    """Accelerations of free bodies, in the axes that these had, become those in the axes that they have now."""
+    counts, h, speeds = _int64(head), _value(m, STEP), _array(d, QVEL)
+    free = _int64(counts[FREE])
+    for i in range(counts[COUNT_FREE]):
+        a = free[2 * i + 1] + 3
+        back = -h * speeds[a], -h * speeds[a + 1], -h * speeds[a + 2]
+        for accelerations in (_array(d, QACC), _array(d, START)):
+            turned = _rotated((accelerations[a], accelerations[a + 1], accelerations[a + 2]), back)
+            for j in range(3):
+                accelerations[a + j] = turned[j]
+
+
+@compiled
 def _gyrate(m: int, d: int, head: int, known: bool, over: bool) -> None:
     """Gyroscopic forces on free bodies by the implicit midpoint rule, under the moments of the step before.
 
@@ -754,7 +775,10 @@ def _gyrate(m: int, d: int, head: int, known: bool, over: bool) -> None:
             size = _dot(turn, turn)
             change = _sum(_sum(_cross(half, turn), 0.5, pushed), -size, momentum)
             change = _sum((0.0, 0.0, 0.0), 1 / (1 + size), _sum(change, _dot(turn, half), turn))
-            middle = _sum(spin, 1 / volume, (_dot(one, change), _dot(two, change), _dot(three, change)))
+            last, middle = middle, _sum(spin, 1 / volume, (_dot(one, change), _dot(two, change), _dot(three, change)))
+            moved = _sum(middle, -1.0, last)
+            if _dot(moved, moved) <= 1e-32 * _dot(middle, middle):  # soon of a body that is round
+                break
         change = _sum(change, 1.0, _sum(change, -1.0, pushed))
         coasts, after = _sum(momentum, 1.0, change), _sum(middle, 1.0, _sum(middle, -1.0, spin))
         across = _cross(after, arm)
@@ -923,7 +947,7 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
         edges = length > 1 and not elliptic
         normal = (rows[r + RESIDUAL] + rows[r + ROW + RESIDUAL]) / 2 if edges else rows[r + RESIDUAL]
         error = kept[k + law.ERROR] > enough
-        kept[k + law.SLIP] = slip
+        kept[k + law.SLIP], kept[k + law.GUESS] = slip, -1.0
         if state == law.NEW or state == law.OPEN:
             doubt |= normal < 0 and (rigid or slip > enough)
             continue
@@ -938,10 +962,40 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
             kept[k + law.SLIP] = 0.0
             doubt |= slip > enough and not _holds(rows, r, length, edges, axes, 24 * i + 18, diagonal)
         else:
+            kept[k + law.GUESS], kept[k + law.SLIP] = slip, max(slip + kept[k + law.MISS], 0.0)
             doubt |= error
         # the force of a rigid contact will change by a weight
         doubt |= rigid and (abs(normal) > gravity or (kept[k + law.SLIP] == 0 and slip > gravity))
     return doubt
+
+
+@compiled
+def _slide_on(m: int, d: int, head: int) -> None:
+    """Friction of what slides on opposes its slip in the middle of the step, see `Law.fast`."""
+    counts, elliptic, h = _int64(head), _elliptic(m), _value(m, STEP)
+    kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
+    velocity = _array(d, VEL)
+    for i in range(counts[COUNT]):
+        k, a, r, length = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT], places[4 * i + LENGTH]
+        if kept[k + law.STATE] != law.SLIDES or kept[k + law.SLIP] == 0:
+            continue
+        edges, mu, speed, change = length > 1 and not elliptic, 24 * i + 18, 0.0, 0.0
+        for t in range(length // 2 if edges else length - 1):
+            e, own = (2 * t, 0.5) if edges else (t + 1, axes[mu + t])
+            slip, rate = velocity[a + e], rows[r + ROW * e + RESIDUAL] + rows[r + ROW * e + REFERENCE]
+            if edges:
+                slip -= velocity[a + e + 1]
+                rate -= rows[r + ROW * (e + 1) + RESIDUAL] + rows[r + ROW * (e + 1) + REFERENCE]
+            speed, change = speed + (own * slip) ** 2, change + (own * rate) ** 2
+        if speed <= (_real(head)[FAST] * h) ** 2 * change:
+            continue
+        normal = (velocity[a] + velocity[a + 1]) / 2 if edges else 0.0
+        for e in range(0 if edges else 1, length):
+            more = (velocity[a + e] - normal) / h
+            rows[r + ROW * e + REFERENCE] -= more
+            rows[r + ROW * e + RESIDUAL] += more
+        kept[k + law.GUESS] = _slip(rows, r, length, elliptic, axes, mu)
+        kept[k + law.SLIP] = max(kept[k + law.GUESS] + kept[k + law.MISS], 0.0)
 
 
 @compiled
@@ -999,6 +1053,8 @@ def _weigh(m: int, d: int, head: int) -> float:
         for e in range(r, r + ROW * length if rigid else r, ROW):
             error = max(error, abs(rows[e + SOFT] * (rows[e + FOUND] - rows[e + MEMORY])))
         kept[k + law.STATE], kept[k + law.ERROR], kept[k + law.SEEN] = state, error, slip
+        guessed = rigid and state == law.SLIDES and kept[k + law.GUESS] >= 0
+        kept[k + law.MISS] = slip - kept[k + law.GUESS] if guessed else 0.0
         most = max(most, error)
     first = ROW * counts[COUNT_ROWS]
     for r in range(first, first + ROW * counts[COUNT_DRY], ROW):

@@ -124,6 +124,11 @@ class Simulation:
         self._called, self._data = data.time, data
         start, poses = data.qacc_warmstart, _poses(data)
         start[abs(start) < numbers.calm] = 0.0
+        if known and over and len(self._free):  # accelerations of free bodies are in their axes, which have turned
+            turning = self._free[:, 1:] + (3, 4, 5)
+            back = -model.opt.timestep * data.qvel[turning]
+            for accelerations in (data.qacc, start):
+                accelerations[turning] = _rotated(accelerations[turning], back)
         still = known and self._still(data, poses)
         if still:
             if over:
@@ -152,10 +157,11 @@ class Simulation:
             self._turn_rows(data, since)
         self._hold()
         enough = numbers.share * _gravity(model)
-        if self._foresee(model, data, acceleration - self._reference, enough):
+        residual = acceleration - self._reference
+        if self._foresee(model, data, residual, enough):
             mujoco.mj_fwdActuation(model, data)
             mujoco.mj_fwdAcceleration(model, data)
-            last = math.inf
+            last, self._kept[law.GUESS] = math.inf, -1.0  # what a blow does says nothing of the next step
             for _ in range(numbers.most):
                 self._refer(data)
                 mujoco.mj_fwdConstraint(model, data)
@@ -166,6 +172,8 @@ class Simulation:
                 if worst <= 1e-6 * enough or (worst <= enough and (not numbers.rigid or worst > 0.1 * last)):
                     break
                 last = worst
+        elif numbers.rigid:
+            self._slide_on(model, data, residual, acceleration)
         self._refer(data)
 
     # -- contacts and their rows ---------------------------------------------------------------------------------------
@@ -255,6 +263,7 @@ class Simulation:
                 np.diff(first, append=len(best)) == 1
             )  # one that wanders over its bodies, or is made of several, isn't
             kept[law.SPEED :, to] = np.where(fixed, before[law.SPEED :, old[first]], math.inf)
+            kept[law.MISS, to] = np.where(np.diff(first, append=len(best)) == 1, before[law.MISS, old[first]], 0.0)
             moved = math.sqrt(max(square[best].max() / 2, 0.0)) if len(to) < len(best) else 0.0
         load, friction = carried[: law.FORCE - law.LOAD].T, carried[law.FORCE - law.LOAD :].T.reshape(-1, 6, 2)
         along = (self._turn.swapaxes(1, 2) @ friction).ravel()[self._place] / 2
@@ -448,13 +457,36 @@ class Simulation:
             new, closing = state <= law.OPEN, self._normal(residual) < 0
             stops |= (state == law.SLIDES) & (self._ahead(residual) >= 0)
             doubt = bool(np.where(new, closing & (rigid | much), ~stops & (kept[law.ERROR] > enough)).any())
-        kept[law.SLIP] = slip * ~stops
+        kept[law.GUESS] = np.where((state > law.OPEN) & ~stops, slip, -1.0)
+        guessed = kept[law.GUESS] >= 0
+        kept[law.SLIP] = np.where(guessed, np.maximum(slip + kept[law.MISS], 0.0), slip * ~stops)
         if not doubt and much.any():
             doubt = bool((much & stops & ~self._holds(data, residual)).any())
         if not doubt and rigid:  # forces will change by a weight
             most = np.maximum(abs(self._normal(residual)), slip * stops)
             doubt = bool(((most > _gravity(model)) & (state > law.OPEN)).any())
         return doubt
+
+    def _slide_on(self, model: Any, data: Any, residual: Array, acceleration: Array) -> None:
+        """Friction of what slides on opposes its slip in the middle of the step, see `Law.fast`."""
+        kept, h, velocity = self._kept, model.opt.timestep, data.efc_vel[self._rows]
+        speed, change = (self._sizes(values) for values in (velocity, acceleration))
+        fast = (kept[law.STATE] == law.SLIDES) & (kept[law.SLIP] > 0) & (speed > self._law.fast * h * change)
+        if fast.any():
+            slip = velocity.copy()
+            slip[self._normals] -= self._normal(velocity)[self._normals_of]
+            more = np.zeros(len(self._rows))
+            more[self._counts[0] :] = (slip[self._counts[0] :] / h) * fast[self._of]
+            self._reference = self._reference - more
+            kept[law.GUESS, fast] = self._slip(residual + more)[fast]
+            kept[law.SLIP, fast] = np.maximum(kept[law.GUESS, fast] + kept[law.MISS, fast], 0.0)
+
+    def _sizes(self, values: Array) -> Array:
+        """Of each contact, what its rows have along all directions of friction, times its coefficients."""
+        if self._elliptic:
+            return self._slip(values)
+        apart = np.where(self._length > 1, 1.0, 0.0)[self._of] * (values - values[self._other])[self._counts[0] :]
+        return np.sqrt(np.add.reduceat(apart**2, self._first - self._counts[0]))
 
     def _ahead(self, residual: Array) -> Array:
         """Power of friction against slip: positive of contacts that stop."""
@@ -496,6 +528,8 @@ class Simulation:
             # the slip of open contacts matters if without it they would have closed
             kept[law.ERROR] = np.where(apart, 0.0, abs(kept[law.SEEN] - kept[law.SLIP]))
         if self._law.rigid:
+            guessed = (kept[law.STATE] == law.SLIDES) & (kept[law.GUESS] >= 0)
+            kept[law.MISS] = np.where(guessed, kept[law.SEEN] - kept[law.GUESS], 0.0)
             missed = np.maximum.reduceat(abs(self._soft * (forces - self._memory)), self._first)
             np.maximum(kept[law.ERROR], missed, out=kept[law.ERROR])
         if dry:

@@ -11,13 +11,14 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-GEOMS, PLACE, NORMAL, GAP, LIFT, BORE, STATE, ERROR, SLIP, SEEN, LOAD, FORCE, SPEED, WIDTH = (
-    0, 2, 8, 11, 12, 13, 14, 15, 16, 17, 18, 23, 35, 38
+GEOMS, PLACE, NORMAL, GAP, LIFT, BORE, STATE, ERROR, SLIP, SEEN, GUESS, MISS, LOAD, FORCE, SPEED, WIDTH = (
+    0, 2, 8, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 25, 37, 40
 )  # fmt: skip
 """Where in the row of a contact stand: its geoms (2); its place on both, in their axes (6), m; its normal in the axes
 of the first (3); its gap, m; the distance that a servo holds, m; what a rigid one bore in the step before the last, N;
 whether it was open, stuck or slid; by how much its slip was not foreseen, m s-2; its slip as foreseen and as found,
-times the coefficient of friction, m s-2; what its normal, or each pair of a pyramid's edges, bears (5), N; force and
+times the coefficient of friction, m s-2; of one that slides that from velocities and the accelerations of the step
+before alone, and what that misses, m s-2; what its normal, or each pair of a pyramid's edges, bears (5), N; force and
 moment of friction in the axes of both geoms (geom; axis; force, moment; 12), N and N m; the velocity that its last
 Jacobian gives to the present speeds, in world axes (3), m s-1."""
 NEW, OPEN, STICKS, SLIDES = range(4)
@@ -61,6 +62,9 @@ class Law:
     """Share of the larger radius up to which two points of contact count as one."""
     fixed: float = 1e-4
     """Share of the larger radius up to which a contact that has moved on its bodies is fixed on them."""
+    fast: float = 3.0
+    """Slip of a rigid contact, in units of its change in a step, above which it slides on: friction opposes its slip in
+    the middle of the step, else that at the end, which may be none."""
 
 
 def free_bodies(model: Any) -> npt.NDArray[np.int64]:

@@ -25,7 +25,7 @@ def omega_c(p, settings, lasts=10.0):
     return run.x[-1, 2] / known.state.omega_c, run
 
 
-@pytest.mark.parametrize(("omega_0", "order", "off"), [(12.0, 2.0, 2e-5), (25.0, 1.0, 1e-4)])
+@pytest.mark.parametrize(("omega_0", "order", "off"), [(12.0, 3.0, 1e-6), (25.0, 2.0, 1e-6)])
 def test_stationary_states_are_right_in_the_limit(omega_0, order, off) -> None:
     p = P.replace(omega_0=omega_0)
     coarse, middle, fine = (omega_c(p, rigid(step), 40.0)[0] - 1 for step in STEPS)
@@ -56,7 +56,7 @@ def test_rolling_shows_next_to_no_slip() -> None:
 
 
 def test_what_a_step_foresees_of_slip_is_the_number_of_the_law() -> None:
-    assert Law.share == FORESEEN
+    assert pytest.approx(FORESEEN) == Law.share / 5
 
 
 def test_compiled_steps_are_those_in_python(monkeypatch) -> None:

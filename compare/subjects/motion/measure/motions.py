@@ -324,7 +324,7 @@ def _landed(lab: Lab, landing: TrialResult) -> Iterator[Measurement | Missing]:
     changed = [VARIABLES.index(name) for name in LANDED]
     change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
     # The contact closes at a whole step, up to one late; until then weight and friction differ.
-    late = coarse_step(p) / REFINED / time_unit(p) / 2
+    late = coarse_step(p) / REFINED / lab.refine / time_unit(p) / 2
     for quantity, k in zip(LANDED, changed, strict=True):
         value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
         yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))
