@@ -2,7 +2,7 @@
 
 matplotlib draws the figure, once. What bears a label is written as a series of that name, and axes say how a place in
 the picture becomes a value; `templates/figure.js` reads both. Where no script runs, the picture is there all the same.
-Plotly or Bokeh would need a second description of each figure, and 1 to 5 MB a page; the library here, Panzoom, is 10 kB.
+Plotly or Bokeh would need a second description of each figure, and 1 to 5 MB a page; Panzoom, the library, has 10 kB.
 A label that begins with an underscore names a series that no legend lists, as is matplotlib's rule.
 """
 
