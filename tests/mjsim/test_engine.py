@@ -77,7 +77,7 @@ RIGID = ContactSettings(coordinates="free", law="rigid", servo=0.0, memory=False
 def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> None:
     """Also of a run that breaks down, beside others; progress is that of all of them."""
     sets = [P.replace(omega_0=omega_0) for omega_0 in (5.0, 12.0, 25.0, 40.0, 60.0)]
-    x0s, told = [[0.0, 0, 10.0, 0, 0, 0]] * 4 + [[0, 0, 1e9, 0, 0, 0]], []
+    x0s, told = [[0.0, 0, 10.0, 0, 0, 0]] * 4 + [[0, 0, 1e11, 0, 0, 0]], []
     one, *others = (
         mjsim.simulate_many(sets, x0s, 0.1, settings=settings, sample_interval=0.01, threads=n, progress=told.append)
         for n in (1, 2, 3, 1000)
