@@ -1054,7 +1054,7 @@ def _weigh(m: int, d: int, head: int) -> float:
             error = max(error, abs(rows[e + SOFT] * (rows[e + FOUND] - rows[e + MEMORY])))
         kept[k + law.STATE], kept[k + law.ERROR], kept[k + law.SEEN] = state, error, slip
         guessed = rigid and state == law.SLIDES and kept[k + law.GUESS] >= 0
-        kept[k + law.MISS] = slip - kept[k + law.GUESS] if guessed else 0.0
+        kept[k + law.MISS] = (kept[k + law.MISS] + slip - kept[k + law.GUESS]) / 2 if guessed else 0.0
         most = max(most, error)
     first = ROW * counts[COUNT_ROWS]
     for r in range(first, first + ROW * counts[COUNT_DRY], ROW):

@@ -529,7 +529,7 @@ class Simulation:
             kept[law.ERROR] = np.where(apart, 0.0, abs(kept[law.SEEN] - kept[law.SLIP]))
         if self._law.rigid:
             guessed = (kept[law.STATE] == law.SLIDES) & (kept[law.GUESS] >= 0)
-            kept[law.MISS] = np.where(guessed, kept[law.SEEN] - kept[law.GUESS], 0.0)
+            kept[law.MISS] = np.where(guessed, (kept[law.MISS] + kept[law.SEEN] - kept[law.GUESS]) / 2, 0.0)
             missed = np.maximum.reduceat(abs(self._soft * (forces - self._memory)), self._first)
             np.maximum(kept[law.ERROR], missed, out=kept[law.ERROR])
         if dry:
