@@ -15,12 +15,12 @@ GEOMS, PLACE, NORMAL, GAP, LIFT, BORE, STATE, ERROR, SLIP, SEEN, GUESS, MISS, LO
     0, 2, 8, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 25, 37, 40
 )  # fmt: skip
 """Where in the row of a contact stand: its geoms (2); its place on both, in their axes (6), m; its normal in the axes
-of the first (3); its gap, m; the distance that a servo holds, m; what a rigid one bore in the step before the last, N;
-whether it was open, stuck or slid; by how much its slip was not foreseen, m s-2; its slip as foreseen and as found,
-times the coefficient of friction, m s-2; of one that slides that from velocities and the accelerations of the step
-before alone, and what is added, the mean of what was and of what that missed, m s-2; what its normal, or each pair of a pyramid's edges, bears (5), N; force and
-moment of friction in the axes of both geoms (geom; axis; force, moment; 12), N and N m; the velocity that its last
-Jacobian gives to the present speeds, in world axes (3), m s-1."""
+of the first (3); its gap, m; the distance that a servo holds, m; what a rigid one bore in the step before the last,
+N; whether it was open, stuck or slid; by how much its slip was not foreseen, m s-2; its slip as foreseen and as
+found, times the coefficient of friction, m s-2; of one that slides that from velocities and the accelerations of the
+step before alone, and what is added, the mean of what was and of what that missed, m s-2; what its normal, or each
+pair of a pyramid's edges, bears (5), N; force and moment of friction in the axes of both geoms (geom; axis; force,
+moment; 12), N and N m; the velocity that its last Jacobian gives to the present speeds, in world axes (3), m s-1."""
 NEW, OPEN, STICKS, SLIDES = range(4)
 
 UNMOVED = 1e-6
