@@ -54,7 +54,7 @@ class Free:
         x0s: Sequence[npt.ArrayLike],
         theta_0: float,
     ) -> None:
-        self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
+        self._balls = [FreeBall(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
         self.margins = np.zeros((2, len(models)))
 
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
@@ -90,7 +90,9 @@ class Free:
                 ball.law.restore({name: state[f"{name}_{k}"] for name in ball.law_state()})
 
 
-class _Ball:
+class FreeBall:
+    """One of them, with an engine of its own."""
+
     def __init__(self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float) -> None:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)

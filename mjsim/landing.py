@@ -13,7 +13,7 @@ import numpy as np
 
 from mjsim import recorder, scene
 from mjsim.contact_settings import ContactSettings
-from mjsim.free import _Ball as Ball
+from mjsim.free import FreeBall
 from mjsim.world_axes import unwrapped
 from model import Parameters, State
 from model.arrays import Array
@@ -54,7 +54,7 @@ class Fine:
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
         self._p, self._step = p, settings.timestep / FINE
         rigid = ContactSettings.rigid_at(self._step)
-        self._ball = Ball(scene.build(p, rigid)[0], p, State(), rigid, 0.0)
+        self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0)
         self._slow = settings.slowest_fall(p.g) * self._step
         """What a gap loses in a fine step in which the contact closes with a blow, m."""
 

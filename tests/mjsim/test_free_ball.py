@@ -72,7 +72,7 @@ def test_wrong_settings_lose_the_state(monkeypatch, wrong) -> None:
     p, settings = P.replace(omega_0=12.0), rigid(5e-4)
     if wrong == "wall":
         monkeypatch.setattr(free, "loops", lambda: None)
-        monkeypatch.setattr(free._Ball, "unwrap", lambda ball, azimuth: None)
+        monkeypatch.setattr(free.FreeBall, "unwrap", lambda ball, azimuth: None)
     else:
         settings = replace(settings, law="soft")
     assert abs(omega_c(p, settings, 1.0 if wrong == "wall" else 10.0)[0] - 1) > 0.05
