@@ -39,9 +39,13 @@ def verdicts(results: Path) -> list[Verdict]:
 
 
 def counted(results: Path) -> Rows:
-    """How many claims each witness was asked, and how they came out, with its deviations at a step of 2 ms."""
+    """How many claims each witness was asked, and how they came out, with its deviations at a step of 2 ms.
+
+    `mujoco-coulomb`, which measures by itself, has a directory of its own below, as `make mutants` leaves it.
+    """
     said = verdicts(results)
     told, formal = wording.witnesses(said), str(sum(bool(verdict.claim.algebra) for verdict in said))
+    told += wording.witnesses(verdicts(results / "coulomb"))
     head = ["witness", "asked", "confirmed", "to", "refuted", "undecided", "typical deviation", "worst"]
     for row in told:
         expected = sum(row["refuted"].values())
