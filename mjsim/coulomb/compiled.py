@@ -381,27 +381,34 @@ def control(m: int, d: int, head: int) -> None:
     _hold(m, d, head)
     enough = numbers[SHARE] * _gravity(m)
     if _foresee(m, d, head, enough):
-        mj_fwdActuation(m, d)
-        mj_fwdAcceleration(m, d)
-        kept, last = _block(head, KEPT), math.inf
-        for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
-            kept[W * i + law.GUESS] = -1.0
-        for _ in range(numbers[MOST]):
-            _refer(m, d, head)
-            mj_fwdConstraint(m, d)
-            counts[SOLVES] += 1
-            qacc = _array(d, QACC)
-            for i in range(_number(m, DOFS)):
-                start[i] = qacc[i]
-            worst = _weigh(m, d, head)
-            _take_over(m, d, head)
-            if worst <= 1e-6 * enough or (worst <= enough and (not numbers[RIGID] or worst > 0.1 * last)):
-                break
-            last = worst
+        _solve(m, d, head, enough)
     elif numbers[RIGID]:
         _slide_on(m, d, head)
     _refer(m, d, head)
     counts[PENDING] = 1
+
+
+@compiled
+def _solve(m: int, d: int, head: int, enough: float) -> None:
+    """Solve the step until slip is as foreseen, to `enough`, m s-2."""
+    counts, numbers = _int64(head), _real(head)
+    kept, start, last = _block(head, KEPT), _array(d, START), math.inf
+    mj_fwdActuation(m, d)
+    mj_fwdAcceleration(m, d)
+    for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
+        kept[W * i + law.GUESS] = -1.0
+    for _ in range(numbers[MOST]):
+        _refer(m, d, head)
+        mj_fwdConstraint(m, d)
+        counts[SOLVES] += 1
+        qacc = _array(d, QACC)
+        for i in range(_number(m, DOFS)):
+            start[i] = qacc[i]
+        worst = _weigh(m, d, head)
+        _take_over(m, d, head)
+        if worst <= 1e-6 * enough or (worst <= enough and (not numbers[RIGID] or worst > 0.1 * last)):
+            break
+        last = worst
 
 
 @compiled

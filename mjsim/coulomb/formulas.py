@@ -159,22 +159,26 @@ class Simulation:
         enough = numbers.share * _gravity(model)
         residual = acceleration - self._reference
         if self._foresee(model, data, residual, enough):
-            mujoco.mj_fwdActuation(model, data)
-            mujoco.mj_fwdAcceleration(model, data)
-            last, self._kept[law.GUESS] = math.inf, -1.0  # what a blow does says nothing of the next step
-            for _ in range(numbers.most):
-                self._refer(data)
-                mujoco.mj_fwdConstraint(model, data)
-                start[:] = data.qacc
-                self._weigh(data)
-                self._take_over()
-                worst = self._kept[law.ERROR].max(initial=0.0)
-                if worst <= 1e-6 * enough or (worst <= enough and (not numbers.rigid or worst > 0.1 * last)):
-                    break
-                last = worst
+            self._solve(model, data, enough)
         elif numbers.rigid:
             self._slide_on(model, data, residual, acceleration)
         self._refer(data)
+
+    def _solve(self, model: Any, data: Any, enough: float) -> None:
+        """Solve the step until slip is as foreseen, to `enough`, m s-2."""
+        mujoco.mj_fwdActuation(model, data)
+        mujoco.mj_fwdAcceleration(model, data)
+        last, self._kept[law.GUESS] = math.inf, -1.0  # what a blow does says nothing of the next step
+        for _ in range(self._law.most):
+            self._refer(data)
+            mujoco.mj_fwdConstraint(model, data)
+            data.qacc_warmstart[:] = data.qacc
+            self._weigh(data)
+            self._take_over()
+            worst = self._kept[law.ERROR].max(initial=0.0)
+            if worst <= 1e-6 * enough or (worst <= enough and (not self._law.rigid or worst > 0.1 * last)):
+                break
+            last = worst
 
     # -- contacts and their rows ---------------------------------------------------------------------------------------
 
