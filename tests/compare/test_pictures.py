@@ -94,6 +94,7 @@ def test_the_league_page_answers(browser: Any, tmp_path: Path) -> None:
     page.goto((tmp_path / LEAGUE_PAGE).as_uri())
     figure = page.locator("figure.plot")
     figure.scroll_into_view_if_needed()
+    figure.locator(".series label").first.wait_for()  # a figure answers from when it is first seen
     names = figure.locator(".series label").all_inner_texts()
     assert names == ["event", "time-stepping"]
     mark = figure.locator('[data-series="time-stepping"] use').first
