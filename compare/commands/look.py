@@ -75,4 +75,4 @@ def explore(args: argparse.Namespace) -> int:
     from compare.view import explore as served  # here, because nothing else needs it
 
     served.serve(options.parameters(args), args.port, not args.no_browser)
-    return 0
+    raise KeyboardInterrupt  # it ends by a signal alone, which the server's loop keeps to itself now and then
