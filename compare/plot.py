@@ -59,6 +59,8 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
     `run`: what `simulate` returns, or a file that xarray has opened. A component of a force is named as in
     `Trajectory.to_pandas`, ``force_Ay``. Raises `InputError` for an unknown name, or for quantities of different units.
     """
+    if not hasattr(run, "force_A"):
+        raise InputError("the run must be as its file is: open it without engine='dualball', which makes a table of it")
     names, about = names or ("omega_c",), columns(Trajectory)
     known = [name for name in COMPONENTS if name not in ("time", "case")]
     check_names(names, known, "quantity of a motion")

@@ -162,6 +162,10 @@ class Trajectory:
         schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
         return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 
+    def table(self) -> dict[str, Array]:
+        """Everything that a sample holds, number by number: forces split along `AXES` (force_Ax …), each shape (n,)."""
+        return {name: component(self, name) for name in COMPONENTS} | {"omega_0": self.omega_0}
+
     def to_pandas(self) -> pandas.DataFrame:
         """The samples as a pandas table, one row each, with the time in s as its index.
 
@@ -173,7 +177,7 @@ class Trajectory:
             import pandas  # here, because it is optional and takes a second to load
         except ImportError as error:
             raise InputError("to_pandas() needs pandas: pip install pandas") from error
-        table: dict[str, Any] = {name: component(self, name) for name in COMPONENTS} | {"omega_0": self.omega_0}
+        table: dict[str, Any] = self.table()
         table["case"] = pandas.Categorical.from_codes(self.case, [case.name for case in Case])
         found = pandas.DataFrame(table).set_index("time")
         found.attrs = self.header.attributes()

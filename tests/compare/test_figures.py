@@ -308,4 +308,6 @@ def test_functions_that_draw_into_axes():
     ):
         with pytest.raises(InputError, match=said):
             plot.motion(run, *names, axes=mine)
+    with pytest.raises(InputError, match="makes a table of it"):
+        plot.motion(run.to_xarray().drop_dims("axis"))
     assert len(mine.get_lines()) == 2

@@ -1,14 +1,18 @@
 """A run comes back from its file as it was, and a file that was damaged, cut or is foreign is refused by name."""
 
 import dataclasses
+import io
 import json
 import os
 import subprocess
 import sys
+import tomllib
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import h5py
 import numpy as np
+import pandas
 import pytest
 import xarray
 
@@ -120,6 +124,30 @@ def test_a_table_for_pandas_has_a_row_for_each_sample(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(InputError, match="pip install pandas"):
         trajectory.to_pandas()
+
+
+def test_xarray_reads_a_table_with_a_row_for_each_sample(tmp_path):
+    """By the entry point, which it looks up where dualball is installed."""
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    backend = EntryPoint("dualball", project["entry-points"]["xarray.backends"]["dualball"], "").load()
+    trajectory = make(50, 2)
+    storage.save(trajectory, tmp_path / "run.h5")
+    storage.save_batch({"KEY": trajectory}, tmp_path / "batch.h5")
+    (tmp_path / "text.h5").write_text("time,omega_c")
+    for path in ("run.h5", "batch.h5/KEY"):
+        with xarray.open_dataset(tmp_path / path, engine=backend) as run:
+            table, expected = run.to_dataframe(), trajectory.to_pandas()
+            assert run.force_Ay.units == "N"
+            assert run.attrs["mu"] == trajectory.header.parameters.mu
+            run.to_netcdf(tmp_path / "copy.nc")
+        pandas.testing.assert_frame_equal(table, expected.astype({"case": table.case.dtype})[table.columns])
+    with xarray.open_dataset(tmp_path / "run.h5", engine=backend, drop_variables="theta") as run:
+        assert "theta" not in run
+    for path, message in (("text.h5", "text.h5"), ("none.h5", "none.h5"), ("batch.h5", "name one of them")):
+        with pytest.raises(StorageError, match=message):
+            xarray.open_dataset(tmp_path / path, engine=backend)
+    with pytest.raises(InputError, match="by its name, not a BytesIO"):
+        xarray.open_dataset(io.BytesIO(), engine=backend)
 
 
 def test_chunks_arrive_while_the_run_goes_on(tmp_path):

@@ -1,0 +1,44 @@
+"""What xarray reads a run with for ``engine="dualball"``: an entry point in pyproject.toml leads it here."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import xarray
+from xarray.backends import BackendEntrypoint
+
+from model.cases import Case
+from model.errors import InputError
+from model.trajectory import COMPONENTS, FLUID, Trajectory, attributes, columns
+
+
+class RunBackend(BackendEntrypoint):
+    """A run, or one of a batch as ``FILE/KEY``, as columns along the time alone: its table has one row a sample."""
+
+    description = "Runs of dualball, one row a sample"
+    open_dataset_parameters = ("filename_or_obj", "drop_variables")
+
+    def open_dataset(
+        self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
+    ) -> xarray.Dataset:
+        """The columns of `Trajectory.table` over the time, cases by name; not the events, which have another time.
+
+        Raises `StorageError`, in one line, for a file that isn't a run or is damaged.
+        """
+        from model import storage  # here, because xarray loads this module whatever it is to open
+
+        if not isinstance(filename_or_obj, str | os.PathLike):
+            raise InputError(f"engine='dualball' opens a file by its name, not a {type(filename_or_obj).__name__}")
+        run, about = storage.load(Path(filename_or_obj)), columns(Trajectory)
+        metas = {name: about[column] for name, (column, _) in COMPONENTS.items()} | {"omega_0": FLUID}
+        found = xarray.Dataset(
+            {name: ("time", values, attributes(metas[name])) for name, values in run.table().items()},
+            attrs=run.header.attributes(),
+        )
+        names = [Case(code).name for code in run.case]
+        return found.assign(case=("time", names, {"long_name": about["case"]["long_name"]})).drop_vars(
+            drop_variables or (), errors="ignore"
+        )
