@@ -97,8 +97,6 @@ class AtRest:
     model: Any
     data: Any
     contacts: Contacts
-    rows: Array
-    """Of the contacts, in the model's own coordinates."""
     number: Array
     """By which `data` has them."""
     radius: Array

@@ -18,15 +18,12 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-import scipy.optimize
 import scipy.sparse
 
 Array = npt.NDArray[Any]
 """Of floats, or of marks and numbers that choose contacts."""
-LARGEST, CONE, MEETING = 1.0, 0.999, 1.0
-"""Steps are tried up to this, s; from this share of the cone on a contact slides; longest that bodies meet, s."""
-UNEVEN = 0.1
-"""Share of an approach that may be left after a blow of normal forces that should end it."""
+LARGEST, CONE = 1.0, 0.999
+"""Steps are tried up to this, s; from this share of the cone on a contact slides."""
 FAINT = 1e-3
 """A load that could speed up the lighter body by less than this share of g counts as none."""
 SOLREF = (0.02, 1.0)
@@ -91,11 +88,6 @@ class Contacts:
         edges = np.where(self.dim > 1, 2 * mu2 * (1 + mu2) / self.impratio, 1) if self.pyramidal else 1
         found: Array = self.inverse_mass * edges
         return found
-
-    @property
-    def normals(self) -> Array:
-        """How many rows bear the normal force: one, or all edges of a pyramid."""
-        return np.where((self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1)
 
     def reference(self, solref: Array) -> tuple[Array, Array]:
         """Stiffness and damping of rows of these contacts, see the function `reference`."""
@@ -172,6 +164,7 @@ class Contacts:
             lacking = np.linalg.solve(along @ along.T + np.diag(soft), soft * self.force[:, 1:][sticks])
             depth = depth - self.rows[:, 0] @ (along.T @ lacking) / k
         creep = np.where(frictional, creep, 0)
+        bearing = np.where((self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1)  # one row, or all edges of a pyramid
         sideways = np.where(frictional & ~slides[:, None], sideways, 0)
         return Law(
             depth=depth - self.margin,
@@ -179,7 +172,7 @@ class Contacts:
             turning=np.where(slides | (self.dim <= 3), np.nan, np.hypot.reduce(creep[:, 2:], 1)),
             hover=np.where(self.dim > 1, hover, np.inf),
             slides=slides,
-            weight=np.column_stack([self.normals / softness, sideways]),
+            weight=np.column_stack([bearing / softness, sideways]),
             stiffness=slope,
             damping=np.column_stack([b, *[b_f] * 5]),
         )
@@ -224,50 +217,6 @@ class Contacts:
             middle = (low + high) / 2
             low, high = (middle, high) if self.stable(math.exp(middle)) else (low, middle)
         return math.exp(low)
-
-    def approach(self) -> Array:
-        """The motion, in the coordinates of `rows`, that opens all contacts at 1 m/s without slip; its square, a mass.
-
-        It is nan if no joint moves the normals, or normal forces alone cannot end it: then a body lands on other
-        contacts, too, or begins to turn.
-        """
-        if not self.parts:
-            return np.full(self.rows.shape[2], np.nan)
-        wanted = np.tile(np.eye(1, 6), len(self.dim))[0]
-        found: Array = np.linalg.lstsq(self.rows.reshape(len(wanted), -1), wanted)[0]
-        found /= np.mean(self.rows[:, 0] @ found)
-        _, missing = scipy.optimize.nnls(self.rows[:, 0].T, found)
-        return found if missing < UNEVEN * np.hypot.reduce(found) else np.full_like(found, np.nan)
-
-    @np.errstate(all="ignore")  # without stiffness it never leaves
-    def rebound(self, speed: float) -> float:
-        """Share of its speed (m/s) with which a pair parts that meets with all contacts at once and is free else."""
-        h = self.timestep / (16 if self.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1)  # nearly continuous
-        spring, b = self.reference(self.solref)
-        mass, v, depth = float((self.approach() ** 2).sum()), -speed, self.timestep * speed / 2
-        for _ in range(round(MEETING / h)):
-            d = impedance(self.solimp, np.full(len(spring), depth))
-            k, weight = spring * d, self.normals * d / ((1 - d) * self.softness)
-            rate = b + k * h if self.discrete else b
-            end = 1 + rate * h if self.discrete else np.ones_like(b)
-            a = float((weight * (k * depth - rate * v)).sum() / (mass + (weight * end).sum()))
-            if not a > 0:
-                break
-            v += h * a
-            depth -= h * v
-        return v / speed if mass > 0 else math.nan
-
-    def decay(self) -> float:
-        """Rate, s-1, at which the slowest small motion dies out; 0 if it doesn't, inf if it is gone after a step."""
-        mass, damping, stiffness = self.matrices()
-        h, n = self.timestep, len(mass)
-        if self.discrete:
-            mass, damping = mass + h * damping + h**2 * stiffness, damping + h * stiffness
-        acceleration = np.linalg.solve(mass, -np.hstack([damping, stiffness]))
-        speed = np.hstack([np.eye(n), np.zeros((n, n))]) + h * acceleration
-        left = np.linalg.eigvals(np.vstack([speed, np.hstack([np.zeros((n, n)), np.eye(n)]) + h * speed]))
-        largest = np.abs(left[np.abs(left - 1) > 1e-6]).max(initial=0)  # where it slips to, it stays
-        return math.inf if largest == 0 else max(-math.log(largest) / h, 0.0)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ import numpy as np
 
 from compare.bench import advice
 from compare.bench.contact_law import LARGEST, Array, contacts, geom_names, replaced
-from compare.bench.measured import loads, measured_slip, noting_loads, rebound, step_to_most_contacts
 from compare.bench.settled import (
     WINDOW,
     Advance,
@@ -28,8 +27,12 @@ from compare.bench.settled import (
     UnsettledError,
     awake,
     few,
+    loads,
+    measured_slip,
+    noting_loads,
     radii,
     settle,
+    step_to_most_contacts,
     with_control,
 )
 from model import InputError
@@ -39,9 +42,7 @@ CREEP, DEPTH = 1e-5, 0.01
 SECOND, CHECKED = 1.0, 3.0
 """What still moves is measured for so long, s; and a changed model must settle within so many to be advised."""
 SHOWN = 12
-"""The worst pairs, which are shown, and let fall anew for their bounce."""
-G = 9.81
-"""m s-2."""
+"""The worst pairs, which are shown."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +74,6 @@ class PairForecast:
     slides: bool
     hover: float
     """Slip speed from which contact is lost again and again, m/s."""
-    rebound: float
-    """Share of its speed with which the pair alone parts again, at that of a fall as far as the smaller radius."""
-    rebound_measured: float
-    """nan beyond the `SHOWN` worst."""
-    decay: float
-    """Rate at which the slowest disturbance dies out, s-1."""
     largest_step: float
     """Largest stable time step, s; inf if there is none below one second."""
     replaced: Mapping[str, str]
@@ -107,10 +102,7 @@ class Forecast:
         """If nothing that touches is at rest: what moves, in words."""
         if not all(p.moves for p in self.pairs):
             return ""
-        rate = min(p.decay for p in self.pairs)
-        hint = f"; disturbances of its contacts die out at {rate:.2g} 1/s only" if rate < 1 else ""
-        what = [*self.settled.moving.values()] or [p.name for p in self.pairs]
-        return f"what touches still moves: {few(what)}{hint}"
+        return f"what touches still moves: {few([*self.settled.moving.values()] or [p.name for p in self.pairs])}"
 
 
 def forecast(
@@ -206,7 +198,7 @@ def _measured(
             found["depth_measured"][part] = mean[1] / max(mean[2], 1e-300)
     good = np.full(len(number), depth) if depth else DEPTH * radius
     own = those.only(np.ones(len(number), bool))
-    return advice.AtRest(model, start, own, those.rows, number, radius, moves, found, creep, good)
+    return advice.AtRest(model, start, own, number, radius, moves, found, creep, good)
 
 
 def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
@@ -229,9 +221,6 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
                 load=float(own.force[:, 0].sum()),
                 slides=bool((law.slides & ~moves)[part].any()),
                 hover=float(law.hover[part].min()),
-                rebound=own.rebound(_fall_speed(scene.radius[part])),
-                rebound_measured=math.nan,
-                decay=own.decay(),
                 largest_step=largest,
                 replaced=dict(replaced(scene.model, own, names)),
                 harm={name: float(values[part].max()) for name, values in harms.items()}
@@ -240,20 +229,10 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
             )
         )
     pairs.sort(key=lambda pair: -max(pair.harm.values()))
-    for k, pair in enumerate(pairs[:SHOWN]):
-        part = np.array(pair.members)
-        own = dataclasses.replace(those.only(part), rows=scene.rows[part])
-        again = rebound(scene.model, scene.data, own, scene.number[part], _fall_speed(scene.radius[part]))
-        pairs[k] = dataclasses.replace(pair, rebound_measured=again)
     alone = min(pair.largest_step for pair in pairs)
     largest = min(alone, those.largest_step(min(alone, LARGEST)))
     step = scene.model.opt.timestep
     return Forecast(tuple(pairs), step, largest, settled, _flexible(scene.data), None, "")
-
-
-def _fall_speed(radius: Array) -> float:
-    """Speed after a fall as far as the smallest radius, m/s."""
-    return math.sqrt(2 * G * min(radius.min(), 1))
 
 
 def _flexible(data: Any) -> int:

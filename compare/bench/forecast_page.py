@@ -81,12 +81,11 @@ def tables(f: Forecast) -> list[Table]:
     """The worst pairs: at rest and in motion; what was measured is called found, what nobody has is left out."""
     rest = [["pair", "creep\nµm/s", "found\nµm/s", "turning\nµrad/s", "found\nµrad/s", "depth\nµm", "found\nµm"]]
     rest[0] += ["load\nN", "cone\n%"]
-    motion = [["pair", "hover\nmm/s", "bounce\n%", "found\n%", "decay\n1/s", "step\nms"]]
+    motion = [["pair", "hover\nmm/s", "step\nms"]]
     for p in f.pairs[:SHOWN]:
         micro = p.creep, p.creep_measured, p.turning, p.turning_measured, p.depth, p.depth_measured
         rest.append([p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), _number(p.cone, 100)])
-        bounce = [_number(v, 100) for v in (p.rebound, p.rebound_measured)]
-        motion.append([p.name, _number(p.hover, 1e3), *bounce, _number(p.decay), _number(p.largest_step, 1e3)])
+        motion.append([p.name, _number(p.hover, 1e3), _number(p.largest_step, 1e3)])
     title = f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
     return [(title, _filled(rest)), ("In motion", _filled(motion))]
 

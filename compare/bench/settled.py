@@ -1,4 +1,4 @@
-"""Any MuJoCo model brought to rest: stepping with its controller, and what still moves, lies or sleeps in the end."""
+"""Any MuJoCo model brought to rest: what still moves, lies or sleeps then, what contacts bear, how fast they slip."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import Array
+from compare.bench.contact_law import Array, Contacts
 from model import InputError, StorageError
 from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
 
@@ -186,6 +186,58 @@ def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) 
     angle = np.arctan2(sine, (np.trace(turn, axis1=1, axis2=2)[:, None] - 1) / 2)
     mean: Array = np.hstack([data.xipos - place, axis * angle / sine]) / (steps * model.opt.timestep)
     return mean
+
+
+def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
+    """Advance to the moment of a window at which most pairs of geoms bear a load: what rattles comes and goes."""
+    most = 0
+    for _ in range(WINDOW_STEPS):
+        step(model, data, 1)
+        mujoco.mj_forward(model, data)
+        if len(loads(model, data)) > most:
+            most, best = len(loads(model, data)), copy.copy(data)
+    if most:
+        mujoco.mj_copyData(data, model, best)
+
+
+def loads(model: Any, data: Any) -> dict[tuple[int, int], Array]:
+    """What each pair of geoms bears, summed over its contacts: load, N, depth, m, number, and friction (3), N."""
+    found: dict[tuple[int, int], Array] = {}
+    force = np.zeros(6)
+    for k, (geoms, depth) in enumerate(zip(data.contact.geom.tolist(), -data.contact.dist, strict=True)):
+        mujoco.mj_contactForce(model, data, k, force)
+        if force[0] > 0:
+            friction = force[1:3] @ data.contact.frame[k, 3:].reshape(2, 3)
+            found[tuple(geoms)] = found.get(tuple(geoms), 0) + np.array([force[0], depth, 1, *friction])
+    return found
+
+
+def noting_loads(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
+    """A law of stepping that notes what pairs of geoms bear in each step."""
+
+    def one_by_one(model: Any, data: Any, nstep: int) -> None:
+        for _ in range(nstep):
+            step(model, data, 1)
+            history.append(loads(model, data))
+
+    return one_by_one
+
+
+def measured_slip(model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float) -> dict[str, Array]:
+    """How deep each contact is, and how fast its two bodies slip past each other and turn, in the mean of a window."""
+    found = data.contact
+    depth, drift, frames = -found.dist[number], found.surfacevel[number, :2], found.frame[number].reshape(-1, 3, 3)
+    bodies = model.geom_bodyid[c.geoms]
+    lever = found.pos[number][:, None] - data.xipos[bodies]
+    velocity = mean_velocities(model, data, step, time)[bodies]
+    (first, second), turning = np.moveaxis(velocity, 1, 0)[..., :3], np.diff(velocity[..., 3:], axis=1)[:, 0]
+    arms = np.cross(velocity[..., 3:], lever)
+    slip = np.einsum("nij,nj->ni", frames[:, 1:], second + arms[:, 1] - first - arms[:, 0]) + drift
+    return {
+        "depth_measured": depth,
+        "creep_measured": np.where(c.dim > 1, np.hypot(*slip.T), np.nan),
+        "turning_measured": np.where(c.dim > 3, np.hypot.reduce(turning, 1), np.nan),
+    }
 
 
 def radii(model: Any) -> Array:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from compare.bench import contact_law, forecast, forecast_page
+from compare.bench import forecast, forecast_page
 from compare.bench.settled import STILL, settle
 from compare.commands import cli
 from model import InputError
@@ -97,8 +97,8 @@ def settled(text, keyframe=None, limit=10.0):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_depth_creep_rebound_and_decay_are_as_predicted(scene):
-    model, data, found = settled(SCENES[scene])
+def test_depth_creep_and_turning_are_as_predicted(scene):
+    _, _, found = settled(SCENES[scene])
     assert not found.settled.moving
     for pair in found.pairs:
         assert not pair.slides
@@ -106,17 +106,6 @@ def test_depth_creep_rebound_and_decay_are_as_predicted(scene):
         # Round-off of a place, over the window.
         assert pair.creep == pytest.approx(pair.creep_measured, rel=1e-2, abs=1e-11)
         assert pair.turning == pytest.approx(pair.turning_measured, rel=1e-2, abs=STILL, nan_ok=True)
-        # A wheel cannot land without the others.
-        assert pair.rebound == pytest.approx(pair.rebound_measured, rel=1.5e-2, nan_ok="wheel" in pair.name)
-    if scene in ("slope, RK4", "stack, pyramidal"):  # RK4 has no linear step in MuJoCo; CG stops too early for one
-        return
-    step = np.zeros((2 * model.nv, 2 * model.nv))
-    mujoco.mjd_transitionFD(model, data, 1e-6, True, step, None, None, None)
-    left = np.abs(np.linalg.eigvals(step))
-    slowest = -math.log(left[left < 1 - 1e-4].max()) / model.opt.timestep  # where bodies slip to, they stay
-    # An edge of a pyramid is idle where the rod hangs, which decay leaves out.
-    allowed = 0.2 if scene == "gripper, pyramidal" else 2e-2
-    assert contact_law.contacts(model, data)[0].decay() == pytest.approx(slowest, rel=allowed)
 
 
 # A body that a moving floor drags under a guide; how far its place is from where it was put, and its pair.
@@ -229,10 +218,7 @@ REFUSED = {
     mjcf(FALLING): (2, "nothing touches.*body 'stone' at .* m/s"),
     mjcf(FALLING, rest='<equality><weld body1="stone"/></equality>'): (2, "nothing touches"),
     mjcf(FLOOR.format("") + CLOTH): (2, "nothing touches.*16 contacts of flexible bodies are left out"),
-    mjcf(LEVEL, geom='solref="-5000 0"'): (
-        1,
-        "still moves: body 'box' at .*disturbances of its contacts die out at .* 1/s only",
-    ),
+    mjcf(LEVEL, geom='solref="-5000 0"'): (1, "still moves: body 'box' at"),
     mjcf(SLOPE + ROUND): (1, "still moves: body 'ball' at"),
     mjcf(LEVEL.replace('"/></body>', '" /><joint/></body>')): (2, "MuJoCo refuses it"),
     mjcf(LEVEL, 'timestep="0"'): (2, "scene.xml: timestep = 0 s is out of range: must be > 0"),
