@@ -15,7 +15,7 @@ from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExec
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
@@ -99,7 +99,9 @@ def processes(count: int) -> Workers:
     def start() -> Executor:
         for library in ("OMP", "OPENBLAS", "MKL"):  # inherited by the workers; numpy reads it when they import it
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-        return _Pool(count)
+        resource_tracker.ensure_running()  # it lets signals through
+        with _deaf():  # a semaphore that is half made would be left
+            return _Pool(count)
 
     def stop(executor: Executor, at_once: bool) -> None:
         assert isinstance(executor, _Pool)

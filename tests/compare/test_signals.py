@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import analytic
+from compare.commands import signals
 from compare.kit import record
 from compare.kit.levels import Level
 from compare.kit.record import Records
@@ -20,6 +21,8 @@ from tests.commands import COMMANDS, METER, SCENE
 from tests.measured import measured
 
 ROOT = Path(__file__).parents[2]
+SIGNALS = signal.SIGINT, signal.SIGTERM
+BOTH = pytest.mark.parametrize("number", SIGNALS)
 LONG = {
     "validate": "--quick --set reference --claim prop-1",
     "figures": "--format svg --format png --format pdf",
@@ -106,27 +109,35 @@ def end(command, number, after, here):
     assert not [path for path in new if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))]
 
 
-BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-
-
-@BOTH
-@pytest.mark.parametrize("after", [0.0, 0.4])
-def test_every_command_ends_while_it_begins(whole, tmp_path, after, number):
-    """Python and packages are being loaded: no traceback of theirs."""
-    here = shutil.copytree(whole, tmp_path / "here")
-    for command in COMMANDS:
-        end(command, number, after, here)
-
-
-@BOTH
-@pytest.mark.parametrize("command", ["attractors", "basins"])
+@pytest.mark.parametrize(("command", "number"), [("attractors", signal.SIGINT), ("basins", signal.SIGTERM)])
 def test_work_ends(whole, tmp_path, command, number):
     end(command, number, 3.0, shutil.copytree(whole, tmp_path / "here"))
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_ends_while_it_begins(whole, tmp_path, command):
+    """Python and packages are being loaded, each time a little further: no traceback of theirs."""
+    k = COMMANDS.index(command)
+    end(command, SIGNALS[k % 2], 0.03 * k, shutil.copytree(whole, tmp_path / "here"))
+
+
 @pytest.mark.slow
 @BOTH
-@pytest.mark.parametrize("after", [1.5, 4.0, 10.0])
+@pytest.mark.parametrize("after", [0.0, 0.4, 1.5, 4.0, 10.0])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_ends_at_any_moment(whole, tmp_path, command, after, number):
     end(command, number, after, shutil.copytree(whole, tmp_path / "here"))
+
+
+@BOTH
+def test_a_signal_that_python_loses_comes_again(number):
+    """As in a callback of an object's end, whose errors go nowhere."""
+
+    class Ends:
+        def __del__(self):
+            os.kill(os.getpid(), number)
+            time.sleep(1e-3)
+
+    with pytest.raises(signals.Interrupted) as ended, signals.raised():
+        time.sleep(60 if Ends() else 0)
+    assert ended.value.code == 128 + number
