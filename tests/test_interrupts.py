@@ -22,15 +22,14 @@ calls = {
 }
 for name, call in calls.items():
     call(0.1)  # is compiled
-    for after in (0.3, 0.8):
-        begun = []
-        press = lambda *_: begun.append(time.process_time()) or signal.raise_signal(signal.SIGINT)
-        signal.signal(signal.SIGALRM, press)
-        signal.setitimer(signal.ITIMER_REAL, after)
-        try:
-            call(1e5)
-        except KeyboardInterrupt:
-            print(name, time.process_time() - begun[0] < 3)
+    begun = []
+    press = lambda *_: begun.append(time.process_time()) or signal.raise_signal(signal.SIGINT)
+    signal.signal(signal.SIGALRM, press)
+    signal.setitimer(signal.ITIMER_REAL, 0.4)
+    try:
+        call(1e5)
+    except KeyboardInterrupt:
+        print(name, time.process_time() - begun[0] < 3)
 """
 """Prints of each call whether it ended within 3 s of processor time."""
 
@@ -40,5 +39,5 @@ def test_ctrl_c_ends_every_long_call() -> None:
     done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     names = ("event", "time-stepping", "many", "mjsim", "mjsim rigid", "mjsim many", "attractors")
-    assert done.stdout.splitlines() == [f"{name} True" for name in names for _ in range(2)]
+    assert done.stdout.splitlines() == [f"{name} True" for name in names]
     assert "Traceback" not in done.stderr
