@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import html
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.textpath import text_to_path
@@ -15,8 +18,11 @@ from matplotlib.textpath import text_to_path
 from compare import subjects
 from compare.kit import drawing, style
 from compare.kit.drawing import Drawing, Figures, GapError, Material
+from compare.kit.pictures import embedded, svg
 from compare.kit.record import Check
 from compare.kit.statistics import COVERAGE
+from compare.kit.tasks import sources
+from compare.kit.workers import JUDGING, Spread, at_most
 from model import InputError, Parameters, StorageError
 from model.files import make_directory, write_text
 
@@ -31,7 +37,7 @@ Selected = dict[str, Callable[[], Any]]
 """By name, what gives a figure its data, or raises `GapError`."""
 
 FORMATS = tuple(suffix[1:] for suffix in drawing.SUFFIXES)
-CAPTIONS = "captions.txt"
+PICTURES, CAPTIONS = "figures", "captions.txt"
 FIGURES: Figures = {name: each for part in subjects.parts("figures") for name, each in part.FIGURES.items()}
 """Every figure, in the order of the report."""
 
@@ -143,3 +149,66 @@ def write(output: Path, selected: Selected, formats: Sequence[str] = ("svg",)) -
         captions.append(f"{name}\n{each.title}. {caption}\n")
         yield name, ""
     write_text(output / CAPTIONS, "\n".join(captions))
+
+
+def pictures(
+    material: Material, drawings: Mapping[str, Drawing], spread: Spread = map
+) -> tuple[dict[str, dict[str, str]], str]:
+    """Of each figure by its name what a page shows, a picture with its caption, or why there is none; and all letters.
+
+    Each is drawn once, by `spread`, a `map`, and kept in `PICTURES` of the results with a hash of all that it shows.
+    """
+    figures, new = {}, []
+    for name, each in drawings.items():
+        path = material.directory / PICTURES / f"{name}.svg"
+        figures[name] = {"id": f"figure-{name}", "title": each.title, "gap": ""}
+        try:
+            data = each.select(material)
+        except GapError as error:
+            figures[name]["gap"] = str(error)
+            continue
+        if known := kept(path, each, data):
+            figures[name] |= known
+        else:
+            new.append((path, each, data))
+    if new:
+        make_directory(material.directory / PICTURES)
+    new.reverse()  # the last ones take longest
+    for (path, *_), found in zip(new, spread(drawn, new), strict=True):
+        figures[path.stem] |= found
+    made, letters = embedded({name: each["picture"] for name, each in figures.items() if not each["gap"]})
+    for name, picture in made.items():
+        figures[name]["picture"] = picture
+    return figures, letters
+
+
+def kept(path: Path, drawing: Drawing, data: Any) -> dict[str, str] | None:
+    """Picture and caption in an SVG file, if this program made it from the same data."""
+    picture = path.read_text("utf-8") if path.is_file() else ""
+    if not picture.endswith(mark := _mark(drawing, data)):
+        return None
+    before, _, caption_on = picture.removesuffix(mark).partition("<desc>")
+    caption, _, after = caption_on.partition("</desc>")
+    return {"picture": before + after, "caption": html.unescape(caption)}
+
+
+def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
+    """The same of a picture that is drawn and written into the file, where it describes itself by the caption.
+
+    Where it can't be drawn or written, the reason as a "gap".
+    """
+    path, drawing, data = new
+    try:
+        with at_most(JUDGING):
+            figure, caption = drawing.draw(data)
+        picture = svg(figure)
+        described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
+        write_text(path, described + _mark(drawing, data))
+    except (GapError, StorageError, TimeoutError) as error:
+        return {"gap": str(error)}
+    return {"picture": picture, "caption": caption}
+
+
+def _mark(drawing: Drawing, data: Any) -> str:
+    made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources("model", "analytic", "compare")])
+    return f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"

@@ -19,10 +19,10 @@ from matplotlib.axes import Axes
 
 from compare.kit import pages, style
 from compare.kit.quantities import QUANTITIES
+from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.thresholds import figures as thresholds
-from compare.view import planes
 from model import Case, InputError, Parameters, Trajectory
 from model.parameters import check_names
 from model.trajectory import COMPONENTS, columns, component
@@ -86,7 +86,7 @@ def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
     Raises `StorageError` for a file that isn't one.
     """
     axes = _or_new(axes)
-    planes.fill(axes, of if isinstance(of, Basins) else Basins.load(of))
+    attractors.fill_basins(axes, of if isinstance(of, Basins) else Basins.load(of))
     return axes
 
 

@@ -157,9 +157,9 @@ def plane(args: argparse.Namespace) -> int:
     if args.map:
         mapped.save(args.map)
     if args.plot:
-        from compare.view import planes  # here, because drawing takes a second to load
+        from compare.subjects.attractors import figures  # here, because drawing takes a second to load
 
-        drawing.save(planes.draw(mapped), args.plot)
+        drawing.save(figures.draw_basins(mapped), args.plot)
     shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
     differ = mapped.differences().tolist() if args.mujoco else []
     said = []

@@ -16,17 +16,16 @@ from typing import Any
 from markdown_it import MarkdownIt
 
 from compare.claim import Outcome, Verdict
-from compare.gallery import FIGURES, figures_of
+from compare.gallery import FIGURES, figures_of, pictures
 from compare.kit import pages
-from compare.kit.drawing import Drawing, GapError, Material
+from compare.kit.drawing import Material
 from compare.kit.levels import Level
-from compare.kit.pictures import embedded
 from compare.kit.record import Check, Measurement, Records
 from compare.kit.workers import Spread
-from compare.report import pictures, results, wording
+from compare.report import results, wording
 from compare.report.results import Summary
 from model import storage
-from model.files import make_directory, write_text
+from model.files import write_text
 
 ROWS = 12
 """Checks of a claim that are listed, the worst first; the page searches them all."""
@@ -42,7 +41,6 @@ def write(material: Material, verdicts: Sequence[Verdict], summary: Summary, spr
     """
     directory = material.directory
     results.save(summary, directory)
-    make_directory(directory / results.FIGURES)
     path = directory / results.REPORT
     write_text(path, render(material, verdicts, summary, spread))
     return path
@@ -57,7 +55,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
     drawings = dict(free)
     for own in beside.values():
         drawings |= own
-    figures, letters = _figures(material, drawings, spread)
+    figures, letters = pictures(material, drawings, spread)
     shown: dict[str, str] = {}
     sections: dict[str, list[dict[str, Any]]] = {}
     for verdict in ran:
@@ -176,29 +174,3 @@ def packed(of: Mapping[str, Sequence[Any]]) -> str:
     """Columns as JSON, compressed (deflate) and written in base64: about a tenth of their length."""
     text = json.dumps(of, ensure_ascii=False, separators=(",", ":"))
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
-
-
-def _figures(
-    material: Material, drawings: Mapping[str, Drawing], spread: Spread
-) -> tuple[dict[str, dict[str, str]], str]:
-    """What the page shows of every figure: a picture with its caption, or why there is none; and all letters."""
-    figures, new = {}, []
-    for name, drawing in drawings.items():
-        path = material.directory / results.FIGURES / f"{name}.svg"
-        figures[name] = {"id": f"figure-{name}", "title": drawing.title, "gap": ""}
-        try:
-            data = drawing.select(material)
-        except GapError as error:
-            figures[name]["gap"] = str(error)
-            continue
-        if kept := pictures.kept(path, drawing, data):
-            figures[name] |= kept
-        else:
-            new.append((path, drawing, data))
-    new.reverse()  # the last ones take longest
-    for (path, *_), drawn in zip(new, spread(pictures.drawn, new), strict=True):
-        figures[path.stem] |= drawn
-    made, letters = embedded({name: each["picture"] for name, each in figures.items() if not each["gap"]})
-    for name, picture in made.items():
-        figures[name]["picture"] = picture
-    return figures, letters

@@ -22,7 +22,7 @@ from model.errors import StorageError
 from model.files import check_ours, make_directory, reading_json, write_text
 from model.versions import current_commit, current_versions
 
-SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
+SUMMARY, REPORT, RUNS = "summary.json", "report.html", "runs"
 SCHEMA, SCHEMA_VERSION = "dualball-summary", 5
 
 

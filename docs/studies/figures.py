@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from compare.kit import drawing
+from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
-from compare.view import planes
 from docs.studies import cases, hopping
 from docs.studies.search import Searched
 from model.files import make_directory, write_text
@@ -29,7 +29,7 @@ def main() -> None:
     write_text(DOCS / "hopping.md", hopping.page(search, *others))
     basins = Basins.load(DATA / "basins.json")
     hopping.draw_where(search).savefig(DOCS / "attractors" / "where.png", dpi=110)
-    drawing.save(planes.draw(basins), DOCS / "attractors" / "basins.png")
+    drawing.save(attractors.draw_basins(basins), DOCS / "attractors" / "basins.png")
     print(hopping.caption_where(search), hopping.caption_plane(basins), sep="\n")
 
 

@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 import pytest
 from matplotlib.figure import Figure
 
+from compare import gallery
 from compare.claim import Bearing, Claim, Outcome, Text, Verdict, Witness
 from compare.commands import cli, validate
 from compare.gallery import FIGURES
@@ -25,7 +26,7 @@ from compare.kit.levels import Level
 from compare.kit.pages import readable, typeset
 from compare.kit.record import Check, Missing, Records
 from compare.kit.workers import processes
-from compare.report import pictures, report, results, wording
+from compare.report import report, results, wording
 from compare.report.results import Summary
 from model import Case, Parameters, StorageError
 from tests.measured import measured
@@ -265,18 +266,18 @@ def test_a_missing_summary_names_the_command(tmp_path: Path) -> None:
 def test_a_picture_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawing = Drawing("t", lambda _: None, lambda data: (Figure(figsize=(1, 1)), f"<&> {data}"))
     path = tmp_path / "made.svg"
-    assert pictures.kept(path, drawing, ("a", 1.0)) is None
-    first = pictures.drawn((path, drawing, ("a", 1.0)))
+    assert gallery.kept(path, drawing, ("a", 1.0)) is None
+    first = gallery.drawn((path, drawing, ("a", 1.0)))
     ElementTree.parse(path)
     assert first["picture"].startswith("<svg")
     assert first["caption"] == "<&> ('a', 1.0)"
     assert "desc" not in first["picture"]
-    assert pictures.kept(path, drawing, ("a", 1.0)) == first
-    assert pictures.kept(path, drawing, ("a", 2.0)) is None
-    monkeypatch.setattr(pictures, "sources", lambda *packages: " ".join(packages))  # the program changes
-    assert pictures.kept(path, drawing, ("a", 1.0)) is None
+    assert gallery.kept(path, drawing, ("a", 1.0)) == first
+    assert gallery.kept(path, drawing, ("a", 2.0)) is None
+    monkeypatch.setattr(gallery, "sources", lambda *packages: " ".join(packages))  # the program changes
+    assert gallery.kept(path, drawing, ("a", 1.0)) is None
     path.write_text("something else")
-    assert pictures.kept(path, drawing, ("a", 1.0)) is None
+    assert gallery.kept(path, drawing, ("a", 1.0)) is None
 
 
 def test_processes_draw_every_figure(tmp_path: Path) -> None:
@@ -287,7 +288,7 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     with processes(2) as work:
         for name, how in (("there", work.map), ("here", map)):
             material = Material({v.claim.id: v.checks for v in VERDICTS}, directory=tmp_path / name)
-            (material.directory / results.FIGURES).mkdir(parents=True)
+            (material.directory / gallery.PICTURES).mkdir(parents=True)
             pages.append(report.render(material, VERDICTS, summary, how))
     assert pages[0].replace("-o there", "-o here") == pages[1]
     assert pages[1].count('<figure class="plot"') > 1

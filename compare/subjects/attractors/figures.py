@@ -1,4 +1,4 @@
-"""Beyond the paper: the ball that hops for ever, and Figs. 9, 10 and 13 with the branch of such motions."""
+"""Beyond the paper: the ball that hops for ever, Figs. 9, 10 and 13 with the branch of such motions, maps of basins."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
@@ -19,6 +21,7 @@ from analytic.orbits.orbit_branch import OrbitBranch
 from compare.branches import Drawn, going_round, lifted, slipping, spin
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Material
+from compare.subjects.attractors.basins import FATES, Basins
 from model import Case, Parameters, State
 from model.files import reading_json
 
@@ -165,6 +168,48 @@ def draw_walls(of: Diagram) -> tuple[Figure, str]:
         f"({at['nonsmooth birth']}) hops grow; they lose stability in a torus bifurcation ({at['torus']}), turn back "
         f"in a fold ({at['fold']}), and end in hops of no height. Dots without names: the sequence of cases changes. "
         f"Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} rad/s.{mark}"
+    )
+
+
+_SHADES = (style.HOPPING, *(style.COLOURS[case] for case in (Case.RR, Case.SS, Case.NR, Case.NN)))
+"""Of `FATES`."""
+_VARIABLES = {
+    "omega_c": style.OMEGA_C,
+    **{f"slip_{axis}": f"$\\tilde\\omega_{axis}$ (rad/s)" for axis in "xyz"},
+    **{"y": "y (m)", "v_y": "$v_y$ (m/s)", "h": "h (m)", "v_h": "$v_h$ (m/s)"},
+}
+
+
+def draw_basins(basins: Basins) -> Figure:
+    """The map as a figure."""
+    figure = style.figure(6.2, 4.4)
+    fill_basins(figure.add_subplot(), basins)
+    return figure
+
+
+def fill_basins(axes: Axes, basins: Basins) -> None:
+    """The map by time stepping, and a point for each run of MuJoCo."""
+    look: dict[str, Any] = {
+        "cmap": ListedColormap(_SHADES),
+        "vmin": -0.5,
+        "vmax": len(FATES) - 0.5,
+        "alpha": 0.55,
+    }
+    axes.pcolormesh(basins.x, basins.y, basins.fates, shading="nearest", rasterized=True, **look)
+    present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
+    handles: list[object] = [Patch(color=_SHADES[k], alpha=0.55, label=FATES[k]) for k in sorted(present)]
+    if basins.coarse:
+        x, y = np.meshgrid(basins.x[:: basins.coarse], basins.y[:: basins.coarse])
+        for k in sorted(set(basins.mujoco.ravel().tolist())):
+            own = basins.mujoco == k
+            axes.plot(x[own], y[own], "o", ms=4, color=_SHADES[k], mec="k", mew=0.4)
+        differ = basins.mujoco != basins.fates[:: basins.coarse, :: basins.coarse]
+        if np.any(differ):
+            handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
+        handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
+    axes.set(xlabel=f"{_VARIABLES[basins.across]} at the start", ylabel=f"{_VARIABLES[basins.up]} at the start")
+    axes.legend(
+        handles=handles, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(handles), frameon=False
     )
 
 
