@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analytic import contact_forces, simulate, solution
+from analytic import contact_forces, simulate
 from analytic.mechanics import rolling_forces
 from analytic.simulation import integrator
 from model import Case, Flow, Parameters, SimulationError
@@ -134,30 +134,6 @@ def test_a_case_ends_where_its_forces_do(name):
 
 
 # --- stationary solutions, flows, solvers ------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "omega_0", "case"),
-    [
-        ("reference", 12.0, Case.RR),
-        ("reference", 20.0, Case.SS),
-        ("reference", 25.0, Case.SS),
-        ("high-wall-friction", 25.0, Case.NR),
-    ],
-)
-@pytest.mark.parametrize(("method", "tolerance"), [("event", 1e-7), ("time-stepping", 1e-9)])
-def test_stationary_solutions_stay(name, omega_0, case, method, tolerance):
-    """In time stepping, too, at large steps: axes that turn with the ball make a stationary orbit a fixed point."""
-    p = Parameters.named(name).replace(omega_0=omega_0)
-    settled = solution(p, case)
-    x0 = settled.state._replace(y=0.01 if case is Case.NR else 0.0)  # where y is neutral
-    run = simulate(p, x0, 3.0, method=method, timestep=2e-3, sample_interval=2e-3)
-    assert not len(run.events)
-    assert set(run.cases) == {case}
-    np.testing.assert_allclose(run.x, np.tile(x0, (len(run.time), 1)), atol=tolerance)
-    assert run.theta[-1] == pytest.approx(3.0 * x0.omega_c, rel=1e-9)
-    if case is Case.SS:
-        np.testing.assert_allclose(run.force_A[-1], settled.force_A, atol=1e-8 * p.m * p.g)
 
 
 def test_flows_of_several_pieces():

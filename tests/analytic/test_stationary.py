@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 
 from analytic import (
     Stability,
-    contact_forces,
     leaning_modes,
-    slowest_time_constant,
     solution,
     stationary_solutions,
     thresholds,
@@ -69,25 +67,6 @@ def test_solution_of_a_case():
     ):
         with pytest.raises(InputError, match=message):
             ask()
-
-
-@pytest.mark.parametrize(("omega_0", "c"), [(3.0, 0.1), (9.0, 1.0), (20.0, 4.0), (30.0, 1.0)])
-def test_slowest_time_constant(omega_0, c):
-    """In NS c, and the roots of x^2 - (1 + q (1+j)/j) x + q/j in units of c: the slower one is that of the spin slip_y.
-
-    The groups of time in theory.md in RR and of NR's swing; inf where nothing decays.
-    """
-    p = P.replace(omega_0=omega_0, c=c)
-    q = p.eta * p.Omega_0**2 / (1 - p.eta * p.Omega_0**2)
-    expected = np.sort([1.0, *np.roots([1.0, -(1 + q * (1 + p.j) / p.j), q / p.j])])
-    s = solution(p, Case.NS)
-    decaying = -s.eigenvalues.real[np.abs(s.eigenvalues.imag) < 0.5 * omega_0] / c
-    np.testing.assert_allclose(decaying, expected, rtol=1e-10)
-    assert slowest_time_constant(s) == pytest.approx(1 / (c * expected[0]), rel=1e-10)
-    p = P.replace(omega_0=9.0, c=c)
-    assert slowest_time_constant(solution(p, Case.RR)) == pytest.approx((1 + 2 * p.j) / c)
-    assert slowest_time_constant(solution(p.replace(omega_0=45.0), Case.NR)) == pytest.approx(2 * (1 + p.j) / c)
-    assert slowest_time_constant(solution(p.replace(c=0.0), Case.RR)) == np.inf
 
 
 # --- eigenvalues -----------------------------------------------------------------------------------------------
@@ -166,22 +145,6 @@ def test_just_beyond_the_end_of_rolling(excess):
 
 
 # --- mirror images and vanishing parameters --------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("omega_0", [1.0, 8.0, 13.0, 14.0, 22.0, 28.0, 33.0, 41.0, 60.0])
-def test_mirror_image(omega_0):
-    """Backwards flow: the reflected solutions, which solve the equations, with the same eigenvalues."""
-    p = P.replace(omega_0=-omega_0)
-    for s, forward in zip(stationary_solutions(p), stationary_solutions(P.replace(omega_0=omega_0)), strict=True):
-        np.testing.assert_array_equal(np.abs(s.x), np.abs(forward.x))
-        np.testing.assert_array_equal(s.eigenvalues, forward.eigenvalues)
-        rate = vector_field(s.case, s.x, p)
-        rate[0] = 0
-        assert np.abs(rate).max() <= 1e-10
-        if s.case is not Case.RR:
-            np.testing.assert_allclose(
-                np.concatenate(contact_forces(s.case, s.x, p)), [*s.force_A, *s.force_B], atol=1e-13
-            )
 
 
 VANISHING = [  # what exists, is how stable, and is free
