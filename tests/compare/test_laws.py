@@ -31,26 +31,20 @@ def values(run):
     return {(law.split(":")[0], contact): value for (_, law, contact), value in laws.deviations([run]).items()}
 
 
-def test_a_motion_that_obeys_the_laws_shows_no_deviation():
-    worst = values(sliding())
+def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
+    run, ratio, law = sliding(), "friction over normal force", "(14), (15)"
+    worst = values(run)
     for contact, coefficient in (("A", P.mu), ("B", P.eta)):
-        assert worst["(14), (15)", contact] <= laws.ROUNDING
-        assert worst["friction over normal force", contact] == pytest.approx(coefficient, rel=laws.ROUNDING)
+        assert worst[law, contact] <= laws.ROUNDING
+        assert worst[ratio, contact] == pytest.approx(coefficient, rel=laws.ROUNDING)
         # Nothing rolls: that law has no samples.
         assert np.isnan(worst["where it rolls it doesn't slip", contact])
-
-
-def test_every_deviation_is_measured():
-    run = sliding()
-    strong = values(sliding(force_B=run.force_B * [1.0, 1.01, 1.01]))
-    assert strong["friction over normal force", "B"] == pytest.approx(1.01 * P.eta)
-    weak = values(sliding(force_A=run.force_A * [0.99, 1.0, 0.99]))
-    assert weak["friction over normal force", "A"] == pytest.approx(0.99 * P.mu)
+    assert values(sliding(force_B=run.force_B * [1.0, 1.01, 1.01]))[ratio, "B"] == pytest.approx(1.01 * P.eta)
+    assert values(sliding(force_A=run.force_A * [0.99, 1.0, 0.99]))[ratio, "A"] == pytest.approx(0.99 * P.mu)
     turned = run.force_B.copy()
     turned[7, 1] *= -1.0  # one sample is enough
-    assert values(sliding(force_B=turned))["(14), (15)", "B"] > 0.1 * P.eta
-    assert values(sliding(gap_A=np.full(SAMPLES, 1e-3 * P.R)))["where it is closed there is no gap", "A"] == (
-        pytest.approx(1e-3)
-    )
+    assert values(sliding(force_B=turned))[law, "B"] > 0.1 * P.eta
+    gaps = values(sliding(gap_A=np.full(SAMPLES, 1e-3 * P.R)))
+    assert gaps["where it is closed there is no gap", "A"] == pytest.approx(1e-3)
     slow = sliding(slip_z=1e-3 * run.slip_z, slip_x=1e-3 * run.slip_x, case=np.full(SAMPLES, Case.RS, np.int8))
     assert values(slow)["where it rolls it doesn't slip", "A"] > 0

@@ -11,7 +11,7 @@ from compare.catalogue import CLAIMS
 from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
-from compare.kit.fits import turning, vanishing
+from compare.kit.fits import turning
 from compare.kit.lab import time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
@@ -19,8 +19,6 @@ from compare.kit.sets import sets
 from compare.kit.settling import PRESSES
 from compare.kit.statistics import Measured
 from compare.subjects.thresholds.measure import thresholds
-from compare.subjects.thresholds.measure.basins import Edge, ends_slipping
-from compare.subjects.thresholds.measure.thresholds import DISTANCES, TURNS
 from model import Case, Parameters, State
 from tests.measured import measured
 
@@ -83,59 +81,12 @@ def test_the_drag_at_which_a_fold_is_born_is_judged_where_that_of_the_set_is_too
         assert judge(select(CLAIMS, ["double-points"]), Records((row,)))[0].outcome is outcome
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-6])
-def test_extrapolated_zero_is_as_sure_as_it_says(noise):
-    where = 2.0 * (1 + DISTANCES)
-    zero = vanishing(where, [Measured(math.sin(w - 2) * (1 + w), noise) for w in where])
-    assert abs(zero.value - 2.0) < 3 * zero.uncertainty < 3e-4
-
-
-@pytest.mark.parametrize("power", [2.0, 2.5, 2.687])
-def test_extrapolated_zero_of_what_is_no_power_series_is_as_sure_as_it_says(power):
-    """As omega_0 is none of the lag where drag isn't linear."""
-    for part in (0.02, 0.1, 0.5):
-        order = DISTANCES / DISTANCES[-1]
-        where = 1.0 + 0.05 * (order + part * order**power + 0.1 * order**3)
-        place = vanishing(where, [Measured(float(value), 1e-12) for value in order])
-        assert abs(place.value - 1.0) < 3 * place.uncertainty
-
-
-def test_extrapolated_maximum_is_as_sure_as_it_says():
-    slip = 1 + np.sqrt(TURNS)  # its maximum is at slip = 1, with a cubic part
-    where = 3 - (slip - 1) ** 2 * (1 + 0.5 * (slip - 1) + 0.2 * (slip - 1) ** 2)
-    slips = [Measured(-float(s), 1e-9) for s in slip]
-    top, pull = turning(where, slips), turning(where, slips, 0.9 * slip - np.sin(slip))
-    assert abs(top.value - 3) < 3 * top.uncertainty < 3e-3
-    assert abs(pull.value - 0.9 + math.sin(1)) < 3 * pull.uncertainty < 3e-3
-
-
-def test_an_extrapolation_whose_last_change_is_the_largest_is_as_uncertain_as_that():
-    """Slips and flows of a set whose branch is steep next to the fold, at 123.226 rad/s."""
-    where = np.array([122.23004, 121.19617, 119.64536, 118.09455, 114.99294, 111.89133, 107.75585])
-    slips = [-198.87326, -183.12067, -166.63932, -154.07601, -134.79674, -119.85194, -103.77153]
-    top = turning(where, [Measured(slip, 1e-7) for slip in slips])
-    assert abs(top.value - 123.226) < 3 * top.uncertainty
-
-
 @pytest.mark.parametrize("bend", [0.0, 1e-15, -1e-15, 1e-4])
 def test_a_line_has_no_maximum(bend):
     """Nor has one that is bent by round-off, or so little that a maximum would be far away."""
     where = np.linspace(1.0, 2.0, 6)[::-1]
     order = [Measured(float(w), 0.0) for w in where]
     assert not math.isfinite(turning(where - bend * where**2, order).value)
-
-
-def test_edge_tells_by_the_way_a_run_still_goes():
-    slipping, lifted = np.eye(8)[2] * 10.0, np.eye(8)[2] * 30.0
-    edge = Edge("reference", REFERENCE, slipping, lifted, slipping, lifted - slipping)
-    time = np.arange(101)
-    for begins, rate, falls in ((25, -0.1, True), (25, 0.1, False), (10, 0, True), (30, 0, False)):
-        omega_c = begins + rate * time
-        assert ends_slipping(SimpleNamespace(time=time, omega_c=omega_c), edge) is falls
-    # Next to the border: what grows decides, and what dies out doesn't.
-    for rate, falls in ((0.05, False), (-0.05, None)):
-        omega_c = 20.0 + 1e-2 * np.exp(rate * time)
-        assert ends_slipping(SimpleNamespace(time=time, omega_c=omega_c), edge) is falls
 
 
 def _settled(name, p, flows):

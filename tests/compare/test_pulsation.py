@@ -1,13 +1,11 @@
 """A pulsation that breaks down loses its own numbers, and sets without slip say why."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import analytic
-import mjsim
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.quantities import QUANTITIES
@@ -15,7 +13,7 @@ from compare.kit.record import Records
 from compare.kit.sets import sets
 from compare.kit.statistics import COVERAGE
 from compare.subjects.unsteady import measure as unsteady
-from model import Case, Flow, Parameters
+from model import Parameters
 from tests.measured import thresholds
 
 NAME, QUICK = "rough-wall", sets(Level.QUICK)
@@ -61,31 +59,3 @@ def test_sets_without_slip_say_why(lab):
         "no flow was measured at which two-point rolling ends by slipping",
         "no flows were measured between which the ball slips at both points",
     ]
-
-
-def test_limit_of_a_geometric_sequence():
-    assert unsteady.limit(5 + 0.3 ** np.arange(3)) == pytest.approx(5.0, rel=1e-12)
-    assert unsteady.limit(np.array([0.0, 1.0, 3.0])) == 3.0
-
-
-CASES = [(Case.RR, 0, True), (Case.SS, 0, True), (Case.SS, 14, True), (Case.SS, 9, False), (Case.NR, 9, False)]
-
-
-@pytest.mark.parametrize(("case", "at", "rolls"), [*CASES, (Case.RS, 9, True)])
-def test_rolling_on_is_judged_after_the_beginning(case, at, rolls):
-    cases = np.full(16, Case.RR)
-    cases[at : at + unsteady.LASTING] = case
-    assert unsteady.rolls_on(SimpleNamespace(time=np.linspace(0.0, 1.5, 16), case=cases)) is rolls
-
-
-def test_a_measured_flow_by_both_witnesses(tmp_path):
-    """Noise and a swell that makes the ball slip, a hundred samples a second."""
-    p, t = Parameters.named("reference").replace(c=4.0), np.arange(0.0, 3.0, 0.01)
-    omega_0 = 12.0 + 4.0 * np.sin(2 * np.pi * t / 3.0) + 0.3 * np.random.default_rng(1).standard_normal(len(t))
-    np.savetxt(
-        tmp_path / "flow.csv", np.stack([t, omega_0], axis=-1), delimiter=",", header="time,omega_0", comments=""
-    )
-    flow = Flow.from_csv(tmp_path / "flow.csv")
-    theory, run = (simulate(p, [0, 0, 12.0, 0, 0, 0], 3.0, flow) for simulate in (analytic.simulate, mjsim.simulate))
-    assert {Case.RR, Case.SS} <= set(theory.cases) & set(run.cases)
-    np.testing.assert_allclose(run.omega_c, theory.omega_c, rtol=1e-3)

@@ -2,24 +2,22 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import analytic
 from compare.claim import Outcome
 from compare.judge import judge
-from compare.kit import levels, settling, statistics
+from compare.kit import levels, settling
 from compare.kit.lab import time_unit
 from compare.kit.levels import Level
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
 from compare.subjects.flowmeter import claims as flowmeter
 from compare.subjects.flowmeter import measure as characteristic
 from compare.subjects.stationary import claims as stationary
 from compare.subjects.stationary import measure as settled
-from compare.subjects.thresholds.measure import basins
 from model import Case, Parameters
-from tests.measured import measured, thresholds
+from tests.measured import measured
 
 THICK = Parameters.named("reference").replace(c=10.0)
 
@@ -64,17 +62,6 @@ class TestSettled:
         assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 
 
-def test_a_steady_mean_is_as_sure_as_it_says_and_passes_over_oscillations():
-    t = np.arange(1000) / 1000
-    for rate in (3.0, 10.0, 30.0):
-        means, uncertain = statistics.steady_mean(np.array([2.0 + np.exp(-rate * t)]), 500)
-        assert abs(means[0] - 2.0) <= 3 * uncertain[0]
-    for turns in (20.3, 31.7, 47.1):
-        means, _ = statistics.steady_mean(np.array([2.0 + np.sin(2 * np.pi * turns * t + 1.0)]), 500)
-        # (TAPER/2)!^2/(pi m^(TAPER+1)) for m periods in the window.
-        assert abs(means[0] - 2.0) <= 24**2 / (np.pi * (turns / 2 - 4) ** (statistics.TAPER + 1))
-
-
 def _outcomes(records):
     claims = (*stationary.CLAIMS, *stationary.DIAGRAMS, *flowmeter.CLAIMS)
     return {verdict.claim.id: verdict.outcome for verdict in judge(claims, records)}
@@ -107,33 +94,5 @@ def test_a_slope_of_a_state_that_theory_does_not_know_is_a_refutation():
     assert _outcomes(Records((row,)))["slope-rolling"] is Outcome.REFUTED
 
 
-class TestOthers:
-    def test_the_jump_is_looked_for_where_slipping_was_seen_to_begin(self, lab):
-        known = thresholds("thick", THICK, "omega_01")
-        (only,) = characteristic.slope(lab, {"thick": THICK}, known)
-        assert isinstance(only, Measurement)
-        assert _outcomes(Records((only,)))["slope-jump"] is Outcome.CONFIRMED
-
-    def test_no_loop_without_a_change_from_slipping_to_riding(self, lab):
-        assert [type(row) for row in characteristic.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
-
-
-class TestPlane:
-    def test_points_are_added_at_borders_each_kind_in_turn(self):
-        seen = [(u, 1 if u[0] < 0.5 else 2 if u[1] < 0.5 else 4) for u in basins.spread(60, 1)]
-        added = basins.added(seen)[:12]
-        assert len(added) == 12
-        # Between points that differ: near one of the two lines.
-        assert all(abs(u[0] - 0.5) < 0.25 or abs(u[1] - 0.5) < 0.25 for u in added)
-        assert any(u[0] > 0.6 for u in added)
-        assert any(u[0] < 0.6 and u[1] > 0.6 for u in added)
-
-    def test_a_few_points_are_measured(self, lab, monkeypatch):
-        monkeypatch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, plane_spread=2, plane_added=()))
-        monkeypatch.setattr(basins, "DRAG", 10.0)
-        rows = list(basins.planes(lab, {"reference": THICK}, Records()))
-        masks = [row for row in rows if isinstance(row, Measurement)]
-        assert {m.conditions["figure"] for m in masks} <= set(basins.FIGURES)
-        assert len(masks) + sum(isinstance(row, Missing) for row in rows) >= 2
-        for m in masks:
-            assert int(m.value) & (1 << Case.NR | 1 << Case.NS)  # what starts on the wall stays or sinks
+def test_no_loop_without_a_change_from_slipping_to_riding(lab):
+    assert [type(row) for row in characteristic.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
