@@ -17,7 +17,7 @@ from matplotlib.textpath import text_to_path
 
 from compare import subjects
 from compare.kit import drawing, style
-from compare.kit.drawing import Drawing, Figures, GapError, Material
+from compare.kit.drawing import Drawing, Evidence, Figures, GapError
 from compare.kit.pictures import embedded, svg
 from compare.kit.record import Check
 from compare.kit.statistics import COVERAGE
@@ -50,9 +50,9 @@ def figures_of(claim: str) -> Figures:
     return own if claim in own else own | {f"claim-{claim}": deviations}
 
 
-def measured(material: Material, claim: str) -> Checks:
+def measured(evidence: Evidence, claim: str) -> Checks:
     """The checks of a claim; `GapError` if none has a tolerance, since counts need no figure."""
-    checks = tuple(material.checks.get(claim, ()))
+    checks = tuple(evidence.checks.get(claim, ()))
     if not any(map(_has_tolerance, checks)):
         raise GapError("nothing with a tolerance was measured")
     return checks
@@ -122,9 +122,9 @@ def of_set(p: Parameters) -> Selected:
     return {name: partial(each.of_set, p) for name, each in FIGURES.items() if each.of_set}
 
 
-def of_results(material: Material) -> Selected:
+def of_results(evidence: Evidence) -> Selected:
     """What every figure selects from results."""
-    return {name: partial(each.select, material) for name, each in FIGURES.items()}
+    return {name: partial(each.select, evidence) for name, each in FIGURES.items()}
 
 
 def write(output: Path, selected: Selected, formats: Sequence[str] = ("svg",)) -> Iterator[tuple[str, str]]:
@@ -152,7 +152,7 @@ def write(output: Path, selected: Selected, formats: Sequence[str] = ("svg",)) -
 
 
 def pictures(
-    material: Material, drawings: Mapping[str, Drawing], spread: Spread = map
+    evidence: Evidence, drawings: Mapping[str, Drawing], spread: Spread = map
 ) -> tuple[dict[str, dict[str, str]], str]:
     """Of each figure by its name what a page shows, a picture with its caption, or why there is none; and all letters.
 
@@ -160,10 +160,10 @@ def pictures(
     """
     figures, new = {}, []
     for name, each in drawings.items():
-        path = material.directory / PICTURES / f"{name}.svg"
+        path = evidence.directory / PICTURES / f"{name}.svg"
         figures[name] = {"id": f"figure-{name}", "title": each.title, "gap": ""}
         try:
-            data = each.select(material)
+            data = each.select(evidence)
         except GapError as error:
             figures[name]["gap"] = str(error)
             continue
@@ -172,7 +172,7 @@ def pictures(
         else:
             new.append((path, each, data))
     if new:
-        make_directory(material.directory / PICTURES)
+        make_directory(evidence.directory / PICTURES)
     new.reverse()  # the last ones take longest
     for (path, *_), found in zip(new, spread(drawn, new), strict=True):
         figures[path.stem] |= found

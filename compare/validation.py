@@ -16,7 +16,7 @@ from compare.claim import Claim, Outcome, Verdict
 from compare.judge import forget, select
 from compare.kit import programme
 from compare.kit.campaign import Campaign
-from compare.kit.drawing import Material
+from compare.kit.drawing import Evidence
 from compare.kit.engines import WITNESSES, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
@@ -190,19 +190,19 @@ def stored(directory: Path) -> RecordsByEngine:
     return results.testimony(results.load(directory).files(directory))
 
 
-def material(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Material:
+def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Evidence:
     """What figures of a results directory are made of: of engines beside the one on trial at half the usual step."""
     checks = {v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts}
     first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [Records()]
-    return Material(checks, first, directory, sum(others, Records()))
+    return Evidence(checks, first, directory, sum(others, Records()))
 
 
-def stored_material(directory: Path) -> Material:
+def stored_evidence(directory: Path) -> Evidence:
     """The same from what is stored, judged again; of theory alone if nothing is."""
     if not (directory / results.SUMMARY).exists():
-        return Material()
+        return Evidence()
     testimony = stored(directory)
-    return material(directory, [_in_time(claim, testimony) for claim in CLAIMS], testimony)
+    return evidence(directory, [_in_time(claim, testimony) for claim in CLAIMS], testimony)
 
 
 def _write(
@@ -222,14 +222,14 @@ def _write(
     if over:
         from compare.report import report as page  # here, because drawing takes a second to load
 
-        page.write(material(directory, verdicts, testimony), verdicts, summary, over)
+        page.write(evidence(directory, verdicts, testimony), verdicts, summary, over)
     else:
         results.save(summary, directory)
     return verdicts
 
 
 def _announced(announce: Announce, claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str]) -> Verdict:
-    """The verdict, or that one of the protocols of its claim broke down."""
+    """Judge a claim, an error if one of its protocols broke down, and hand the verdict to whoever wants to know."""
     judged = full_verdict(claim, testimony)
     if errors := [why for name, why in broken.items() if name in claim.protocols]:
         judged = replace(judged, outcome=Outcome.ERROR, error="; ".join(errors))

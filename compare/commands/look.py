@@ -25,7 +25,7 @@ def figures(args: argparse.Namespace) -> int:
             )
         chosen = registry.of_set(*own)
     else:
-        chosen = registry.of_results(validation.stored_material(args.results or Path("results")))
+        chosen = registry.of_results(validation.stored_evidence(args.results or Path("results")))
     for name, gap in registry.write(args.output, chosen, args.format or ["svg"]):
         print(f"{args.output / name}: {gap or 'written'}")
     return 0

@@ -61,9 +61,9 @@ class Bracket:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A question with a yes at `begin.low` and a no at `begin.high`."""
+    """A question with a yes at the lower end of a bracket and a no at the upper one."""
 
-    begin: Bracket
+    bracket: Bracket
     task: Callable[[float, Bracket, Attempt], Task]
     """The run to ask at a value, given the bracket so far."""
     answer: Answer
@@ -96,7 +96,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     uncertain as the bracket before it was wide, see `Bracket.shift`.
     """
     failures, sections = dict[Search, str](), lab.effort.sections
-    brackets = [search.begin for search in searches]
+    brackets = [search.bracket for search in searches]
     before, todo = list(brackets), list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].width > searches[k].width]:
         inside = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist()[1:-1] for k in todo}

@@ -13,7 +13,7 @@ from compare.kit.record import Check, Measurement, Records
 from model import Parameters, StorageError, Trajectory, storage
 from model.files import write_bytes, write_text
 
-if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
+if TYPE_CHECKING:  # it takes half a second to load, and much that hands it over never draws
     from matplotlib.figure import Figure
 
 
@@ -28,21 +28,21 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Material:
-    """What figures are made of: judged numbers, measurements, and run files; without any, theory alone is drawn."""
+class Evidence:
+    """What a validation left, for figures: judged numbers, measurements, run files. Without any, theory is drawn."""
 
     checks: Mapping[str, Sequence[Check]] = field(default_factory=dict)
     """By the id of the claim on which they bear."""
     records: Records = Records()
     directory: Path = Path()
     """The results directory, where names of run files begin."""
-    beside: Records = Records()
+    others: Records = Records()
     """What other engines measured at steps that users take."""
 
     def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
-        """Measurements of a quantity, by whichever engine, that have conditions of these names."""
+        """Measurements of a quantity, by all engines, among whose conditions are those of these names."""
         named = set(conditions)
-        measured = (*self.records.measurements, *self.beside.measurements)
+        measured = (*self.records.measurements, *self.others.measurements)
         return (m for m in measured if m.quantity == quantity and named <= m.conditions.keys())
 
     def motions(self, m: Measurement) -> list[Motion]:
@@ -75,7 +75,7 @@ class Drawing:
     """One figure: a record of the registry."""
 
     title: str
-    select: Callable[[Material], Any]
+    select: Callable[[Evidence], Any]
     """All that is drawn, as data whose repr tells it apart; raises `GapError` where results are missing."""
     draw: Callable[[Any], tuple[Figure, str]]
     """The figure, and its caption: what is shown, with the parameters."""

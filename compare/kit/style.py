@@ -147,7 +147,6 @@ def curve(
     text: str = "",
     place: Place | None = None,
     line: Line = STABLE,
-    width: float = 2,
 ) -> None:
     """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place.
 
@@ -157,7 +156,7 @@ def curve(
     label = f"_{text or ', '.join(case.name for case in cases)}"
     for k, case in enumerate(cases):
         turns = (_TURN * k, (_TURN, _TURN * (len(cases) - 1))) if len(cases) > 1 else line
-        axes.plot(x, y, color=COLOURS[case], ls=turns, lw=width, label=label)
+        axes.plot(x, y, color=COLOURS[case], ls=turns, lw=2, label=label)
     if place:
         points, (at, offset) = np.transpose([x, y]), place
         steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))

@@ -72,7 +72,7 @@ class Workers:
         raise StorageError("workers die as soon as they are started")
 
     def map(self, one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
-        """As Python's own, which a single worker leaves it to; what a worker that died was to do is done here."""
+        """Python's `map` by the workers, in order; what one that died had to do, or a single one, is done here."""
         if self.count < 2:
             yield from map(one, items)
             return

@@ -18,7 +18,7 @@ from markdown_it import MarkdownIt
 from compare.claim import Outcome, Verdict
 from compare.gallery import FIGURES, figures_of, pictures
 from compare.kit import pages
-from compare.kit.drawing import Material
+from compare.kit.drawing import Evidence
 from compare.kit.levels import Level
 from compare.kit.record import Check, Measurement, Records
 from compare.kit.workers import Spread
@@ -34,28 +34,28 @@ REASONS = 12
 _OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
 
 
-def write(material: Material, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> Path:
-    """Write ``summary.json`` and ``report.html`` into the material's results directory; return the page's path.
+def write(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> Path:
+    """Write ``summary.json`` and ``report.html`` into the evidence's results directory; return the page's path.
 
     Figures are drawn by `spread`, a `map`. Raises `model.StorageError` if it can't be written.
     """
-    directory = material.directory
+    directory = evidence.directory
     results.save(summary, directory)
     path = directory / results.REPORT
-    write_text(path, render(material, verdicts, summary, spread))
+    write_text(path, render(evidence, verdicts, summary, spread))
     return path
 
 
-def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> str:
+def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> str:
     """The page as text; what was not run is named in one line, a figure that can't be drawn is a gap."""
-    directory, option = material.directory, _OPTIONS[Level[summary.level]]
+    directory, option = evidence.directory, _OPTIONS[Level[summary.level]]
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     free = {name: each for name, each in FIGURES.items() if not each.claims}
     beside = {verdict.claim.id: figures_of(verdict.claim.id) for verdict in ran if verdict.checks}
     drawings = dict(free)
     for own in beside.values():
         drawings |= own
-    figures, letters = pictures(material, drawings, spread)
+    figures, letters = pictures(evidence, drawings, spread)
     shown: dict[str, str] = {}
     sections: dict[str, list[dict[str, Any]]] = {}
     for verdict in ran:
@@ -87,8 +87,8 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
             f" is {len(orbits)} of the numbers below; the largest relative deviation of these is "
             f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
         )
-    measured = {name for m in material.records.measurements for name in m.runs}
-    sets = {m.set for m in material.records.measurements}
+    measured = {name for m in evidence.records.measurements for name in m.runs}
+    sets = {m.set for m in evidence.records.measurements}
     known = summary.provenance
     files = sum(len(names) for steps in summary.measurements.values() for names in steps.values())
     return pages.render(
@@ -108,7 +108,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         heard=sorted({f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.witnesses[1:]}),
         wording=wording,
         run_of=lambda m: next((name for name in m.runs if storage.exists(directory / name)), ""),
-        numbers=packed(columns(material.records, {v.claim.id: v.checks for v in ran})),
+        numbers=packed(columns(evidence.records, {v.claim.id: v.checks for v in ran})),
         not_run=[verdict.claim for verdict in verdicts if verdict.outcome is Outcome.NOT_RUN],
         not_drawn=[f"{figure['title']}: {figure['gap']}" for figure in apart if figure["gap"]],
         command=f"dualball validate --full -o {directory.resolve().name}",

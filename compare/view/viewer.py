@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -54,22 +53,14 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     return Polar([model], [p], settings, [x0], 0.0, flow([0.5 * settings.timestep]), batched=False)
 
 
-def run(
-    handle: Any,
-    stepper: Polar,
-    flow: Flow,
-    timestep: float,
-    speed: float,
-    clock: Callable[[], float] = time.monotonic,
-    sleep: Callable[[float], None] = time.sleep,
-) -> int:
+def run(handle: Any, stepper: Polar, flow: Flow, timestep: float, speed: float) -> int:
     """Step and draw until the window is closed; return the number of steps.
 
     The simulation follows the clock; where it can't, it runs as fast as it can.
     """
-    steps, begin, most = 0, clock(), max(1, int(BEHIND * speed / timestep))
+    steps, begin, most = 0, time.monotonic(), max(1, int(BEHIND * speed / timestep))
     while handle.is_running():
-        frame = clock()
+        frame = time.monotonic()
         due = int((frame - begin) * speed / timestep) - steps
         if due > most:
             begin += (due - most) * timestep / speed
@@ -78,5 +69,5 @@ def run(
             stepper.advance(flow((steps + 0.5 + np.arange(due)) * timestep)[:, None])
         steps += due
         handle.sync()
-        sleep(max(0.0, FRAME - (clock() - frame)))
+        time.sleep(max(0.0, FRAME - (time.monotonic() - frame)))
     return steps

@@ -21,7 +21,7 @@ from compare.catalogue import CLAIMS
 from compare.commands import cli
 from compare.gallery import FIGURES, figures_of
 from compare.kit import drawing, style
-from compare.kit.drawing import GapError, Material, Motion
+from compare.kit.drawing import Evidence, GapError, Motion
 from compare.kit.engines import ENGINES
 from compare.kit.record import Check, Measurement, Records
 from compare.subjects.flowmeter import figures as flowmeter
@@ -45,7 +45,7 @@ def check(m: Measurement, predicted: float, tolerance: float = 3e-9) -> Check:
 
 
 @pytest.fixture(scope="module")
-def material() -> Material:
+def evidence() -> Evidence:
     """A few results of every kind that a figure shows."""
     states = [
         measurement("omega_c", 10.0),
@@ -64,7 +64,7 @@ def material() -> Material:
         "prop-1": (check(states[0], 10.0), check(states[1], 10.0)),
     }
     beside = [measurement("omega_c", 9.0, engine=name) for name in ("mujoco-plain", "mujoco-defaults")]
-    return Material(checks, Records((*states, *plane)), Path("nowhere"), Records(tuple(beside)))
+    return Evidence(checks, Records((*states, *plane)), Path("nowhere"), Records(tuple(beside)))
 
 
 @pytest.fixture
@@ -90,12 +90,12 @@ def few_points() -> Iterator[None]:
 @functools.cache
 def alone(name: str) -> tuple[Any, Figure, str]:
     """What a figure of theory alone shows, the figure, and its caption."""
-    data = FIGURES[name].select(Material())
+    data = FIGURES[name].select(Evidence())
     return data, *FIGURES[name].draw(data)
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_every_figure_draws_and_gives_its_parameters(name: str, material: Material, no_engine) -> None:
+def test_every_figure_draws_and_gives_its_parameters(name: str, evidence: Evidence, no_engine) -> None:
     drawing = FIGURES[name]
     if name == "characteristic":
         with pytest.raises(GapError, match="measured"):
@@ -103,7 +103,7 @@ def test_every_figure_draws_and_gives_its_parameters(name: str, material: Materi
     else:
         assert alone(name)[2].endswith(".")
     buffer = io.BytesIO()
-    figure, caption = drawing.draw(drawing.select(material))
+    figure, caption = drawing.draw(drawing.select(evidence))
     figure.savefig(buffer, format="png", dpi=40)
     assert buffer.tell() > 1000
     assert caption.endswith(".")
@@ -167,9 +167,9 @@ def test_the_path_of_slip_bends_and_ends_as_the_paper_says(name: str) -> None:
     assert (np.linalg.norm(path[-1]) > slipping.PUSHED) == (name == "fig-5")
 
 
-def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(material: Material) -> None:
+def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(evidence: Evidence) -> None:
     for name in ("fig-7", "fig-8"):
-        data = FIGURES[name].select(material)
+        data = FIGURES[name].select(evidence)
         figure, caption = FIGURES[name].draw(data)
         (axes,) = figure.axes
         assert any("bistable" in text.get_text() for text in axes.texts)
@@ -178,9 +178,9 @@ def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(ma
         assert ("not as predicted in 1 (crossed)" in caption) == (name == "fig-7")
 
 
-def test_measured_states_have_their_engines_marks(material: Material) -> None:
+def test_measured_states_have_their_engines_marks(evidence: Evidence) -> None:
     """Plain MuJoCo and MuJoCo as it comes stand beside the engine on trial, and the caption says with which step."""
-    data = FIGURES["characteristic"].select(material)
+    data = FIGURES["characteristic"].select(evidence)
     figure, caption = FIGURES["characteristic"].draw(data)
     assert "mujoco-plain and mujoco-defaults: as measured with a time step of 2 ms" in caption
     axes = figure.axes[0]
@@ -192,7 +192,7 @@ def test_deviations_are_drawn_over_tolerance() -> None:
     m = measurement("omega_c", 10.0)
     far, equal = (dataclasses.replace(check(m, 10.0), predicted=value) for value in (9.0, 10.0))
     count = check(measurement("case", 0.0), 0.0, 0.0)
-    made = Material({"x": (check(m, 10.0 - 1.5e-9), far, equal, count)})
+    made = Evidence({"x": (check(m, 10.0 - 1.5e-9), far, equal, count)})
     drawing = figures_of("x")["claim-x"]
     figure, caption = drawing.draw(drawing.select(made))
     (axes,) = figure.axes
@@ -203,7 +203,7 @@ def test_deviations_are_drawn_over_tolerance() -> None:
     assert "4 numbers of mujoco, of which 3 have a tolerance" in caption
     assert "μ = 0.2" in caption
     with pytest.raises(GapError):
-        drawing.select(Material({"x": (count,)}))
+        drawing.select(Evidence({"x": (count,)}))
 
 
 def test_the_fall_shows_cases_and_impact() -> None:
@@ -229,26 +229,26 @@ def test_claims_have_their_own_figures_or_deviations() -> None:
 def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     chosen = {name: FIGURES[name] for name in ("fig-9", "characteristic")}
     monkeypatch.setattr(registry, "FIGURES", chosen)
-    assert dict(registry.write(tmp_path, registry.of_results(Material()), ("svg", "png"))) == {
+    assert dict(registry.write(tmp_path, registry.of_results(Evidence()), ("svg", "png"))) == {
         "fig-9": "",
         "characteristic": "not drawn: no settled states were measured with its parameter sets",
     }
     assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-9.png", "fig-9.svg"]
     assert "Stationary solutions off the floor" in (tmp_path / "captions.txt").read_text("utf-8")
     with pytest.raises(InputError, match="bmp"):
-        list(registry.write(tmp_path, registry.of_results(Material()), ("bmp",)))
+        list(registry.write(tmp_path, registry.of_results(Evidence()), ("bmp",)))
     (tmp_path / "file").touch()
     with pytest.raises(StorageError):
-        list(registry.write(tmp_path / "file", registry.of_results(Material())))
+        list(registry.write(tmp_path / "file", registry.of_results(Evidence())))
 
 
-def test_how_figures_look(material: Material) -> None:
+def test_how_figures_look(evidence: Evidence) -> None:
     assert set(style.COLOURS) == set(Case)
     assert len(set(style.COLOURS.values())) == len(Case)
     symbols = {"omega_c": "$ω_{c}$", "slip_x": r"$\tilde{ω}_{x}$", "wall_spin": "$ω_{x}^0$"}
     symbols |= {"force_Ax-By": "$A_{x}$ − $B_{y}$", "gamma": "γ", "hops": "hops on"}
     assert {name: style.symbol(name) for name in symbols} == symbols
-    states = list(material.select("omega_c", "case"))[:2]
+    states = list(evidence.select("omega_c", "case"))[:2]
     words = style.caption(Parameters.named("reference"), "What it is.", states=states)
     assert words.startswith("What it is. μ = 0.2, η = 0.2, j = 0.4, κ = ")
     assert ". Marks: measured (2)" in words

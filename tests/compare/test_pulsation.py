@@ -47,7 +47,7 @@ def test_a_mean_may_depend_on_more_than_the_state(lab):
     early, late = (theory.mean_error(p, a, f, leave_rolling=rule) for rule in rules)
     assert late - early > 0.015 * abs(early)
     begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
-    driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
+    driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, lead=float(begin) / a)
     (row,) = unsteady.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
     assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolves * 0.9 * abs(row.value)
 

@@ -21,7 +21,7 @@ from compare import gallery
 from compare.claim import Bearing, Claim, Outcome, Text, Verdict, Witness
 from compare.commands import cli, validate
 from compare.gallery import FIGURES
-from compare.kit.drawing import Drawing, GapError, Material
+from compare.kit.drawing import Drawing, Evidence, GapError
 from compare.kit.levels import Level
 from compare.kit.pages import readable, typeset
 from compare.kit.record import Check, Missing, Records
@@ -81,8 +81,8 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def page(directory: Path, few_figures: None) -> Path:
     records = Records(tuple(check.measurement for check in VERDICTS[0].checks))
-    material = Material({verdict.claim.id: verdict.checks for verdict in VERDICTS}, records, directory)
-    return report.write(material, VERDICTS, Summary.of(directory, VERDICTS, Level.QUICK, {}))
+    evidence = Evidence({verdict.claim.id: verdict.checks for verdict in VERDICTS}, records, directory)
+    return report.write(evidence, VERDICTS, Summary.of(directory, VERDICTS, Level.QUICK, {}))
 
 
 def row(text: str, name: str) -> str:
@@ -177,7 +177,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, mo
     }
     monkeypatch.setattr(report, "FIGURES", {})
     monkeypatch.setattr(report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims})
-    page = report.write(Material(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, {}))
+    page = report.write(Evidence(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, {}))
     text = page.read_text("utf-8")
     assert text.count('<figure class="plot"') == 1
     assert '<a href="#figure-fall">A fall</a>: see good.' in row(text, "bad")
@@ -185,7 +185,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, mo
 
 
 def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
-    page = report.write(Material(directory=tmp_path), [], Summary.of(tmp_path, [], Level.QUICK, {}))
+    page = report.write(Evidence(directory=tmp_path), [], Summary.of(tmp_path, [], Level.QUICK, {}))
     text = page.read_text("utf-8")
     assert "Nothing has been checked yet" in text
     assert 'id="claims"' not in text
@@ -287,12 +287,12 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     summary, pages = Summary.of(tmp_path, VERDICTS, Level.QUICK, {}), []
     with processes(2) as work:
         for name, how in (("there", work.map), ("here", map)):
-            material = Material({v.claim.id: v.checks for v in VERDICTS}, directory=tmp_path / name)
-            (material.directory / gallery.PICTURES).mkdir(parents=True)
-            pages.append(report.render(material, VERDICTS, summary, how))
+            evidence = Evidence({v.claim.id: v.checks for v in VERDICTS}, directory=tmp_path / name)
+            (evidence.directory / gallery.PICTURES).mkdir(parents=True)
+            pages.append(report.render(evidence, VERDICTS, summary, how))
     assert pages[0].replace("-o there", "-o here") == pages[1]
     assert pages[1].count('<figure class="plot"') > 1
-    assert report.render(material, VERDICTS, summary, lambda one, new: iter(())) == pages[1]  # has room for no new one
+    assert report.render(evidence, VERDICTS, summary, lambda one, new: iter(())) == pages[1]  # has room for no new one
 
 
 def test_errata_are_the_documented_ones() -> None:

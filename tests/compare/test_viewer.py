@@ -13,7 +13,7 @@ from model import Flow, Parameters
 
 
 class Window:
-    """Closes after so many pictures; a picture takes 1/64 s, a number without round-off."""
+    """Closes after so many pictures, and is the clock: a picture takes 1/64 s, a number without round-off."""
 
     def __init__(self, pictures: int, takes: float = 1 / 64) -> None:
         self.left, self.takes, self.now = pictures, takes, 0.0
@@ -28,12 +28,19 @@ class Window:
         self.left -= 1
         self.now += self.takes
 
+    def monotonic(self) -> float:
+        return self.now
 
-def test_the_loop_is_that_of_a_simulation(reference: Parameters) -> None:
+    def sleep(self, seconds: float) -> None:
+        pass
+
+
+def test_the_loop_is_that_of_a_simulation(reference: Parameters, monkeypatch: pytest.MonkeyPatch) -> None:
     p, x0 = reference.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0]
     flow, settings = Flow.ramp(20.0, 25.0, 0.3), ContactSettings()
     stepper, window = viewer.start(p, x0, flow, settings), Window(33)
-    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0, lambda: window.now, lambda seconds: None)
+    monkeypatch.setattr(viewer, "time", window)
+    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0)
     assert steps == 500  # half a second: the first of the 33 pictures shows the start
     run = mjsim.simulate(p, x0, 0.5, flow, settings, sample_interval=0.5)
     qpos, qvel = np.array(stepper.data.qpos), np.array(stepper.data.qvel)
@@ -43,11 +50,12 @@ def test_the_loop_is_that_of_a_simulation(reference: Parameters) -> None:
     np.testing.assert_array_less(np.abs(recorder.state(qpos, qvel, p) - run.x[-1]), 4 * np.finfo(float).eps * scale)
 
 
-def test_a_slow_machine_does_not_run_after_the_clock(reference: Parameters) -> None:
+def test_a_slow_machine_does_not_run_after_the_clock(reference: Parameters, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = ContactSettings()
     flow, window = Flow.steady(12.0), Window(4, takes=3.0)
     stepper = viewer.start(reference, [0, 0, 12.0, 0, 0, 0], flow, settings)
-    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0, lambda: window.now, lambda seconds: None)
+    monkeypatch.setattr(viewer, "time", window)
+    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0)
     assert steps == 3 * round(viewer.BEHIND / settings.timestep)
 
 

@@ -20,7 +20,7 @@ from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import OrbitBranch
 from compare.branches import Drawn, going_round, lifted, slipping, spin
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, Material
+from compare.kit.drawing import Diagram, Drawing, Evidence
 from compare.subjects.attractors.basins import FATES, Basins
 from model import Case, Parameters, State
 from model.files import reading_json
@@ -30,9 +30,9 @@ LOWEST_FLOW, HIGHEST_FLOW = 0.9, 1.4
 """Flows shown, in units of omega_02."""
 
 
-def select(material: Material, quantity: str) -> Diagram:
+def select(evidence: Evidence, quantity: str) -> Diagram:
     """What was measured of the hopping ball; the orbits are theory's."""
-    return Diagram(quantity, SET, tuple(material.select(quantity, "period")))
+    return Diagram(quantity, SET, tuple(evidence.select(quantity, "period")))
 
 
 @functools.cache

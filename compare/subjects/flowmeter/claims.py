@@ -250,7 +250,7 @@ CLAIMS = (
     claim(
         "time-constants",
         "Prop. 1, section 5.2",
-        "The slowest disturbance of rolling dies out with the response time of a design.",
+        "The slowest disturbance of rolling dies out with the time constant that a design gives for a meter.",
         Bearing(
             "rates",
             "slowest_decay",

@@ -14,7 +14,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation import simulator
 from compare.branches import check_thresholds, ends, fold_state, slipping
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion, only_where
+from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, Motion, only_where
 from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
 from model import Case, Contact, Parameters
@@ -26,11 +26,11 @@ _SETTLED = frozenset({"settled", "hysteresis"})
 """Protocols whose omega_c is that of a settled state."""
 
 
-def select_curves(material: Material) -> tuple[Diagram, ...]:
+def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
     """The settled states of every engine with the two sets of the paper's kind, without balls that only sink (NS)."""
     settled = [
         m
-        for m in material.select("omega_c", "case")
+        for m in evidence.select("omega_c", "case")
         if m.protocol in _SETTLED and m.parameters.omega_0 > 0 and m.conditions["case"] != "NS"
     ]
     if not any(m.set in SETS.values() for m in settled):
@@ -71,13 +71,13 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
     )
 
 
-def select_figure_13(material: Material, figure: str) -> Diagram:
+def select_figure_13(evidence: Evidence, figure: str) -> Diagram:
     """The settled states of a panel: left, those of a flow that is raised and lowered in held steps."""
     if figure == "fig-13-left":
-        rows = [m for m in material.select("omega_c", "side") if m.conditions["side"] in _WAYS]
-        rows += material.select("edge_omega_c")
+        rows = [m for m in evidence.select("omega_c", "side") if m.conditions["side"] in _WAYS]
+        rows += evidence.select("edge_omega_c")
     else:
-        rows = [m for m in material.select("omega_c", "case") if m.protocol == "settled"]
+        rows = [m for m in evidence.select("omega_c", "case") if m.protocol == "settled"]
     name = SETS[figure]
     return Diagram(figure, Parameters.named(name), tuple(m for m in rows if m.set == name))
 
@@ -147,10 +147,10 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     return t
 
 
-def select_fall(material: Material) -> Motion:
+def select_fall(evidence: Evidence) -> Motion:
     """A measured fall, if its run file is there, else that of the event-driven simulation."""
-    for m in material.records.select("unloading", where=lambda m: m.set == SETS["fig-13-right"]):
-        if m.conditions["start"] == "unloading" and (motions := material.motions(m)):
+    for m in evidence.records.select("unloading", where=lambda m: m.set == SETS["fig-13-right"]):
+        if m.conditions["start"] == "unloading" and (motions := evidence.motions(m)):
             return motions[-1]  # with the finest step
     return fall_of_set(Parameters.named(SETS["fig-13-right"]))
 

@@ -93,8 +93,8 @@ LAW_CLAIMS = (
     claim(
         "table-4",
         "Table 4, (22)",
-        "A ball that is pushed a little out of a stationary motion has as many ways to move as the domain of its case "
-        "has dimensions.",
+        "A ball that is pushed a little out of a stationary motion moves in as many independent ways as the domain of "
+        "its case has dimensions.",
         Bearing("rates", "modes", lambda m: _DIMENSIONS[m.conditions["case"]], by="Table 4"),
     ),
     claim(

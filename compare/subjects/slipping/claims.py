@@ -112,8 +112,8 @@ CLAIMS = (
         claim(
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
-            f"A slight slip out of {arrow[0].name} in any direction of {arrow[1].name} grows at the rate γ while the "
-            "forces admit it; else the ball passes into another case, as the equations of motion say.",
+            f"Out of {arrow[0].name} a slight slip in any direction that {arrow[1].name} allows grows at the rate γ "
+            "while forces admit it; else the ball passes into another case, as the equations of motion say.",
             *(
                 Bearing("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
                 for gamma, by in ((_gamma, "slip_stability.gamma"), (_gamma_nr, "slip_bounds.gamma_nr"))
@@ -151,7 +151,7 @@ CLAIMS = (
     claim(
         "eq-66",
         "(66)",
-        "A ball that lags behind the fluid begins to slip at the wall where (66) says.",
+        "A ball that rolls round slower than the fluid begins to slip at the wall once the difference exceeds (66).",
         *_bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y")))),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
@@ -165,7 +165,7 @@ CLAIMS = (
     claim(
         "eq-73",
         "(73)",
-        "A ball that lags behind the fluid begins to slip at the floor where (73) says.",
+        "A ball that rolls round slower than the fluid begins to slip at the floor once the difference exceeds (73).",
         *_bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x")))),
     ),
     claim(
@@ -178,13 +178,13 @@ CLAIMS = (
     claim(
         "eq-82",
         "(82)",
-        "Slip at both points at once, with directions (0, 0), grows above ω₀₁ and dies out below.",
+        "Slip at both points at once, in the directions α = β = 0, grows above ω₀₁ and dies out below.",
         *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
     ),
     claim(
         "eq-83",
         "(83)",
-        "Slip at both points with directions (π, π) dies out: (83) has no bound for η < 1.",
+        "Slip at both points in the directions α = β = π dies out: (83) has no bound for η < 1.",
         *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
     ),
     claim(

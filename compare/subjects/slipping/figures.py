@@ -12,7 +12,7 @@ from analytic.bifurcation.diagram import thresholds
 from analytic.simulation import simulator
 from compare.branches import check_thresholds
 from compare.kit import style
-from compare.kit.drawing import Drawing, Material, Motion
+from compare.kit.drawing import Drawing, Evidence, Motion
 from compare.kit.engines import EVENT
 from model import Case, Parameters
 
@@ -37,7 +37,7 @@ def of_set(p: Parameters, figure: str) -> Motion:
     )
 
 
-def select(_: Material, figure: str) -> Motion:
+def select(_: Evidence, figure: str) -> Motion:
     """That of the set of the paper's kind, measured or not."""
     return of_set(SET, figure)
 

@@ -213,7 +213,7 @@ def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
 
 
 def stays(run: Trajectory, case: Case) -> int:
-    """Samples after the first for which a run is in a case, and the first.
+    """For how many samples a run stays in a case; the first one counts, whatever it is in.
 
     A ball on an almost unloaded floor may bounce by less than a contact's gap; it is in SR until the floor lets go.
     """

@@ -22,7 +22,7 @@ from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
 from compare.branches import check_thresholds, fold_state, going_round, lifted, slipping, spin
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, GapError, Material, only_where
+from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, only_where
 from compare.kit.record import Check
 from compare.kit.style import UNSTABLE
 from model import Case, Parameters, State
@@ -55,9 +55,9 @@ class Plane:
     checks: tuple[Check, ...] = ()
 
 
-def select_plane(material: Material, figure: str) -> Plane:
+def select_plane(evidence: Evidence, figure: str) -> Plane:
     """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the first."""
-    checks = material.checks.get(figure, ())
+    checks = evidence.checks.get(figure, ())
     chosen = tuple(c for c in checks if c.measurement.set == checks[0].measurement.set)
     return Plane(chosen[0].measurement.parameters if chosen else _THEORY, figure == "fig-8", chosen)
 
@@ -171,12 +171,12 @@ _SHOWN = {
 }
 
 
-def select_diagram(material: Material, figure: str) -> Diagram:
+def select_diagram(evidence: Evidence, figure: str) -> Diagram:
     """The measured spins on the wall, by case and set."""
     if figure == "fig-12":
         return Diagram(figure, RELEASED)
     name, cases = _SETS[figure]
-    measured = [*material.select("wall_spin", "case"), *material.select("edge_wall_spin", "case")]
+    measured = [*evidence.select("wall_spin", "case"), *evidence.select("edge_wall_spin", "case")]
     own = tuple(m for m in measured if m.set == name and m.conditions["case"] in cases)
     return Diagram(figure, Parameters.named(name), own)
 

@@ -15,7 +15,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import pulsation, response
 from compare.branches import slipping
 from compare.kit import style
-from compare.kit.drawing import Drawing, Material, Motion
+from compare.kit.drawing import Drawing, Evidence, Motion
 from compare.kit.record import Measurement
 from compare.subjects.unsteady.measure import caught_up, odd_part
 from model import Case, Flow, Parameters
@@ -47,10 +47,10 @@ class Measurements:
         return next((m.parameters for m in self.of("gain")), REFERENCE)
 
 
-def select(material: Material, figure: str) -> Measurements:
+def select(evidence: Evidence, figure: str) -> Measurements:
     """The measurements of a protocol; for the jumps their runs with the finer step, too."""
-    own = tuple(m for m in material.records.measurements if m.protocol == figure and m.set == SET)
-    runs = [motion for m in own if m.quantity == "jump_height" for motion in material.motions(m)[-2:]]
+    own = tuple(m for m in evidence.records.measurements if m.protocol == figure and m.set == SET)
+    runs = [motion for m in own if m.quantity == "jump_height" for motion in evidence.motions(m)[-2:]]
     return Measurements(own, tuple(runs[:2]))
 
 

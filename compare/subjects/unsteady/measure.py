@@ -95,10 +95,10 @@ class Pulsation:
     """rad s-1"""
     reach: float
     """Largest amplitude of omega_c that is tried, rad s-1."""
-    begin: float = 0.0
+    lead: float = 0.0
     """omega_c less the mean flow as a period begins, divided by the amplitude."""
     power: float = 0.0
-    """Power of the amplitude with which `begin` grows."""
+    """Power of the amplitude with which `lead` grows."""
     ratio: complex = 1.0
     """omega_c divided by omega_0, from the Fourier sums over two periods."""
     uncertainty: float = math.inf
@@ -111,11 +111,11 @@ class Pulsation:
     def start(self, amplitude: float) -> Array:
         """The state (8,) of a ball that follows a pulsation of an amplitude, as it begins."""
         grown = (amplitude / self.amplitude) ** self.power
-        return State(omega_c=self.p.omega_0 + amplitude * self.begin * grown).stacked()
+        return State(omega_c=self.p.omega_0 + amplitude * self.lead * grown).stacked()
 
-    def begun(self, omega_c: float) -> Pulsation:
+    def leading(self, omega_c: float) -> Pulsation:
         """The same with this omega_c as a period begins."""
-        return replace(self, begin=(omega_c - self.p.omega_0) / self.amplitude)
+        return replace(self, lead=(omega_c - self.p.omega_0) / self.amplitude)
 
     def task(self, lab: Lab, amplitude: float, x: Array, timing: Timing, largest: float = 0.0) -> Task:
         """A run from a state, with as many steps in a period, a power of two, as the `largest` amplitude needs."""
@@ -190,7 +190,7 @@ def _rounds(
                 continue
             omega_c = limit(run.omega_c[samples::samples])
             slid = State.of(run.x[-1])._replace(omega_c=omega_c).stacked()
-            states[k] = slid if slips else each.begun(omega_c).start(a)
+            states[k] = slid if slips else each.leading(omega_c).start(a)
             seen[k] = [*before[-1:], Round(task, run, omega_c)]
     return seen
 
@@ -209,7 +209,7 @@ def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
             for t, x in ((run.time, run.omega_c) for _, run, _ in seen)
         )
         failure = "" if rolls_on(seen[-1].run) else "a ball slips in a pulsation half as large as in a slow one"
-        new, change, tasks = each.begun(seen[-1].omega_c), abs(ratio - first), tuple(task for task, *_ in seen)
+        new, change, tasks = each.leading(seen[-1].omega_c), abs(ratio - first), tuple(task for task, *_ in seen)
         followed.append(replace(new, ratio=ratio, uncertainty=change, failure=failure, tasks=tasks))
     return followed
 
@@ -219,12 +219,12 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     raised, todo = list(pulsations), [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
     for _ in range(12):
         higher = [
-            replace(each, amplitude=RAISE * each.amplitude, begin=each.begin * RAISE**each.power)
+            replace(each, amplitude=RAISE * each.amplitude, lead=each.lead * RAISE**each.power)
             for each in (raised[k] for k in todo)
         ]
         still = [(k, each) for k, each in zip(todo, _followed(lab, higher), strict=True) if not each.failure]
         for k, each in still:
-            raised[k] = replace(each, power=math.log(each.begin / raised[k].begin, RAISE))
+            raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, RAISE))
         todo = [k for k, _ in still]
     return raised
 
@@ -234,15 +234,15 @@ def _search(lab: Lab, each: Pulsation) -> Search:
 
     def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
         timing = Timing(1.5 * attempt.time, lab.effort.pulsation_samples, 2 * attempt.refine)
-        return each.task(lab, amplitude, each.start(amplitude), timing, largest=begin.high)
+        return each.task(lab, amplitude, each.start(amplitude), timing, largest=first.high)
 
     if each.p.drag == STOKES:
         # Slip may begin from about half the largest amplitude on: the width is taken relative to that.
         largest = each.reach / abs(each.ratio)
-        begin, size = Bracket(0.0, largest), largest / 2
+        first, size = Bracket(0.0, largest), largest / 2
     else:
-        begin, size = Bracket(0.99 * each.amplitude, RAISE * each.amplitude), each.amplitude
-    return Search(begin, task, rolls_on, lab.effort.pulsation_width * size)
+        first, size = Bracket(0.99 * each.amplitude, RAISE * each.amplitude), each.amplitude
+    return Search(first, task, rolls_on, lab.effort.pulsation_width * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
