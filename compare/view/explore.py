@@ -7,6 +7,7 @@ without a network. Each tab has a set and a motion of its own, by the event-driv
 from __future__ import annotations
 
 import errno
+import json
 import socket
 import tempfile
 from collections.abc import Callable
@@ -22,19 +23,14 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from compare.branches import ends, slipping_curve
 from compare.kit.pages import typeset
-from compare.kit.style import COLOURS, FORCE
+from compare.kit.style import COLOURS
 from compare.subjects.thresholds.figures import TINTS
-from compare.view.geometry import orientations
+from compare.view import page as motion
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
-from model.kinematics import frame, to_world
 
 HOST = "127.0.0.1"
 LASTS, RATE = 10.0, 60
 """Duration of a motion, s, and its samples a second."""
-REACH = 0.6
-"""Length of the arrow of the largest force, in units of R."""
-TICK = 0.05
-"""Time between two pictures, s."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
 SLIDERS: dict[str, tuple[str, float, float, float]] = {
@@ -57,11 +53,10 @@ class Tab:
     p: Parameters
     start: State = field(default_factory=lambda: State(omega_c=0.0))
     run: Trajectory | None = None
-    turns: Any = None
-    """How the ball is turned at each sample."""
-    clock: float = 0.0
     asked: int = 0
     """Number of the simulation that was asked for last."""
+    play: Callable[[], None] = lambda: None
+    """Shows the run."""
 
 
 def changed(p: Parameters, name: str, value: float | str) -> Parameters:
@@ -152,13 +147,13 @@ def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more
     return {"data": data, "layout": layout | more}
 
 
-def simulated(p: Parameters, start: State) -> tuple[Trajectory, Any]:
-    """A motion and how the ball is turned; what there is of one that breaks down."""
+def simulated(p: Parameters, start: State) -> Trajectory:
+    """A motion; what there is of one that breaks down."""
     try:
-        run = analytic.simulate(p, start.stacked(), LASTS, sample_interval=1 / RATE)
+        return analytic.simulate(p, start.stacked(), LASTS, sample_interval=1 / RATE)
     except SimulationError as error:
-        run = error.trajectory
-    return run, orientations(run)
+        run: Trajectory = error.trajectory
+        return run
 
 
 def said(p: Parameters) -> str:
@@ -179,6 +174,7 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     try:
         from nicegui import app, ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware
+        from starlette.responses import HTMLResponse
     except ImportError as error:
         raise InputError("explore needs NiceGUI: pip install 'dualball[explore]'") from error
     with socket.socket() as tried:
@@ -190,6 +186,8 @@ def serve(p: Parameters, port: int, show: bool) -> None:
         except OSError as error:
             why = "is in use" if error.errno == errno.EADDRINUSE else f"can't be had: {error.strerror}"
             raise InputError(f"port {port} {why}; choose another one by --port") from error
+    scene = motion.write(p, 1.0)
+    app.add_route("/motion", lambda _: HTMLResponse(scene))
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
     ui.run(
@@ -202,13 +200,14 @@ def page(p: Parameters) -> None:
     from nicegui import ui
 
     tab, draw = Tab(p), list[Callable[[], None]]()
-    with ui.row().classes("w-full no-wrap"):
+    wide = "flex: 1 1 26rem; min-width: 0"
+    with ui.row().classes("w-full"):
         with ui.column().classes("w-80"):
             follow = _controls(ui, tab, draw)
-        with ui.column().classes("grow"):
+        with ui.column().style(wide):
             _theory(ui, tab, draw, follow)
-        with ui.column().classes("grow"):
-            _motion(ui, tab)
+        with ui.column().style(wide):
+            tab.play = _motion(ui, tab)
     follow()
 
 
@@ -225,7 +224,8 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
             ui.notify(str(error), type="negative")
             return
         if found and mine == tab.asked:  # nothing else was asked for meanwhile
-            (tab.run, tab.turns), tab.clock = found, 0.0
+            tab.run = found
+            tab.play()
 
     def change(name: str, event: Any) -> None:
         if event.value is None or (name in SLIDERS and float(event.value) == value(name)):
@@ -306,55 +306,15 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
     ui.label("A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η and ω₀.")
 
 
-def _motion(ui: Any, tab: Tab) -> None:
-    """The vessel, the ball that rolls in it, and the forces of floor and wall; lengths in units of R."""
-    p, upright = tab.p, [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
-    size = p.r / p.R
-    label = ui.label().classes("text-lg case")
-    scene = ui.scene(width=560, height=480, grid=False, background_color="#ffffff").classes("w-full")
-    scene.move_camera(0, -2.3, 1.7, 0, 0, 0.1)
-    with scene:
-        wall = scene.cylinder(1 + size, 1 + size, 1, 64, wireframe=True).rotate_R(upright).material("#7794ad", 0.35)
-        scene.cylinder(1 + size, 1 + size, 0.01, 64).rotate_R(upright).move(0, 0, -0.005).material("#dfe5ea")
-        with scene.group() as ball:
-            scene.sphere(size).material("#f5cc6b")
-            for spot in np.vstack([np.eye(3), -np.eye(3)]).tolist():
-                scene.sphere(0.2 * size, 12, 8).move(*(0.9 * size * v for v in spot)).material("#8a6d1f")
-        arrows = [scene.group() for _ in "AB"]
-        for arrow in arrows:
-            with arrow:
-                scene.cylinder(0.02, 0.02, 1, 12).rotate_R(upright).move(0, 0, 0.5).material(FORCE)
+def _motion(ui: Any, tab: Tab) -> Callable[[], None]:
+    """The page that `render` writes of a run, as a part of this one; what is returned hands it the run of the tab."""
+    within = ui.element("iframe").props('src="/motion" title="motion"').classes("w-full motion")
+    within.style("height: 48rem; border: 0")
 
-    largest = 1.0
+    def play() -> None:
+        if tab.run and len(tab.run.time):
+            frames = json.dumps(motion.frames(tab.run, tab.run.time))
+            within.client.run_javascript(f"getHtmlElement({within.id}).contentWindow.postMessage({frames}, origin)")
 
-    def tick() -> None:
-        nonlocal largest
-        run = tab.run
-        if run is None or not len(run.time):
-            return
-        if tab.clock == 0:  # a new run: as tall a vessel as it needs, arrows by its largest force
-            tall = float(run.y.max()) / p.R + 3 * size
-            wall.scale(1, tall, 1).move(0, 0, tall / 2)
-            largest = max(p.m * p.g, float(np.abs([run.force_A, run.force_B]).max()))
-        k = int(tab.clock * RATE) % len(run.time)
-        tab.clock += TICK
-        axes = frame(run.theta[k])
-        centre = to_world(run.x[k], run.theta[k], p).position / p.R
-        ball.move(*centre.tolist()).rotate_R(tab.turns[k].as_matrix().tolist())
-        for arrow, normal, force in zip(arrows, (axes[1], axes[0]), (run.force_A[k], run.force_B[k]), strict=True):
-            along = axes.T @ force * (REACH / largest)
-            length = max(float(np.linalg.norm(along)), 1e-6)
-            arrow.move(*(centre - size * normal).tolist()).rotate_R(_towards(along)).scale(1, 1, length)
-        case = run.cases[k].name
-        label.set_text(f"{case}   t = {run.time[k]:.2f} s   ω_c = {run.omega_c[k]:.3g} rad/s")
-
-    ui.timer(TICK, tick)
-
-
-def _towards(direction: Any) -> list[list[float]]:
-    """A rotation that turns the z axis into a direction."""
-    z = direction / max(float(np.linalg.norm(direction)), 1e-12)
-    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
-    x /= max(float(np.linalg.norm(x)), 1e-12)
-    rotation: list[list[float]] = np.column_stack([x, np.cross(z, x), z]).tolist()
-    return rotation
+    within.on("load", play)
+    return play

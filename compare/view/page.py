@@ -16,25 +16,22 @@ import numpy as np
 from compare.kit.pages import render
 from compare.kit.style import BALL, COLOURS, FORCE, SLIP
 from compare.view.geometry import geometry, resampled
-from model import Case, InputError, Trajectory
+from model import Case, InputError, Parameters, Trajectory
 from model.arrays import Array
 
 DIGITS = 4
 """Of lengths, in units of R, and of parts of quaternions."""
 
 
-def write(run: Trajectory, times: Array, speed: float, **arrows: float) -> str:
-    """The page of a run at times (n,) in s, which plays at a multiple of real time; `arrows` as in `render.write`.
-
-    Raises `InputError` if NiceGUI, an extra, isn't installed.
-    """
+def frames(run: Trajectory, times: Array, **arrows: float) -> dict[str, Any]:
+    """What moves on the page, frame by frame, at times (n,) in s; `arrows` as in `render.write`."""
     p, now = run.header.parameters, resampled(run, times)
     seen = geometry(run, now, **arrows)
     columns = [
         seen.centres / p.R, seen.turns.as_quat(),
         *(part[k] / p.R for k in range(2) for part in (seen.contacts, seen.forces, seen.slips)),
     ]  # fmt: skip
-    motion = {
+    return {
         "time": np.round(times, 6).tolist(),
         "omega_0": np.round(np.broadcast_to(run.header.flow(times), times.shape), 3).tolist(),
         "omega_c": np.round(now.omega_c, 3).tolist(),
@@ -43,17 +40,22 @@ def write(run: Trajectory, times: Array, speed: float, **arrows: float) -> str:
         "case": now.case.tolist(),
         "rows": np.round(np.hstack(columns), DIGITS).tolist(),
     }
+
+
+def write(p: Parameters, speed: float, motion: dict[str, Any] | None = None, run: Trajectory | None = None) -> str:
+    """The page of a run with its `frames`, which plays at a multiple of real time.
+
+    Without them it is a part of another page, which sends it frames of balls and vessels as large as those of `p`.
+    Raises `InputError` if NiceGUI, an extra, isn't installed.
+    """
     cases = {
-        int(case): {"name": Case(case).name, "floor": Case(case).A.value, "wall": Case(case).B.value,
-                    "colour": COLOURS[Case(case)]}
-        for case in np.unique(now.case)
-    }  # fmt: skip
-    about: dict[str, Any] = {"motion": motion, "cases": cases, "speed": speed, "size": p.r / p.R}
-    about["colours"] = {"ball": BALL, "force": FORCE, "slip": SLIP}
-    return render(
-        "compare.view", "motion.html", three=_three(), data=about, p=p, header=run.header, force=FORCE, slip=SLIP,
-        slips=bool(np.any(run.slip_speed_A + run.slip_speed_B)),
-    )  # fmt: skip
+        int(case): {"name": case.name, "floor": case.A.value, "wall": case.B.value, "colour": COLOURS[case]}
+        for case in Case
+    }
+    about = {"cases": cases, "speed": speed, "size": p.r / p.R, "colours": {"ball": BALL, "force": FORCE, "slip": SLIP}}
+    slips = run is not None and bool(np.any(run.slip_speed_A + run.slip_speed_B))
+    told = {"p": p, "header": run and run.header, "force": FORCE, "slip": SLIP, "slips": slips}
+    return render("compare.view", "motion.html", three=_three(), about=about, motion=motion, **told)
 
 
 def _three() -> str:

@@ -102,7 +102,8 @@ def write(
         )
     times = np.arange(begin, until + 1e-12, step) if film else np.array([begin])
     if kind == ".html":
-        write_bytes(output, page.write(run, times, speed, **arrows).encode())
+        moves = page.frames(run, times, **arrows)
+        write_bytes(output, page.write(run.header.parameters, speed, moves, run).encode())
         return f"{output}: {len(times)} frames"
     shown, note = resampled(run, times), f"× {speed:.3g}" if film else ""
     slips = bool(np.any(run.slip_speed_A + run.slip_speed_B))

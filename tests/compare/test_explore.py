@@ -79,7 +79,10 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(address: str, tmp_pa
         shows("NR at ω_c = 40")
         click(".curve .nsewdrag", 0.75, 0.25)  # omega_0 = 60, from omega_c = 60
         shows("NR at ω_c = 60")
-        page.wait_for_function("document.querySelector('.case').innerText.startsWith('NR')")
+        moving = page.frame_locator(".motion")
+        sync.expect(moving.locator("#case")).to_have_text("NR")
+        place = moving.locator("#place").input_value()
+        sync.expect(moving.locator("#place")).not_to_have_value(place)  # it plays
         for button, name in (("Set as TOML", "set.toml"), ("Run as HDF5", "run.h5")):
             with page.expect_download() as saved:
                 page.get_by_text(button).click()
@@ -122,14 +125,10 @@ def test_every_set_has_its_figures(changes: dict[str, float]) -> None:
     assert np.shape(plane["data"][0]["z"]) == np.shape(plane["data"][0]["text"])
 
 
-def test_a_slider_changes_the_set_and_a_motion_turns_the_ball() -> None:
+def test_a_slider_changes_the_set_and_the_motion() -> None:
     p = explore.changed(explore.changed(P, "kappa", 0.5), "drag", "schiller-naumann")
     assert p.kappa == pytest.approx(0.5)
     assert p.nu_f == explore.OIL
     with pytest.raises(InputError, match="j = 2"):
         explore.changed(P, "j", 2.0)
-    run, turns = explore.simulated(p, State(omega_c=5.0))
-    assert len(turns) == len(run.time)
-    along = np.array(explore._towards(np.array([0.3, -0.4, 0.2])))
-    assert along[:, 2] * np.sqrt(0.29) == pytest.approx([0.3, -0.4, 0.2])
-    assert np.linalg.det(along) == pytest.approx(1.0)
+    assert explore.simulated(p, State(omega_c=5.0)).complete
