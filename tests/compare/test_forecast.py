@@ -1,4 +1,4 @@
-"""The forecast of contacts stands beside what MuJoCo does in twenty small scenes, and its advice does what it says."""
+"""The forecast of contacts stands beside what MuJoCo does in small scenes, and its advice does what it says."""
 
 import itertools
 import json
@@ -56,28 +56,20 @@ CART = (
 )
 SCENES = {
     "slope": mjcf(ON_SLOPE, 'cone="elliptic"'),
-    "slope, impratio 10": mjcf(ON_SLOPE, 'cone="elliptic" impratio="10"'),
     "slope, pyramidal": mjcf(ON_SLOPE),
-    "slope, pyramidal, impratio 10": mjcf(ON_SLOPE, 'impratio="10"'),
     "slope, pyramidal, condim 4": mjcf(ON_SLOPE, geom='friction=".6" condim="4"'),
-    "slope, springs": mjcf(ON_SLOPE, 'cone="elliptic"', 'friction=".6" solref="-5000 -100"'),
     "slope, pyramidal, springs": mjcf(ON_SLOPE, geom='friction=".6" solref="-5000 -100"'),
-    "slope, discrete": mjcf(ON_SLOPE, 'cone="elliptic" integrator="discrete"'),
     "slope, pyramidal, discrete": mjcf(ON_SLOPE, 'integrator="discrete"', 'friction=".6" solref=".01 .7"'),
     "slope, implicitfast, wide impedance": mjcf(
         ON_SLOPE, 'cone="elliptic" integrator="implicitfast"', 'friction=".6" solimp=".3 .9 .004 .4 3"'
     ),
-    "slope, large step": mjcf(ON_SLOPE, 'cone="elliptic" timestep=".015"'),
     "slope, RK4": mjcf(ON_SLOPE, 'cone="elliptic" integrator="RK4"'),
     "slope, PGS": mjcf(ON_SLOPE, 'cone="elliptic" solver="PGS" iterations="400" tolerance="0"'),
     "slope, noslip": mjcf(ON_SLOPE, 'cone="elliptic" noslip_iterations="30" noslip_tolerance="0"'),
     "slope, pair": mjcf(ON_SLOPE, 'cone="elliptic" impratio="3"', rest=PAIR.format("-1 -60")),
-    "slope, pair, skew": mjcf(SLOPE + box(angle="0 15 40"), rest=PAIR.format(".05 1")),
     "slope, margin": mjcf(ON_SLOPE, 'cone="elliptic" integrator="implicit"', 'friction=".6" margin=".002"'),
     "stack": mjcf(STACK, 'cone="elliptic" impratio="5"'),
-    "stack, pyramidal": mjcf(STACK, 'solver="CG"'),
     "gripper": mjcf(GRIPPER, 'cone="elliptic" impratio="10"', rest=SQUEEZE),
-    "gripper, pyramidal": mjcf(GRIPPER, rest=SQUEEZE),
     "ball held by rolling friction": mjcf(BALL, 'cone="elliptic" impratio="3"'),
     "ball held by rolling friction, pyramidal": mjcf(BALL),
     "wheels held by dry friction": mjcf(SLOPE + CART, 'cone="elliptic" impratio="20"'),
@@ -87,7 +79,7 @@ SCENES = {
 }
 
 
-def settled(text, keyframe=None, limit=10.0):
+def settled(text, limit=10.0):
     """A model, its state, and its forecast."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -113,12 +105,9 @@ GUIDED = '<body pos="0 0 .0495"><joint type="slide" axis="0 0 1"/><geom name="bo
 SPHERE, BLOCK = 'type="sphere" size=".05"', 'type="box" size=".05 .05 .05"'
 SLIDING = {
     "elliptic": ('cone="elliptic"', 'friction=".6"', SPHERE),
-    "elliptic, impratio 10, condim 6": ('cone="elliptic" impratio="10"', 'friction=".6" condim="6"', SPHERE),
     "springs": ('cone="elliptic"', 'friction=".3" solref="-3000 -80"', SPHERE),
     "wide impedance": ('cone="elliptic"', 'friction=".6" solimp=".3 .9 .002"', BLOCK),
-    "discrete": ('cone="elliptic" integrator="discrete"', 'friction=".6"', SPHERE),
     "pyramidal": ("", 'friction=".6"', SPHERE),
-    "pyramidal, impratio 5": ('impratio="5"', 'friction=".6" solimp=".5 .5 .001"', BLOCK),
     "pyramidal, discrete": ('integrator="discrete"', 'friction=".4"', SPHERE),
     "solreffriction": ('cone="elliptic"', "", SPHERE),
 }
@@ -150,17 +139,12 @@ UNSAFE = '<flag refsafe="disable"/>'
 STEPS = {
     "springs": mjcf(LEVEL, 'cone="elliptic"', 'solref="-5000 -100"'),
     "springs, pyramidal": mjcf(LEVEL, geom='solref="-5000 -100"'),
-    "springs, ball": mjcf(FLOOR.format("") + ROUND, 'cone="elliptic"', 'solref="-5000 -100"'),
     "springs, little damping": mjcf(LEVEL, 'cone="elliptic"', 'solref="-5000 -10"'),
-    "springs, implicitfast": mjcf(LEVEL, 'cone="elliptic" integrator="implicitfast"', 'solref="-9000 -90"'),
     "springs, RK4": mjcf(LEVEL, 'cone="elliptic" integrator="RK4"', 'solref="-5000 -100"'),
-    "springs, pile": mjcf(PILE, 'cone="elliptic"', 'solref="-5000 -100"'),
     "springs, gripper": mjcf(GRIPPER, 'cone="elliptic" impratio="10"', 'friction=".6" solref="-20000 -200"', SQUEEZE),
     "friction": mjcf(LEVEL, 'cone="elliptic"', rest=PAIR.format("-1 -90")),
     "refsafe off": mjcf(LEVEL, 'cone="elliptic"', 'solref=".004 1"', flag=UNSAFE),
-    "refsafe off, slope": mjcf(ON_SLOPE, 'cone="elliptic"', 'friction=".6" solref=".01 1"', flag=UNSAFE),
     "low impedance": mjcf(LEVEL, 'cone="elliptic"', 'solimp=".1 .1 .001"'),
-    "low impedance, pile": mjcf(PILE, 'cone="elliptic"', 'solimp=".2 .2 .001"'),
 }
 
 
@@ -261,13 +245,14 @@ def test_the_page_the_json_and_what_the_engine_replaces(tmp_path, capsys):
 
 
 def test_two_hundred_contacts_stay_readable():
-    _, _, found = settled(
-        mjcf(FLOOR.format("") + "".join(box(f"{k / 5} 0 .0499", "0 0 0", f"box{k}") for k in range(50)))
-    )
+    """A line says what the engine replaces at all of them."""
+    boxes = "".join(box(f"{k / 5} 0 .0499", "0 0 0", f"box{k}") for k in range(50))
+    _, _, found = settled(mjcf(FLOOR.format('solref=".03 1"') + boxes), limit=2.0)
     assert len(found.pairs) == 50
     assert sum(len(pair.members) for pair in found.pairs) == 200
     assert [len(rows) for _, rows in forecast_page.tables(found)] == [forecast.SHOWN + 1] * 2
-    assert list(forecast_page.sentences(found)) == ["Nothing needs to change."]
+    (line,) = (line for line in forecast_page.sentences(found) if "replaces" in line)
+    assert re.match("MuJoCo replaces solref of two geoms at floor / box.*, and at 49 more: .*0.025 1 is taken", line)
 
 
 def test_a_pair_that_no_joint_can_part_has_a_forecast_nevertheless():
@@ -366,10 +351,3 @@ def test_where_no_option_helps_coulomb_does(tmp_path, capsys):
     (ball,) = re.findall(r"floor / ball +(.*)", shown.partition("With mjsim.Coulomb")[2])
     assert ball.split()[:4] == ["0"] * 4  # creep and turning, predicted and found
     assert "<pre" in page.read_text("utf-8")
-
-
-def test_what_the_engine_replaces_takes_a_line_a_kind():
-    boxes = "".join(box(f"{k / 5} 0 .0499", "0 0 0", f"box{k}") for k in range(20))
-    _, _, found = settled(mjcf(FLOOR.format('solref=".03 1"') + boxes))
-    (line,) = (line for line in forecast_page.sentences(found) if "replaces" in line)
-    assert re.match("MuJoCo replaces solref of two geoms at floor / box.*, and at 19 more: .*0.025 1 is taken", line)
