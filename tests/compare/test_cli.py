@@ -14,7 +14,6 @@ import xarray
 from compare.bench import league
 from compare.commands import cli, parsers
 from compare.kit import engines
-from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
@@ -308,58 +307,31 @@ def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> No
     ("argv", "says"),
     [
         ("predict --parameters broken.toml", "broken.toml is not valid TOML"),
-        ("predict --parameters unknown.toml", "unknown.toml: unknown parameter 'muu' (did you mean 'mu'?)"),
-        ("predict --parameters text.toml", "text.toml: m = 'heavy' must be a number in kg"),
-        ("predict --set referense", "no parameter set is named 'referense' (did you mean 'reference'?)"),
         ("predict --j 0.7", "argument --j: 0.7 is out of range: it must be > 0 and <= 2/3"),
         ("predict --nu-f -1e-6", "argument --nu-f: -1e-06 m²/s is out of range: it must be >= 0"),
         ("predict --omega-0 1e155", "omega_0 = 1e+155 rad s-1 is out of range"),
-        ("predict --R -inf", "argument --R: -inf m is out of range: it must be finite and > 0"),
         ("simulate --ramp 1 -2e0 -1E-3", "duration = -0.001 s is out of range"),
         ("simulate --start slip=3", "unknown state variable 'slip' (did you mean 'slip_z'?)"),
-        ("simulate --start omega_c=fast", "omega_c = 'fast' must be a number in rad s-1"),
         ("simulate --sample-interval 100 --time 1", "sample_interval = 100 s is out of range: within this run"),
-        ("simulate --time 1e-9", "time = 1e-09 s is out of range: to hold a time step it must be >= 0.001"),
-        ("simulate --sample-interval=1e-9", "sample_interval = 1e-09 s is out of range"),
         ("simulate -o run.csv", "'run.csv' would hold HDF5: its name must end in .h5"),
         ("simulate --engine event --timestep 0.1", "--timestep is not for event, which takes --rtol and --restitution"),
-        ("simulate --restitution 0.5", "--restitution is not for mujoco, which takes --timestep"),
-        ("simulate --engine event --restitution 1.5", "restitution = 1.5 is out of range"),
         ("simulate --flow broken.toml", "broken.toml, line 1: no column is called time; there are 'm', '='"),
         ("simulate --omega-0 5 --ramp 1 2 3", "--omega-0 is for a steady flow, and can't be given beside --ramp"),
-        ("figures --results absent", "cannot read absent: there is no such directory"),
         ("simulate --longest-interval 3", "--longest-interval is for --flow"),
         ("sweep --vary omega_0=30:10:5", "omega_0 = 30:10 rad s-1 is in the wrong order"),
         ("sweep --vary omega_0=10:30", "here omega_0 needs values: write omega_0=from:to:count or omega_0=a,b,c"),
-        ("sweep --vary omega_0=10:30 --direction up", "here omega_0 needs values"),
-        ("attractors --vary eta=0.1:0.2", "here eta needs values"),
-        ("basins --across y=0:1 --up h=0:0.01:2", "here y needs values"),
         ("sweep --vary omega0=10:30:5", "unknown parameter 'omega0' (did you mean 'omega_0'?)"),
         ("sweep --vary omega_0=10:30:2.5", "count of omega_0 = 2.5 points is out of range"),
-        ("sweep --vary omega_0=1:2:1000000000", "count of omega_0 = 1e+09 points is out of range: must be a whole"),
         ("sweep --vary eta=1:2:400 --vary mu=1:2:400", "the grid = 160000 runs is out of range: must be >= 1 and <= 1"),
         ("sweep --vary eta=1:2:3 --vary eta=1:2:3", "eta is given 2 ranges: one is enough"),
-        ("sweep --vary eta=1,1", "eta = 1,1 names a value twice"),
-        ("sweep --vary omega_0=10:30:3:4", "'omega_0=10:30:3:4' is no range"),
         ("sweep --vary eta=0.1:0.2:3 --direction up", "vary omega_0 and nothing else"),
         ("sweep --vary eta=0.1,0.2,0.3 --random 4", "here eta needs a range: write eta=from:to"),
-        ("validate --claim prop1", "no claim is called 'prop1'"),
         ("judge absent", "cannot read absent/summary.json: No such file or directory"),
-        ("attractors --start y=-1", "y = -1 m is out of range"),
         ("attractors --follow omega_0=60", "omega_0=from:to"),
-        ("attractors --follow omega=60:70", "unknown parameter 'omega'"),
         ("attractors --c 0 --random 1", "say how long"),
-        ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
-        ("predict --mu inf", "argument --mu: inf is out of range: it must be finite and >= 0"),
         ("basins --across y=0:1:2 --up y=0:1:3", "across and up are both y: a plane needs two state variables"),
         ("basins --across y=0:1:2 --up h=0:99:2 --results new/map", "h = 99 m is out of range"),
-        ("forecast a.xml -o card.md", "'card.md' would hold an HTML page: its name must end in .html or .htm"),
-        ("compare a.h5 b.h5 -o x.png", "compare -o is --plot now"),
-        ("basins --across y=0:1:2 --up h=0:1:2 -o f.toml", "'f.toml' would hold JSON: its name must end in .json"),
-        ("attractors --starts=3", "attractors --starts is --random now"),
-        ("predict --omega 25", "there is no option '--omega' (did you mean '--omega-0'?); see 'dualball predict "),
         ("simulate --tme=3 --omega-0 5", "there is no option '--tme' (did you mean '--time'?)"),
-        ("--verson", "there is no option '--verson' (did you mean '--version'?)"),
         ("predict extra", "'extra' is one argument too many"),
         ("simulate --view --time 3", "--view keeps nothing and ends with its window: it goes without --time"),
         ("simulate --view --engine event", "--view shows MuJoCo, not event"),
@@ -367,14 +339,9 @@ def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> No
         ("view --omega-0 3", "'dualball simulate --view' opens the viewer"),
         ("report", "no command 'report' any more: 'dualball judge'"),
         ("grade mine.xml", "league --settings FILE.xml"),
-        ("serch", "no command 'serch'"),
-        ("validat", "did you mean 'validate'"),
         ("sweep --vary eta=1,2 -o all.h5", "'all.h5' would be a directory, but its name is that of a file"),
         ("league --engine mujco", "did you mean 'mujoco'?"),
-        ("league --settings nowhere.xml", "there is no such file"),
         ("design absent.toml", "cannot read absent.toml: No such file or directory"),
-        ("compare none.csv none.csv", "cannot read none.csv: No such file or directory"),
-        ("cases land", ""),
     ],
 )
 def test_mistakes(
@@ -382,8 +349,6 @@ def test_mistakes(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("broken.toml").write_text("m = ")
-    Path("unknown.toml").write_text("muu = 0.2")
-    Path("text.toml").write_text("m = 'heavy'\n" + "".join(f"{k} = 0.1\n" for k in list(FIELDS)[1:]))
     before = sorted(Path().iterdir())
     assert says in refused(capsys, *argv.split())
     assert sorted(Path().iterdir()) == before  # and nothing is left half written
