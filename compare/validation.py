@@ -102,7 +102,7 @@ def validate(
     count = workers if isinstance(workers, int) else workers.count
     with processes(min(count, os.cpu_count() or 1)) as work:
         draw = far.drawing(work.map) if report else None
-        _write(output, level, files, results.testimony(files), verdicts, draw)
+        _write(output, level, files, results.testimony(output, files), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
 
 
@@ -144,9 +144,10 @@ class _Judging:
                 self.judged[claim.id].add_done_callback(lambda _: self.done())
 
 
-def _files(output: Path, lab: Lab, sets: Mapping[str, Parameters] | None) -> list[Path]:
-    asked = [protocol for protocol in PROTOCOLS if protocol.measures(lab)]
-    return [path for each in asked if (path := programme.file(each, output, lab, sets)).exists()]
+def _files(output: Path, lab: Lab, sets: Mapping[str, Parameters] | None) -> list[str]:
+    """The files of what was measured, relative to the results directory."""
+    paths = [programme.file(each, output, lab, sets) for each in PROTOCOLS if each.measures(lab)]
+    return [path.relative_to(output).as_posix() for path in paths if path.exists()]
 
 
 def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0) -> list[Verdict]:
@@ -161,11 +162,10 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
     stored.cache_clear()
     forget()
     testimony = stored(directory)  # what can't be read is said before anything is judged
-    files = summary.files(directory)
     with processes(workers) as work:  # the last claims first: they take longest
         found = work.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
         verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
-        written = _write(directory, Level[summary.level], files, testimony, verdicts, work.map)
+        written = _write(directory, Level[summary.level], summary.measurements, testimony, verdicts, work.map)
     return [v for v in written if v.claim.id in chosen]
 
 
@@ -187,7 +187,7 @@ def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
 @cache
 def stored(directory: Path) -> RecordsByEngine:
     """The measurements of the last validation in a directory, read once in a process."""
-    return results.testimony(results.load(directory).files(directory))
+    return results.testimony(directory, results.load(directory).measurements)
 
 
 def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Evidence:
@@ -218,7 +218,7 @@ def _write(
     Return the verdicts on all claims.
     """
     verdicts = [known.get(claim.id) or full_verdict(claim, testimony) for claim in CLAIMS]
-    summary = Summary.of(directory, verdicts, level, files)
+    summary = Summary.of(verdicts, level, files)
     if over:
         from compare.report import report as page  # here, because drawing takes a second to load
 

@@ -26,8 +26,9 @@ SUMMARY, REPORT, RUNS = "summary.json", "report.html", "runs"
 SCHEMA, SCHEMA_VERSION = "dualball-summary", 5
 
 
-Files = Mapping[str, Mapping[int, Sequence[Path]]]
-"""Files of measurements by engine and time steps in one that a protocol asks for."""
+Files = Mapping[str, Mapping[int, Sequence[str]]]
+"""Files of measurements, relative to the results directory: by engine, the one on trial first, and time steps in one
+that a protocol asks for."""
 
 
 @dataclass(frozen=True)
@@ -35,40 +36,28 @@ class Summary:
     """What a validation came to, as JSON-able data."""
 
     level: str = Level.QUICK.name
-    measurements: Mapping[str, Mapping[str, Sequence[str]]] = field(default_factory=dict)
-    """Files of the measurements that were judged, relative to the results directory: by engine, the one on trial first,
-    and time steps in one that a protocol asks for."""
+    measurements: Files = field(default_factory=dict)
+    """Those that were judged."""
     verdicts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """By claim id: outcome, number of checks, resolving power; the checks follow from the measurements."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, directory: Path, verdicts: Iterable[Verdict], level: Level, measured: Files) -> Summary:
+    def of(cls, verdicts: Iterable[Verdict], level: Level, measured: Files) -> Summary:
         """The verdicts of now on the measurements in the files `measured`."""
-        files = {
-            engine: {str(n): [path.relative_to(directory).as_posix() for path in paths] for n, paths in steps.items()}
-            for engine, steps in measured.items()
-        }
         provenance = {
             "versions": dict(current_versions()),
             "commit": current_commit(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        return cls(level.name, files, {verdict.claim.id: _outcome(verdict) for verdict in verdicts}, provenance)
-
-    def files(self, directory: Path) -> Files:
-        """The files of the measurements that were judged."""
-        return {
-            engine: {int(n): [directory / name for name in names] for n, names in steps.items()}
-            for engine, steps in self.measurements.items()
-        }
+        return cls(level.name, measured, {verdict.claim.id: _outcome(verdict) for verdict in verdicts}, provenance)
 
 
-def testimony(files: Files) -> RecordsByEngine:
-    """The measurements that were judged, to be judged again; raises `StorageError` for a file that is not whole."""
+def testimony(directory: Path, files: Files) -> RecordsByEngine:
+    """The measurements in files of a directory; raises `StorageError` for one that is not whole."""
     return {
-        engine: {refine: sum(map(record.load, paths), Records()) for refine, paths in steps.items()}
+        engine: {n: sum((record.load(directory / name) for name in names), Records()) for n, names in steps.items()}
         for engine, steps in files.items()
     }
 
@@ -126,10 +115,11 @@ def load(directory: Path) -> Summary:
         if (content["schema"], content["schema_version"]) != (SCHEMA, SCHEMA_VERSION):
             raise ValueError("it is in another format; choose another directory with --output")
         Level[content["level"]]
-        summary = Summary(
-            content["level"], *(dict(content[name]) for name in ("measurements", "verdicts", "provenance"))
-        )
-        summary.files(directory)
+        files = {
+            engine: {int(n): [*map(str, names)] for n, names in steps.items()}
+            for engine, steps in content["measurements"].items()
+        }
+        summary = Summary(content["level"], files, *(dict(content[name]) for name in ("verdicts", "provenance")))
         version, ours = summary.provenance["versions"]["dualball"], current_versions()["dualball"]
     if version != ours:
         held = f"{directory} holds results of dualball {version}, this is {ours}"

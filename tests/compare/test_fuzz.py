@@ -135,7 +135,8 @@ def test_damage_is_one_line(
 def results_of(measurements: Path) -> Path:
     """A results directory with these measurements, before they are damaged."""
     directory = measurements.parents[1]
-    results.save(results.Summary.of(directory, [], Level.QUICK, {"mujoco": {1: [measurements]}}), directory)
+    names = [measurements.relative_to(directory).as_posix()]
+    results.save(results.Summary.of([], Level.QUICK, {"mujoco": {1: names}}), directory)
     return directory
 
 
@@ -207,12 +208,12 @@ def test_a_damaged_summary_is_one_line(
         summary.write_bytes(mutated(good, rng))
         try:
             stored = results.load(tmp_path)
-            results.testimony(stored.files(tmp_path))
+            results.testimony(tmp_path, stored.measurements)
         except StorageError as error:
             refusals.append(str(error))
         else:  # what is not a reference to measurements is made anew by judging
-            files = [path for steps in stored.files(tmp_path).values() for paths in steps.values() for path in paths]
-            assert set(files) <= {tmp_path / "measurements/settled.h5"}
+            files = [name for steps in stored.measurements.values() for names in steps.values() for name in names]
+            assert {tmp_path / name for name in files} <= {path}
     assert len(refusals) > count / 2
     assert not any("\n" in message for message in refusals)
 

@@ -81,7 +81,7 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def page(directory: Path, few_figures: None) -> Path:
     records = Records(tuple(check.measurement for check in VERDICTS[0].checks))
     evidence = Evidence({verdict.claim.id: verdict.checks for verdict in VERDICTS}, records, directory)
-    return report.write(evidence, VERDICTS, Summary.of(directory, VERDICTS, Level.QUICK, {}))
+    return report.write(evidence, VERDICTS, Summary.of(VERDICTS, Level.QUICK, {}))
 
 
 def row(text: str, name: str) -> str:
@@ -120,7 +120,7 @@ def test_what_the_page_says(page, tmp_path):
     # What was not run is named once, outside the sections, and no section is empty.
     assert "<h3>Laws and cases</h3>" not in text
     assert re.search(r"Not part of this run: <code[^>]*>deeper</code>", text)
-    empty = report.write(Evidence(directory=tmp_path), [], Summary.of(tmp_path, [], Level.QUICK, {}))
+    empty = report.write(Evidence(directory=tmp_path), [], Summary.of([], Level.QUICK, {}))
     assert "Nothing has been checked yet" in empty.read_text("utf-8")
 
 
@@ -174,7 +174,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, mo
     }
     monkeypatch.setattr(report, "FIGURES", {})
     monkeypatch.setattr(report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims})
-    page = report.write(Evidence(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, {}))
+    page = report.write(Evidence(directory=tmp_path), VERDICTS[:2], Summary.of([], Level.QUICK, {}))
     text = page.read_text("utf-8")
     assert text.count('<figure class="plot"') == 1
     assert '<a href="#figure-fall">A fall</a>: see good.' in row(text, "bad")
@@ -203,7 +203,7 @@ def test_summary_is_read_back(page: Path, directory: Path) -> None:
     ids=["cut", "other", "old", "version"],
 )
 def test_a_foreign_summary_is_refused_in_one_line(tmp_path: Path, change: Any, message: str) -> None:
-    results.save(Summary.of(tmp_path, [], Level.QUICK, {}), tmp_path)
+    results.save(Summary.of([], Level.QUICK, {}), tmp_path)
     path = tmp_path / results.SUMMARY
     path.write_text(change(path.read_text("utf-8")))
     with pytest.raises(StorageError, match=message) as refusal:
@@ -241,7 +241,7 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     """They draw what this process would, and nothing is drawn again."""
     for name, drawing in FIGURES.items():
         assert pickle.loads(pickle.dumps(drawing)).title == drawing.title, name
-    summary, pages = Summary.of(tmp_path, VERDICTS, Level.QUICK, {}), []
+    summary, pages = Summary.of(VERDICTS, Level.QUICK, {}), []
     with processes(2) as work:
         for name, how in (("there", work.map), ("here", map)):
             evidence = Evidence({v.claim.id: v.checks for v in VERDICTS}, directory=tmp_path / name)

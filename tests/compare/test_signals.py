@@ -55,7 +55,7 @@ def whole(tmp_path_factory):
     (made / "scene.xml").write_text(SCENE)
     file = made / "results" / "measurements" / "settled.h5"
     record.save(Records((measured("settled", "omega_c", 11.9, 1e-9, case="RR"),)), file, {})
-    summary = results.Summary.of(made / "results", [], Level.QUICK, {"mujoco": {1: [file]}})
+    summary = results.Summary.of([], Level.QUICK, {"mujoco": {1: ["measurements/settled.h5"]}})
     results.save(summary, made / "results")
     return made
 
