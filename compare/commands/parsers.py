@@ -248,7 +248,7 @@ def forecast(parser: Parser) -> None:
     options.add_json(parser)
 
 
-@command("contacts and engines", "cases.listed", "-o cases")
+@command("contacts and engines", "bench.listed", "-o cases")
 def cases(parser: Parser) -> None:
     """The exact contact cases: listed, shown, or as files for engines in any language."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="show this case")
