@@ -127,15 +127,27 @@ class _Pool(ProcessPoolExecutor):
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Signals that end a program wait, and processes started here never get to know of them."""
+    """Signals that end a program wait, and processes started here never get to know of them.
+
+    Those that another thread gets are handled by the main one, blocked or not: they are sent again afterwards.
+    """
     if sys.platform == "win32":
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    came: list[int] = []
+    here = SIGNALS if threading.current_thread() is threading.main_thread() else ()
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    before = {each: handler for each in here if callable(handler := signal.getsignal(each))}
+    for each in before:
+        signal.signal(each, lambda number, frame: came.append(number))
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number in came[:1]:
+            signal.raise_signal(number)
 
 
 _between = threading.Lock()

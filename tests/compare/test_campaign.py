@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 
@@ -17,7 +18,7 @@ from compare.commands import cli
 from compare.kit import collection
 from compare.kit.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.kit.tasks import Task
-from compare.kit.workers import Workers, dask, processes
+from compare.kit.workers import Workers, _deaf, dask, processes
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
@@ -234,6 +235,21 @@ def test_what_a_killed_process_was_to_do_is_done_here(count):
     with processes(count) as work:
         assert list(work.map(functools.partial(square, os.getpid()), range(8))) == [k**2 for k in range(8)]
         assert list(work.map(abs, [-1, -2])) == [1, 2]
+
+
+def test_a_signal_that_another_thread_gets_waits_until_a_worker_has_started():
+    heard, wait = [], threading.Event()
+    (thread := threading.Thread(target=wait.wait)).start()
+    before = signal.signal(signal.SIGTERM, lambda *_: heard.append(1))
+    try:
+        with _deaf():
+            signal.pthread_kill(thread.ident, signal.SIGTERM)
+            time.sleep(0.05)
+            assert not heard
+        assert heard == [1]
+    finally:
+        signal.signal(signal.SIGTERM, before)
+        wait.set()
 
 
 @pytest.mark.filterwarnings("ignore")  # Dask's own, on shutting down

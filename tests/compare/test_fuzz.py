@@ -242,36 +242,18 @@ def test_toml(tmp_path: Path, count: int) -> None:
     assert {entry.name for entry in tmp_path.iterdir()} == {"good.toml", "bad.toml"}
 
 
-def outside(secret: Path) -> Iterator[tuple[str, Callable[[h5py.File], None]]]:
-    """Ways to let a dataset be read from another file."""
-
-    def virtual(file: h5py.File) -> None:
-        layout = h5py.VirtualLayout((51,), float)
-        layout[:] = h5py.VirtualSource(secret, "x", (51,))
-        file.create_virtual_dataset("y", layout)
-
-    def link(file: h5py.File) -> None:
-        file["y"] = h5py.ExternalLink(secret, "x")
-
-    def external(file: h5py.File) -> None:
-        file.create_dataset("y", (51,), float, external=[(str(secret), 0, 51 * 8)])
-
-    yield from {"virtual": virtual, "link": link, "external": external}.items()
+def virtual(file, secret):
+    layout = h5py.VirtualLayout((51,), float)
+    layout[:] = h5py.VirtualSource(secret, "x", (51,))
+    file.create_virtual_dataset("y", layout)
 
 
-@pytest.mark.parametrize("way", ["virtual", "link", "external"])
-def test_nothing_in_a_file_is_followed(
-    tmp_path: Path, files: dict[str, Path], capsys: pytest.CaptureFixture[str], way: str
-) -> None:
-    secret = tmp_path / "secret.h5"
-    with h5py.File(secret, "w") as file:
-        file["x"] = np.arange(51.0)
-    shutil.copy(files["event"], tmp_path / "run.h5")
-    with edited(tmp_path / "run.h5") as file:
-        del file["y"]
-        dict(outside(secret))[way](file)
-    assert cli.main(["inspect", str(tmp_path / "run.h5")]) == 2
-    assert "'y'" in capsys.readouterr().err
+def link(file, secret):
+    file["y"] = h5py.ExternalLink(secret, "x")
+
+
+def external(file, secret):
+    file.create_dataset("y", (51,), float, external=[(str(secret), 0, 51 * 8)])
 
 
 @pytest.fixture
@@ -293,17 +275,22 @@ def compared(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
     return err
 
 
-@pytest.mark.parametrize("way", ["virtual", "link", "external"])
-def test_nothing_in_a_file_of_another_program_is_followed(
-    tmp_path: Path, foreign: Path, capsys: pytest.CaptureFixture[str], way: str
-) -> None:
-    secret = tmp_path / "secret.h5"
+@pytest.mark.parametrize("outside", [virtual, link, external])
+def test_nothing_in_a_file_is_followed(tmp_path, files, foreign, capsys, outside):
+    """To another file: neither in a run nor in what another program wrote."""
+    secret, run = tmp_path / "secret.h5", tmp_path / "run.h5"
     with h5py.File(secret, "w") as file:
         file["x"] = np.arange(51.0)
+    shutil.copy(files["event"], run)
+    with edited(run) as file:
+        del file["y"]
+        outside(file, secret)
+    assert cli.main(["inspect", str(run)]) == 2
+    assert "'y'" in capsys.readouterr().err
     assert cli.main(["compare", str(foreign), str(foreign)]) == 0
     capsys.readouterr()
     with h5py.File(foreign, "r+") as file:
-        dict(outside(secret))[way](file)
+        outside(file, secret)
     assert "'y'" in compared(foreign, capsys)
 
 

@@ -74,27 +74,27 @@ def sliding(case):
     (surface,), bodies = case.surfaces, case.bodies[::-1]
     normal = np.array(surface.normal)
     way, h, press = np.array([normal[2], 0.0, -normal[0]]), 4e-5, case.g * normal[2]
-    masses = np.array([body.mass for body in bodies])
-    bounds = press * np.array([surface.friction * masses.sum(), case.between * masses[-1]][: len(masses)])
-    belt, v = float(np.dot(surface.velocity, way)), np.array([np.dot(body.velocity, way) for body in bodies])
-    s, out, done, f = np.zeros(len(v)), [], 0, np.zeros(len(v))
+    masses, count = [body.mass for body in bodies], len(bodies)
+    bounds = [press * surface.friction * sum(masses), press * case.between * masses[-1]][:count]
+    belt, v = float(np.dot(surface.velocity, way)), [float(np.dot(body.velocity, way)) for body in bodies]
+    s, out, done, f = [0.0] * count, [], 0, [0.0] * (count + 1)  # nothing lies on the highest
     for t in case.times:
         for _ in range(round(t / h) - done):
-            free = v - h * case.g * way[2]
+            free = [w - h * case.g * way[2] for w in v]
             for _ in range(400):
-                last = f.copy()
-                for k in range(len(f)):
-                    now = free + h * (f - np.append(f[1:], 0.0)) / masses
-                    slip = now[k] - (now[k - 1] if k else belt)
+                last = list(f)
+                for k in range(count):
+                    under = free[k - 1] + h * (f[k - 1] - f[k]) / masses[k - 1] if k else belt
+                    slip = free[k] + h * (f[k] - f[k + 1]) / masses[k] - under
                     share = 1 / masses[k] + (1 / masses[k - 1] if k else 0.0)
-                    f[k] = np.clip(f[k] - slip / (h * share), -bounds[k], bounds[k])
-                if abs(f - last).max() <= 1e-13 * bounds.max():
+                    f[k] = min(max(f[k] - slip / (h * share), -bounds[k]), bounds[k])
+                if max(abs(now - then) for now, then in zip(f, last, strict=True)) <= 1e-13 * max(bounds):
                     break
-            new = free + h * (f - np.append(f[1:], 0.0)) / masses
-            s, v = s + h * (v + new) / 2, new
+            new = [w + h * (f[k] - f[k + 1]) / masses[k] for k, w in enumerate(free)]
+            s, v = [x + h * (w + now) / 2 for x, w, now in zip(s, v, new, strict=True)], new
         done = round(t / h)
         out.append(np.concatenate([
-            part for k in range(len(f))[::-1] for part in (bodies[k].position + s[k] * way, v[k] * way, np.zeros(3))
+            part for k in range(count)[::-1] for part in (bodies[k].position + s[k] * way, v[k] * way, np.zeros(3))
         ]))  # fmt: skip
     return np.array(out)
 

@@ -90,39 +90,10 @@ WORDS = ("", "x", "ω ₀", "prop-1", "mujoco", "event", "reference", "svg", "1"
 READ = ["run.h5", "link.h5", "hard.h5", "öl_ω.h5", "set.toml", "bom.toml", "flow.csv", "scene.xml", "meter.toml"]
 MINE = [*READ, "mine.html", "mine.md", "mine.json", "mine.png", "mine.svg"]
 """Files of the user."""
-ABSURD = [
-    "cut.h5",
-    "empty.h5",
-    "folder.h5",
-    "loop.h5",
-    "dangling.h5",
-    "cut.toml",
-    "cut.csv",
-    "bytes.csv",
-    "cut.xml",
-    "pipe",
-    "runs",
-    ".",
-    "..",
-    "/",
-    "~",
-    "a/b.h5",
-]
-NEW = [
-    "new.h5",
-    "new.html",
-    "new.md",
-    "new.json",
-    "new.png",
-    "new.svg",
-    "new.gif",
-    "new",
-    "new/deep",
-    "no/new.h5",
-    "/dev/null",
-    "/dev/full",
-    "pipe",
-]
+ABSURD = ["cut.h5", "empty.h5", "folder.h5", "loop.h5", "dangling.h5", "cut.toml", "cut.csv", "bytes.csv", "cut.xml",
+          "pipe", "runs", ".", "..", "/", "~", "a/b.h5"]  # fmt: skip
+NEW = ["new.h5", "new.html", "new.md", "new.json", "new.png", "new.svg", "new.gif", "new", "new/deep", "no/new.h5",
+       "/dev/null", "/dev/full", "pipe"]  # fmt: skip
 CUT = {"cut.h5": "run.h5", "cut.toml": "set.toml", "cut.csv": "flow.csv", "cut.xml": "scene.xml"}
 
 
@@ -142,12 +113,7 @@ def furnish(here: Path) -> None:
     (here / "meter.toml").write_text(METER)
     for name in ("mine.html", "mine.md", "mine.json", "mine.png"):
         (here / name).write_text("mine")
-    for whole, cut in (
-        ("run.h5", "cut.h5"),
-        ("set.toml", "cut.toml"),
-        ("flow.csv", "cut.csv"),
-        ("scene.xml", "cut.xml"),
-    ):
+    for cut, whole in CUT.items():
         content = (here / whole).read_bytes()
         (here / cut).write_bytes(content[: 2 * len(content) // 3])
     (here / "empty.h5").touch()
@@ -199,9 +165,9 @@ def contents(here: Path) -> dict[str, str]:
     def look(path: Path) -> str:
         if path.is_symlink():
             return f"link to {path.readlink()}"
-        return (
-            hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "folder" if path.is_dir() else "else"
-        )
+        if path.is_file():
+            return hashlib.sha256(path.read_bytes()).hexdigest()
+        return "folder" if path.is_dir() else "else"
 
     return {str(path.relative_to(here)): look(path) for path in here.rglob("*")}
 

@@ -11,8 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import analytic
-from analytic.mechanics import dynamics
 from analytic.stationary import solutions as stationary
 from compare.catalogue import CLAIMS
 from compare.judge import verdict
@@ -21,12 +19,11 @@ from compare.kit.engines import ENGINES, MUJOCO
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.record import Records
-from compare.kit.short import constrained
 from compare.subjects.stationary import claims
-from model import Case, Parameters
+from model import Parameters
 from tests.mutants import engines, trial
 from tests.mutants.engines import WRONG_ENGINES
-from tests.mutants.exchange import WrongTheory, believed, scaled
+from tests.mutants.exchange import believed
 from tests.mutants.theories import FOR_TESTS, THEORIES
 
 P = Parameters.named("reference").replace(omega_0=25.0)
@@ -42,48 +39,6 @@ def test_there_are_many_and_each_replaces_a_function_that_exists_and_gives_it_ba
         with believed(wrong):
             assert getattr(module, wrong.function) is not right, wrong.what
         assert getattr(module, wrong.function) is right, wrong.what
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        w
-        for w in THEORIES
-        if w.module == "analytic.mechanics.dynamics" and w.function not in ("eigenvalues", "jacobian")
-    ],
-    ids=lambda w: w.what,
-)
-def test_wrong_equations_of_motion_are_wrong_and_not_broken(wrong: WrongTheory) -> None:
-    """Another number somewhere, and no error: a theory that can't be evaluated would be noticed by anybody."""
-
-    p, x = P.replace(mu=0.3), np.array([0.0, 0.1, 12.0, 1.0, 2.0, 3.0, 0.0, 0.0])
-    states = [(case, constrained(case, x, p)) for case in Case]
-
-    def numbers() -> list[float]:
-        answers = [(analytic.vector_field(*at, p), *analytic.contact_forces(*at, p)) for at in states]
-        return np.concatenate([np.ravel(each) for answer in answers for each in answer]).tolist()
-
-    right = numbers()
-    assert np.all(np.isfinite(right))
-    with believed(wrong):
-        assert numbers() != right
-
-
-def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
-    doubled = WrongTheory("", "analytic.stationary.solutions", "stable_solutions", lambda right: lambda p: 2 * right(p))
-    right = analytic.stable_solutions(P)
-    with believed(doubled):
-        assert len(analytic.stable_solutions(P)) == len(stationary.stable_solutions(P)) == 2 * len(right)
-    assert len(analytic.stable_solutions(P)) == len(right)
-
-
-def test_a_fault_shows_in_tables_of_functions() -> None:
-    x = [0.0, 0.0, 12.0, 1.0, 2.0, 3.0, 0.0, 0.0]
-    right = np.array(dynamics.forces(Case.SS, x, P, P.omega_0))
-    with believed(WrongTheory("", "analytic.mechanics.dynamics", "_ss", scaled(1.5, 1))):
-        wrong = np.array(dynamics.forces(Case.SS, x, P, P.omega_0))
-    assert wrong[1] == 1.5 * right[1]
-    assert np.array_equal(np.delete(wrong, 1), np.delete(right, 1))
 
 
 def test_a_theory_that_raises_is_given_back_too() -> None:
@@ -116,16 +71,6 @@ def test_a_prediction_that_hangs_is_no_breakdown(monkeypatch: pytest.MonkeyPatch
     claim = dataclasses.replace(formal, algebra=lambda: (None for _ in itertools.count()))
     with pytest.raises(trial.HangError):
         trial._patiently(lambda: verdict(claim, Records()))
-
-
-def test_functions_that_nothing_tries_are_found() -> None:
-    verdicts, called = trial.watched(lambda: analytic.thresholds(P))
-    assert verdicts == analytic.thresholds(P)
-    names = trial.untried(called)
-    assert not {"bifurcation.diagram.thresholds", "slipping.slip_bounds.gamma_nr"} & set(
-        names
-    )  # called; changed by a wrong theory
-    assert "flowmeter.characteristic.operating_limit" in names
 
 
 def test_subjects_name_wrong_theories_and_tests_that_there_are():
