@@ -51,6 +51,26 @@ _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 
 
 @dataclass(frozen=True)
+class Storing:
+    """What becomes of the runs of a batch."""
+
+    directory: Path
+    label: str
+    """What the names of files begin with."""
+    save: Save = storage.save_batch
+    looked_at: bool = True
+    """Whether whole runs are handed out, too."""
+    brief: float = 0.0
+    """Processor time, s, below which whole runs of a batch are handed out only."""
+
+    def store(self, runs: Mapping[str, Trajectory]) -> Path:
+        """Write whole runs, by key, into a file named by all of them."""
+        path = self.directory / f"{self.label}-{hashlib.sha256(' '.join(runs).encode()).hexdigest()[:24]}.h5"
+        self.save(runs, path)
+        return path
+
+
+@dataclass(frozen=True)
 class Failure:
     """A task that has no whole run."""
 
@@ -147,8 +167,13 @@ class Campaign:
             first = next(iter(self._read))
             if first not in self._files:
                 loose = {key: run for key, run in self._read.items() if key not in self._files}
-                self._files |= dict.fromkeys(loose, _store(loose, self.directory, self.label, self.save))
+                self._files |= dict.fromkeys(loose, self._storing.store(loose))
             self._samples -= len(self._read.pop(first).time)
+
+    @property
+    def _storing(self) -> Storing:
+        brief = SOON_DONE if self.passing else 0.0
+        return Storing(self.directory, self.label, self.save, self.looked_at, brief)
 
     def _done(self, key: str) -> bool:
         return key in self._files or key in self._read
@@ -216,7 +241,6 @@ class Campaign:
         pending: dict[Future[list[Ended]], tuple[Task, ...]] = {}
         again: deque[Task] = deque()
         died: Counter[str] = Counter()
-        how = self.save, self.looked_at, SOON_DONE if self.passing else 0.0
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
             batches = list(itertools.islice(fresh, 2 * self._workers.count - len(pending)))
@@ -226,7 +250,7 @@ class Campaign:
                     return
                 batches = [(again.popleft(),)]
             for batch in batches:
-                pending[self._workers.submit(run_batch, batch, self.directory, self.label, self.limit, *how)] = batch
+                pending[self._workers.submit(run_batch, batch, self._storing, self.limit)] = batch
             if not any(future.done() for future in pending):  # `wait` waits for cancelled ones that nobody told of it
                 wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
@@ -250,21 +274,12 @@ def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 
-def run_batch(
-    tasks: Sequence[Task],
-    directory: Path,
-    label: str,
-    limit: float,
-    save: Save = storage.save_batch,
-    looked_at: bool = True,
-    short: float = 0.0,
-) -> list[Ended]:
-    """Carry out tasks and store their runs under a label; raises `StorageError` if that can't be done.
+def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[Ended]:
+    """Carry out tasks within so many s each, and store their runs; raises `StorageError` if that can't be done.
 
-    Whole ones that took less than a `short` processor time, s, are handed out only. Where a batch can't be carried out
-    as a whole, its tasks are tried one by one.
+    Where a batch can't be carried out as a whole, its tasks are tried one by one.
     """
-    paths, begun = [directory / f"{label}-{task.key}.h5" for task in tasks], time.process_time()
+    begun, paths = time.process_time(), [storing.directory / f"{storing.label}-{task.key}.h5" for task in tasks]
     try:
         if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
             failure = store(tasks[0], paths[0], limit)
@@ -274,26 +289,18 @@ def run_batch(
         raise
     except (InputError, TimeoutError, MemoryError) as error:
         if len(tasks) > 1:
-            how = directory, label, limit, save, looked_at, short
-            return [outcome for task in tasks for outcome in run_batch([task], *how)]
+            return [outcome for task in tasks for outcome in run_batch([task], storing, limit)]
         return [(str(error) or "out of memory", None, None)]
     whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
-    handed_only = looked_at and time.process_time() - begun < short
-    together = _store(whole, directory, label, save) if whole and not handed_only else None
+    handed_only = storing.looked_at and time.process_time() - begun < storing.brief
+    together = storing.store(whole) if whole and not handed_only else None
     outcomes: list[Ended] = []
     for run, path in zip(runs, paths, strict=True):
         file = together if run.complete else failed_path(path)
         if not run.complete:
             storage.save(run, failed_path(path))
-        outcomes.append((run.header.failure, file, run if looked_at else None))
+        outcomes.append((run.header.failure, file, run if storing.looked_at else None))
     return outcomes
-
-
-def _store(runs: Mapping[str, Trajectory], directory: Path, label: str, save: Save) -> Path:
-    """Write whole runs, by key, into a file named by all of them."""
-    path = directory / f"{label}-{hashlib.sha256(' '.join(runs).encode()).hexdigest()[:24]}.h5"
-    save(runs, path)
-    return path
 
 
 def _stored(directory: Path) -> Iterator[tuple[str, Path]]:

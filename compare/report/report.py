@@ -60,17 +60,7 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
     sections: dict[str, list[dict[str, Any]]] = {}
     for verdict in ran:
         claim, own = verdict.claim, beside.get(verdict.claim.id, {})
-        mark, symbol = wording.MARKS[verdict.outcome]
-        more = len(verdict.missing) - REASONS
-        unseen = [f"and {more} more, see {results.SUMMARY}"] if more > 0 else []
-        row = {
-            "claim": claim,
-            "verdict": verdict,
-            "mark": "other" if verdict.passed and mark == "fail" else mark,
-            "symbol": symbol,
-            "predicted": list(dict.fromkeys(bearing.by for bearing in claim.bearings if bearing.by)),
-            "missing": [*map(str, verdict.missing[:REASONS]), *unseen],
-            "checks": wording.ranked(verdict.checks)[:ROWS],
+        row = _row(verdict) | {
             "figures": [figures[name] for name in own if name not in shown],
             "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],
             "repeat": f"dualball validate --claim {claim.id}{option} -o {directory.resolve().name}",
@@ -78,15 +68,6 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
         shown = dict.fromkeys(own, claim.id) | shown  # a figure of several claims stands beside the first
         sections.setdefault(claim.section, []).append(row)
     apart = [figures[name] for name in free]
-    checks = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
-    orbits = [c for c in checks if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0]
-    lead = "Its closed-form theory by Antali and Stépán is held against simulation."
-    if orbits:
-        lead = (
-            "In stationary states the angular velocity ω_c of its orbit, predicted in closed form by Antali and Stépán,"
-            f" is {len(orbits)} of the numbers below; the largest relative deviation of these is "
-            f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
-        )
     measured = {name for m in evidence.records.measurements for name in m.runs}
     sets = {m.set for m in evidence.records.measurements}
     known = summary.provenance
@@ -98,7 +79,7 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
         title=f"{len(ran)} claims: {', '.join(map(' '.join, wording.kinds(ran)))}",
         headline=wording.headline(ran),
         missing=wording.missing(ran),
-        lead=f"A ball rolls and slips round inside a cylinder. {lead}",
+        lead=f"A ball rolls and slips round inside a cylinder. {_lead(ran)}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         witnesses=wording.witnesses(ran),
         tiles=[*wording.totals(ran), (str(len(measured)), f"simulations with {len(sets)} parameter sets")],
@@ -121,6 +102,35 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
             "machine": known.get("machine", ""),
             "measurements": f"{files} files, listed in {results.SUMMARY}",
         },
+    )
+
+
+def _row(verdict: Verdict) -> dict[str, Any]:
+    """What the page says of a claim, but for its figures."""
+    mark, symbol = wording.MARKS[verdict.outcome]
+    more = len(verdict.missing) - REASONS
+    unseen = [f"and {more} more, see {results.SUMMARY}"] if more > 0 else []
+    return {
+        "claim": verdict.claim,
+        "verdict": verdict,
+        "mark": "other" if verdict.passed and mark == "fail" else mark,
+        "symbol": symbol,
+        "predicted": list(dict.fromkeys(bearing.by for bearing in verdict.claim.bearings if bearing.by)),
+        "missing": [*map(str, verdict.missing[:REASONS]), *unseen],
+        "checks": wording.ranked(verdict.checks)[:ROWS],
+    }
+
+
+def _lead(ran: Sequence[Verdict]) -> str:
+    """How far the orbit of stationary states is from theory, in a sentence."""
+    checks = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
+    orbits = [c for c in checks if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0]
+    if not orbits:
+        return "Its closed-form theory by Antali and Stépán is held against simulation."
+    return (
+        "In stationary states the angular velocity ω_c of its orbit, predicted in closed form by Antali and Stépán, is "
+        f"{len(orbits)} of the numbers below; the largest relative deviation of these is "
+        f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
     )
 
 

@@ -28,7 +28,7 @@ from rich.console import Console
 import mjsim
 from analytic import stable_solutions
 from compare.kit import pages
-from compare.kit.campaign import Campaign, run_batch
+from compare.kit.campaign import Campaign, Storing, run_batch
 from compare.kit.engines import MUJOCO
 from compare.kit.pages import Rows
 from compare.kit.sweep import MOST
@@ -285,7 +285,7 @@ def bookkeeping() -> float:
             here.complete(tasks)
 
     with tempfile.TemporaryDirectory() as directory:
-        alone = functools.partial(run_batch, tasks, Path(directory), "alone", math.inf)
+        alone = functools.partial(run_batch, tasks, Storing(Path(directory), "alone"), math.inf)
         alone()  # imports
         for _ in range(REPEATS):
             spent.append((-_seconds(alone, time.process_time) + _seconds(campaign, time.process_time)) / BATCH)

@@ -16,7 +16,7 @@ import pytest
 
 from compare.commands import cli
 from compare.kit import collection
-from compare.kit.campaign import FAILURES, Campaign, Failure, run_batch
+from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
 from compare.kit.tasks import Task
 from compare.kit.workers import Workers, _deaf, dask, processes
 from model import InputError, Parameters, SimulationError, StorageError, storage
@@ -121,7 +121,7 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(tmp_pat
 
 
 def test_runs_that_nobody_looks_at_are_not_handed_out(tmp_path):
-    ended = run_batch(tasks(2), tmp_path, "runs", math.inf, collection.save_means, False)
+    ended = run_batch(tasks(2), Storing(tmp_path, "runs", collection.save_means, looked_at=False), math.inf)
     assert [(reason, run) for reason, _, run in ended] == [("", None)] * 2
     assert len({file for _, file, _ in ended}) == 1
 
