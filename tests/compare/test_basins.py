@@ -1,10 +1,7 @@
 """Basins are those of theory, are kept, and go on where they stopped; kept searches are whole."""
 
-import dataclasses
-
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
 from analytic import stable_solutions
 from analytic.orbits import fates
@@ -13,13 +10,11 @@ from compare.commands import cli
 from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
 from compare.subjects.attractors.basins import FATES, Basins, basins
-from docs.studies import search
 from docs.studies.figures import SEARCHES
-from docs.studies.search import BOX, AttractorSearch, Searched, parameters, random_starts
+from docs.studies.search import BOX, Searched, parameters, random_starts
 from model import InputError, Parameters, StorageError, storage
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
-QUICK = AttractorSearch({**BOX, "kappa": (0.5, 1.0)}, starts=2)
 
 
 def test_screen_and_confirmation_tell_hopping_from_rest():
@@ -43,20 +38,6 @@ def test_intervals_of_shares():
     """Against the closed form of no hit in n: 1 - (alpha/2)^(1/n)."""
     assert interval(0, 900)[1] == pytest.approx(1 - 0.025 ** (1 / 900), rel=1e-9)
     assert interval(0, 0) == (0.0, 1.0)
-
-
-@pytest.mark.parametrize("path", SEARCHES, ids=lambda path: path.stem)
-def test_kept_searches_are_whole(path, tmp_path):
-    record = Searched.load(path)
-    rows = record.search.points(record.sets)
-    assert record.failed <= 1e-5 * record.sets * record.search.starts
-    away, _ = KDTree(rows).query([[row[group] for group in BOX] for row in record.rows])
-    assert np.max(away) < 1e-9
-    for name in BOX:  # the parts of a range are all of it
-        sets, hits = zip(*(map(int, row[3:5]) for row in search.table(record) if row[0] == name), strict=True)
-        assert (sum(sets), sum(hits)) == (record.sets, len(record.confirmed))
-    record.save(tmp_path / "again.json")
-    assert dataclasses.asdict(Searched.load(tmp_path / "again.json")) == dataclasses.asdict(record)
 
 
 def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):

@@ -7,6 +7,7 @@ import os
 import sys
 from pathlib import Path
 
+from docs.studies import mutants
 from model import InputError
 from model.files import write_text
 from tests.mutants import trial
@@ -33,7 +34,7 @@ def main() -> int:
         named = [name.partition("=") for name in args.witness]
         alone = [trial.heard(Path(where or first), name, args.workers) for name, _, where in named]
         if args.page:
-            write_text(args.page, trial.page(levels, measured, alone))
+            write_text(args.page, mutants.page(levels, measured, alone))
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -20,6 +20,7 @@ from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.record import Records
 from compare.subjects.stationary import claims
+from docs.studies import mutants
 from model import Parameters
 from tests.mutants import engines, trial
 from tests.mutants.engines import WRONG_ENGINES
@@ -74,8 +75,8 @@ def test_a_prediction_that_hangs_is_no_breakdown(monkeypatch: pytest.MonkeyPatch
 
 
 def test_subjects_name_wrong_theories_and_tests_that_there_are():
-    assert set(trial.SUBJECTS.values()) <= {wrong.what for wrong in (*THEORIES, *FOR_TESTS)}
-    for named in (*trial.BY_HAND.values(), *(f"analytic/test_{wrong.test}" for wrong in FOR_TESTS)):
+    assert set(mutants.SUBJECTS.values()) <= {wrong.what for wrong in (*THEORIES, *FOR_TESTS)}
+    for named in (*mutants.BY_HAND.values(), *(f"analytic/test_{wrong.test}" for wrong in FOR_TESTS)):
         file, _, test = named.partition("::")
         assert f"def {test}(" in (Path(__file__).parents[1] / f"{file}.py").read_text("utf-8"), named
 

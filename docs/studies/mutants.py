@@ -1,0 +1,114 @@
+"""The page on what the verdicts notice, docs/mutants.md, written by ``python -m tests.mutants ... --page FILE``."""
+
+from __future__ import annotations
+
+import itertools
+import statistics
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from compare.kit import pages
+from compare.kit.quantities import QUANTITIES
+from tests.mutants.theories import FOR_TESTS
+from tests.mutants.trial import KINDS, PATIENCE, Judged, Trial
+
+SUBJECTS = {
+    "C_D of the quadratic law": "the quadratic law's C_D is always 0.44",
+    "the law of the fluid's torque": "the fluid's torque as in creeping flow",
+    "restitution": "rebounds with nine tenths of the restitution",
+    "a ramp that rolling leads": "rolling at both points leads a ramp",
+    "ramps that begin later": "rolling at both points takes a ramp to begin with the run",
+    "stationary states at ω₀ < 0": "in a flow the other way round the ball spins as before",
+    "slow pulsation that falls to rest": "a slow pulsation never falls to rest",
+    "fast pulsation with both cones full": "a fast pulsation never fills both cones",
+    "RR in the case map for η > j": "regions in which RR never ends for η > j",
+    "η_cr of the quadratic law": "η_cr of the quadratic law as under Stokes' drag",
+    "η_cr for equal friction": "for equal friction the fold is born at η_cr of the set",
+    "RN and ω̃_z": "row of ω̃_z of RN 2 % large",
+    "jamming at μ > 1": "rolling lasts while forces can jam it",
+    "choice at μ > 1": "rolling goes on while forces allow it",
+    "SR on a smooth floor": "on a smooth floor the ball lags by 1 %",
+    "leaning direction's sign": "leaning mirrored",
+    "leaning direction's factor": "leaning at half the slope",
+    "landings on the wall": "landings on the wall with 5 % more friction",
+    "added mass": "the fluid adds all of the displaced mass",
+    "1 + j of RS": "the wall of RS doesn't turn the spin axis",
+}
+"""What wrong theories of others were about that nobody noticed at first, and a wrong theory here that is about it."""
+BY_HAND = {
+    "SS whose wall never opens": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "a floor without load that is never lost": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "NR that slips by B_y alone": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "RN's slip limit 5 % late": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "onset of slip that isn't mirrored": "analytic/test_choice::test_never_beyond_what_forces_can_hold_and_continuous_"
+    "where_it_ends",
+    "the fluid's spin with the wrong sign of ω₀": "analytic/test_real_fluid::test_rolling_with_the_torque_obeys_newton_"
+    "and_euler",
+    "a return map without its section": "analytic/test_orbits::test_newton_closes_the_orbit",
+    "a pinch at 0.95 of the friction": "compare/test_cases::test_rest_needs_the_share_of_friction_that_is_said",
+    "the wall's correction of friction's direction 20 % weak in y": "mjsim/test_drag::test_slipping_converges_with_the_"
+    "square_of_the_step",
+}
+"""Faults in compiled code, in methods and in MuJoCo's corrections, put in by hand, and the test that saw each."""
+PAGE = Path(__file__).with_name("mutants.md")
+"""What the page says around its tables."""
+
+
+def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Judged] = ()) -> str:
+    """The page that says which claim notices what, in Markdown, with the trials of wrong engines.
+
+    And what witnesses `alone` notice.
+    """
+    columns = [f"{level.name}: {what}" for level in levels for what in ("largest", "median", "a tenth")]
+    rows = [["quantity", "ceiling", *columns, "where"]]
+    for name, quantity in QUANTITIES.items():
+        if quantity.resolves and name in levels[-1].power:
+            cells = [_power([each[0] for each in level.power.get(name, ())], quantity.resolves) for level in levels]
+            where = "{1}, {2}".format(*levels[-1].power[name][0])
+            rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *itertools.chain(*cells), where])
+    tables = _table("theories", {each.name: each.trials for each in (*levels, *alone)})
+    tables += _table("engines", {"quick": measured}) if measured else ""
+    names, partly = (
+        " and ".join(level.name for level in each) for each in (levels, [e for e in levels if not e.whole])
+    )
+    until = f" (at {partly} until a claim notices it, the quickest first)" if partly else ""
+    tried = [trial for trial in levels[0].trials if trial.tried]
+    kinds = Counter(trial.kind for trial in tried)
+    words = {"first": levels[0].name, "tried": len(tried), **{name: kinds[name] for name in KINDS}}
+    words |= {"levels": names, "until": until, "patience": PATIENCE, "level": levels[-1].name}
+    lists = {"untried": _by_module(levels[-1].untried), "powers": pages.markdown(rows)}
+    lists |= {"subjects": pages.markdown(_subjects(levels[0].trials))}
+    return PAGE.read_text("utf-8").format(trials=tables, **words, **lists)
+
+
+def _subjects(trials: Sequence[Trial]) -> list[list[str]]:
+    """Who notices wrong theories about each of `SUBJECTS`, and the faults `BY_HAND`."""
+    measured, tests = {trial.what: trial.by for trial in trials}, {wrong.what: wrong.test for wrong in FOR_TESTS}
+    rows = [["subject", "wrong theory", "noticed by a claim", "by a unit test"]]
+    for subject, what in SUBJECTS.items():
+        test = f"`analytic/test_{tests[what]}`" if what in tests else "–"
+        rows.append([subject, what, measured.get(what, "–"), test])
+    return rows + [[subject, "by hand", "not tried", f"`{test}`"] for subject, test in BY_HAND.items()]
+
+
+def _by_module(names: Sequence[str]) -> str:
+    """Functions as a list in Markdown, an item a module."""
+    parts = (name.rpartition(".") for name in names)
+    modules = itertools.groupby(parts, lambda part: part[0])
+    return "\n".join(f"* `{module}`: {', '.join(f'`{name}`' for *_, name in own)}" for module, own in modules)
+
+
+def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
+    if not values:
+        return ("not measured",) * 3
+    sharp = sum(value <= ceiling / 10 for value in values) / len(values)
+    return f"{max(values):.1g}", f"{statistics.median(values):.1g}", f"{sharp:.0%}"
+
+
+def _table(what: str, tried: Mapping[str, Sequence[Trial]]) -> str:
+    noticed = ", ".join(f"{sum(bool(trial.noticed) for trial in trials)} at {level}" for level, trials in tried.items())
+    hung = ", ".join(f"{sum(bool(trial.hung) for trial in trials)} at {level}" for level, trials in tried.items())
+    rows = [[trials[0].what, *(trial.by for trial in trials)] for trials in zip(*tried.values(), strict=True)]
+    table = pages.markdown([["fault", *tried], *rows])
+    return f"\n## Wrong {what}, {len(rows)}: noticed {noticed}\n\nFaults that hang a claim: {hung}.\n\n{table}\n"
