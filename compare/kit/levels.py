@@ -141,7 +141,7 @@ WITNESS = replace(
     thresholds_width=5e-4, thresholds_loose=1e4, thresholds_rounds=(0.4, 1.0),
     plane_rounds=(1.0, 2.0),
     hysteresis_hold=15.0, hysteresis_parts=1,
-    unsteady_lasts=16.0, unsteady_refine=(2, 2), unsteady_ramps=(1, 1), unsteady_rates=(4e-2,),
+    unsteady_lasts=24.0, unsteady_refine=(2, 2), unsteady_ramps=(1, 1), unsteady_rates=(4e-2,),
     # where friction creeps, slip counts as such later
     pulsation_octaves=(3,), pulsation_steps=256, pulsation_samples=512, pulsation_refine=1, pulsation_reach=1.5,
     pulsation_width=2e-3,

@@ -90,7 +90,7 @@ class Assignment:
 ASSIGNMENTS: dict[str, Assignment] = {
     # protocol                 on trial, quick  in the limit     steps   as it comes
     "settled":    Assignment(VARIED,          WITNESSED,       (4, 4), ONE_BALL),
-    "mirrored":   Assignment(ONE_BALL),
+    "mirrored":   Assignment(ONE_BALL,        ONE_BALL),
     "plane":      Assignment(ONE_BALL),
     "thresholds": Assignment(VARIED,          WITNESSED,       (3, 4)),
     "edge":       Assignment(("reference", "rough-floor")),
@@ -104,11 +104,11 @@ ASSIGNMENTS: dict[str, Assignment] = {
     "field":      Assignment(VARIED,          WITNESSED),
     "motions":    Assignment(ONE_BALL,        ONE_BALL),
     "runs":       Assignment(DRAG_LAWS,       ONE_BALL),
-    "torque":     Assignment(ONE_BALL),
+    "torque":     Assignment(ONE_BALL,        ONE_BALL,        (4, 4)),
     "impacts":    Assignment(ENDS_OF_ROLLING, ONE_BALL),
     "hysteresis": Assignment(ONE_BALL,        ONE_BALL,        (4, 4)),
     "unloading":  Assignment(ENDS_OF_ROLLING),
-    "slope":      Assignment(VARIED),
+    "slope":      Assignment(VARIED,          ONE_BALL),
     "pulsation":  Assignment(DRAG_LAWS,       ONE_BALL),
     "unsteady":   Assignment(DRAG_LAWS,       ONE_BALL),
     "recurrent":  Assignment(ONE_BALL),

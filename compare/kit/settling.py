@@ -100,7 +100,7 @@ def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -
                 states[n] = Settled(start, Case.NN, {}, start.x0, task, failure=f"the run {run}")
                 continue
             state = states[n] = judged(start, task, run, loose)
-            part = task.t_end / duration(start.p, span)
+            part = task.t_end / duration(start.p, span, steps)
             if left[n] and state.excess > min(part, 1.0) * min(loose, patience.sharp):
                 # A part of a round may end on the way to where the ball settles: it goes on as it is.
                 x = State.of(run.x[-1] if part < 1 else state.mean)
