@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from analytic import contact_forces, vector_field
-from analytic.mechanics import drag
 from analytic.mechanics.rigid_body import energy, velocities
-from analytic.simulation import charts, motion, two_point_rolling
+from analytic.simulation import charts, motion
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS
@@ -89,40 +87,3 @@ def test_vanishing_slip_has_a_direction(case):
         if not math.isnan(given):
             assert math.cos(given - kept) == pytest.approx(1.0, abs=1e-14)
     assert np.all(np.isfinite(chart.rates(at.time, chart.start)))
-
-
-@pytest.mark.parametrize("c", [0.0, 1e-6, 0.3, 4.0, 50.0])
-@pytest.mark.parametrize(("y", "v_y"), [(0.1, 0.0), (0.0, 2.0), (0.05, -1.0), (0.0, 1e-9), (0.2, 3.0)])
-def test_fall_ends_on_the_floor(c, y, v_y):
-    """y'' = -g - c y' by its textbook solution, in a form that needs no small-c care: the work-energy of the fall."""
-    p = P.replace(c=c)
-    t = drag.fall_time(y, v_y, p)
-    height, speed = drag.fall(t, y, v_y, p)
-    scale = y + v_y**2 / p.g
-    assert t > 0
-    assert abs(height) <= 1e-14 * scale
-    assert speed < 0
-    # Momentum: v(t) - v(0) = -g t - c (y(t) - y(0)).
-    assert speed - v_y == pytest.approx(-p.g * t - c * (0 - y), rel=1e-12)
-    # And the height is the integral of the velocity.
-    drop = quad(lambda s: drag.fall(s, y, v_y, p)[1], 0.0, t, epsabs=1e-12 * scale, epsrel=1e-12)[0]
-    assert drop == pytest.approx(-y, abs=2e-12 * scale)
-
-
-@pytest.mark.parametrize("waves", [(), ((3.0, 7.0, 0.4), (1.0, 20.0, 0.0))], ids=["ramp", "waves"])
-@pytest.mark.parametrize("c", [0.0, 1e-8, 1.0, 30.0])
-def test_two_point_rolling_solves_its_equation(c, waves):
-    """Along a ramp: omega_c' = -c (omega_c - omega_0)/(1+2j), azimuth and work by their definitions."""
-    p, ramp = P.replace(c=c), motion.Fluid(0.1, 4.0, 3.0, waves)
-    at = motion.Moment(0.3, 1.1, State(omega_c=5.0))
-    t = np.linspace(0.3, 4.0, 50)[1:]
-    path = two_point_rolling.path(t, at, p, ramp)
-    k = c / (1 + 2 * p.j)
-    for t1, omega_c, theta, work in zip(t, path.x[:, 2], path.theta, path.work, strict=True):
-        # Variation of constants, by quadrature.
-        fluid = quad(lambda s, t1=t1: math.exp(-k * (t1 - s)) * k * ramp(s), 0.3, t1, epsabs=1e-13, epsrel=1e-13)[0]
-        assert omega_c == pytest.approx(5.0 * math.exp(-k * (t1 - 0.3)) + fluid, rel=1e-12)
-        turned = quad(lambda s: float(two_point_rolling.omega_c(s, at, p, ramp)), 0.3, t1, epsrel=1e-12)[0]
-        assert theta - 1.1 == pytest.approx(turned, rel=1e-11)
-        kinetic = p.m * p.R**2 * (1 + 2 * p.j) * (omega_c**2 - 25.0) / 2
-        assert work == pytest.approx(kinetic, abs=1e-13 * p.m * p.R**2 * omega_c**2 + 1e-16)

@@ -5,8 +5,6 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from analytic import contact_forces
 from analytic.mechanics.contact_problem import Closed, NotConvergedError, solve
@@ -15,10 +13,6 @@ from model import Case, Parameters
 
 P = Parameters.named("reference")
 EPS = sys.float_info.epsilon
-
-speeds = st.tuples(*[st.floats(-2, 2)] * 3, *[st.floats(-200, 200)] * 3)
-frictions = st.just(0.0) | st.floats(1e-9, 0.9)
-inertias = st.floats(0.1, 2 / 3)
 
 
 def assert_obeys(P_n, v_n, target, P_t, v_t, friction, tiny):
@@ -46,15 +40,6 @@ def assert_solves(u, A, B, p, tolerance=4e-15):
     return after, impulse
 
 
-@given(speeds, frictions, frictions, inertias, st.floats(0, 1))
-@settings(max_examples=200, deadline=None)
-def test_both_contacts_obey_coulomb(u, mu, eta, j, e):
-    p = P.replace(mu=mu, eta=eta, j=j)
-    after, _ = assert_solves(u, Closed(max(0.0, -e * u[1])), Closed(max(0.0, -e * u[0])), p)
-    if e == 0:
-        assert energy(0.0, after, p) <= energy(0.0, u, p) * (1 + 1e-12)
-
-
 @pytest.mark.parametrize(("largest", "restitution"), [(0.9, 0.0), (20.0, 0.0), (0.999, 1.0), (1.5, 1.0)])
 def test_a_thousand_random_problems(largest, restitution):
     """Any friction without restitution, and restitution wherever mu < 1 or eta < 1; speeds over three decades."""
@@ -66,7 +51,8 @@ def test_a_thousand_random_problems(largest, restitution):
         p = P.replace(mu=mu, eta=eta, j=rng.uniform(0.1, 2 / 3))
         u = tuple((rng.normal(size=6) * 10 ** rng.uniform(-2, 1, 6) / ([1] * 3 + [p.r] * 3)).tolist())
         e = rng.uniform(0, restitution)
-        assert_solves(u, Closed(max(0.0, -e * u[1])), Closed(max(0.0, -e * u[0])), p)
+        after, _ = assert_solves(u, Closed(max(0.0, -e * u[1])), Closed(max(0.0, -e * u[0])), p)
+        assert e > 0 or energy(0.0, after, p) <= energy(0.0, u, p) * (1 + 1e-12)
 
 
 def test_a_slip_that_is_known_beforehand():

@@ -103,20 +103,6 @@ def test_constraints_are_kept_exactly_and_mirror_images_too(case):
     np.testing.assert_allclose(mirrored, flip * rates, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("case", list(Case))
-def test_vanishing_parameters(case):
-    """Each has a defined result, also with an orbit at rest (omega_c = 0)."""
-    x = random_states(case, 50)
-    x[:25, 2] = 0.0
-    for zero in (["mu"], ["eta"], ["c"], ["omega_0"], ["mu", "eta"]):
-        p = P.replace(**dict.fromkeys(zero, 0.0))
-        assert np.all(np.isfinite(vector_field(case, x, p)))
-        if case is not Case.RR:
-            F_A, F_B = contact_forces(case, x, p)
-            assert np.all(np.isfinite([F_A, F_B]))
-            assert case.A is not Contact.S or p.mu > 0 or np.all(F_A[:, [0, 2]] == 0)
-
-
 # --- bad input -------------------------------------------------------------------------------------------------
 
 BAD = [

@@ -1,21 +1,15 @@
 """Both simulators keep the laws at every sample, reflect, refuse what is wrong, and can be interrupted."""
 
-import importlib
 import itertools
 import json
 import math
 import os
-import signal
-import threading
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate, simulate_many, thresholds
-from analytic.simulation import integrator
-from analytic.simulation.ensemble import random_starts
-from analytic.simulation.simulator import slip_perturbation
+from analytic import Settings, simulate, simulate_many
 from model import Case, Contact, Flow, InputError, Parameters, SimulationError
 
 P = Parameters.named("reference")
@@ -199,28 +193,6 @@ def test_bad_input_is_refused(arguments, message):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_interruption_is_raised(method, monkeypatch):
-    """Ctrl-C in the middle of the equations: no run that could be taken for a whole one comes back."""
-    name = {"event": "analytic.simulation.equations.rates", "time-stepping": "analytic.simulation.stepping.advance"}[
-        method
-    ]
-    calls = iter(range(10**9))
-
-    def stop(*args):
-        if next(calls) == 500:
-            raise KeyboardInterrupt
-        return wrapped(*args)
-
-    module, attribute = name.rsplit(".", 1)
-    wrapped = getattr(importlib.import_module(module), attribute)
-    monkeypatch.setattr(name, stop)
-    monkeypatch.setattr(integrator, "_solvers", lambda: None)
-    p = P.replace(omega_0=25.0)
-    with pytest.raises(KeyboardInterrupt):
-        simulate(p, [0, 0, 13.8, -4, 0.5, 10], 4.0, method=method, timestep=1e-3, sample_interval=1e-3)
-
-
-@pytest.mark.parametrize("method", METHODS)
 def test_a_run_that_progress_ends_carries_its_samples(method):
     def enough(done):
         if done > 0.3:
@@ -246,28 +218,3 @@ def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
         assert simulate(p, [0] * 6, 1e-8, flow, method=method).complete
     with pytest.raises(InputError, match="t_end = 1 s is out of range: "):
         simulate_many(p, [0] * 6, 1.0, flow)
-
-
-def test_interrupting_many_runs_ends_those_under_way():
-    """Hours of them, and days without numba: the threads must not be waited for."""
-    p, alarm = Parameters.named("hopping"), signal.getsignal(signal.SIGALRM)
-    simulate_many(p, [0] * 8, 0.1, threads=1)  # is compiled
-
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, 0.5)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            simulate_many(p, random_starts(p, 4, 0), 1e6, sample_interval=1e3, threads=2)
-    finally:
-        signal.signal(signal.SIGALRM, alarm)
-    assert threading.active_count() == 1
-
-
-@pytest.mark.parametrize(("flow", "grows"), [(1.2, False), (0.8, True)])
-def test_slip_on_the_wall_grows_below_omega_02_only(flow, grows):
-    p = P.replace(omega_0=flow * thresholds(P).omega_02)
-    slip = slip_perturbation(p, 1.0, 0.3, 0.05).slip_speed_B
-    assert (slip[-1] > slip[0]) == grows

@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from analytic import (
     Stability,
     leaning_modes,
     solution,
     stationary_solutions,
-    thresholds,
     vector_field,
 )  # fmt: skip
 from analytic.mechanics.dynamics import jacobian
@@ -127,21 +124,6 @@ def test_roots_of_the_branch_to_round_off(mu, kappa, eta):
         assert places
         for place in places:
             assert abs(float(branch(place, p).Omega_0) - Omega_0) <= 8 * EPS * Omega_0
-
-
-@given(st.floats(1e-14, 1e-3))
-@settings(max_examples=30, deadline=None)
-def test_just_beyond_the_end_of_rolling(excess):
-    """The slip of a flow a hair beyond omega_01 is that hair over the slope of (41), to the hair's own digits."""
-    omega_01 = thresholds(P).omega_01
-    p = P.replace(omega_0=omega_01 * (1 + excess))
-    (s,) = of_case(p, Case.SS)
-    lead = p.omega_0 - omega_01
-    den = (1 + p.j) * p.mu * p.eta + p.j - p.eta
-    expected = lead / (p.g * p.mu / (p.R * p.c) * (p.j - p.eta) / den)
-    digits = 8 * EPS * omega_01 / lead + 2 * abs(expected)  # of the flow itself, and of the next order in alpha
-    assert abs(-s.alpha / expected - 1) <= digits
-    assert s.stability is Stability.ASYMPTOTIC
 
 
 # --- mirror images and vanishing parameters --------------------------------------------------------------------

@@ -15,27 +15,6 @@ from model.trajectory import columns
 P = Parameters.named("reference")
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_falls_freely_through_the_fluid(order) -> None:
-    """Off floor and wall only gravity and drag act: v_y' = -g - c v_y, and no moment turns the ball in space."""
-    p = P.replace(omega_0=0.0, c=3.0)
-    x0 = [0.5, 0, 0, 2.0, 1.0, -3.0, 0.02, 0]
-    errors = []
-    for timestep in (2e-3, 1e-3):
-        settings = ContactSettings.at(timestep, order=order)
-        run = mjsim.simulate(p, x0, 0.2, settings=settings, sample_interval=0.02)
-        v_y = -p.g / p.c * (1 - np.exp(-p.c * run.time))
-        y = 0.5 - p.g / p.c * run.time - v_y / p.c
-        errors.append([np.abs(run.v_y - v_y).max(), np.abs(run.y - y).max()])
-        np.testing.assert_array_equal(run.force_A, 0)
-        assert {case.name for case in run.cases} == {"NN"}
-        # (4): o = roll + slip, and roll_z = v_y / r is all that changes.
-        np.testing.assert_allclose(run.slip_z + run.v_y / p.r, -3.0, rtol=0, atol=1e-10)
-    # Halving the step divides the error by 2^order, up to terms of the next order, c h relative.
-    ratio = np.array(errors[0]) / errors[1]
-    np.testing.assert_allclose(ratio, 2**order, rtol=10 * p.c * 2e-3)
-
-
 def test_a_spin_under_which_the_axes_turn_stays_as_large_as_it_is() -> None:
     """On a smooth wall no moment turns the ball in space; a turn of the fluid takes 31 steps."""
     p = P.replace(eta=0.0, omega_0=100.0)

@@ -1,4 +1,4 @@
-"""Landings within a step: what they leave, and second order through impacts on a ball that hops for ever."""
+"""Landings within a step are of second order, at any step and place in it; claim impacts has what they leave."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import mjsim
 from mjsim import ContactSettings, scene
 from mjsim.landing import FINE
 from mjsim.stepping import Polar
-from model import Flow, Parameters
+from model import Parameters
 
 HOPS = Parameters.named("hopping")
 """A hop lasts 0.22 s, and the floor is touched for half a millisecond of it."""
@@ -94,37 +94,3 @@ def test_landings_do_not_depend_on_those_of_others_in_a_batch() -> None:
         for x0s in ([START], [START, higher])
     )
     np.testing.assert_array_equal(beside[0].x, alone[0].x)
-
-
-# --- what a landing leaves, all within its step --------------------------------------------------------------
-
-
-FALLING = Parameters.named("reference").replace(omega_0=0.0, c=0.0)
-STILL = Flow.steady(0.0)
-HEIGHTS = 0.02 * np.linspace(1.0, 1.05, 6)
-"""Falls that end at all phases of a time step."""
-
-
-def after_landing(x0: list[float], timestep: float) -> tuple[float, np.ndarray]:
-    """Speed at which the floor is hit from x0, by energy, and the states from a step after that on."""
-    speed = np.sqrt(2 * FALLING.g * x0[0] + x0[1] ** 2)
-    lands = (speed + x0[1]) / FALLING.g
-    run = mjsim.simulate(FALLING, x0, lands + 0.02, STILL, ContactSettings.at(timestep), sample_interval=timestep)
-    return float(speed), run.x[run.time > lands + 1.5 * timestep]
-
-
-@pytest.mark.parametrize("timestep", [1e-3, 2.5e-4])
-@pytest.mark.parametrize("height", HEIGHTS)
-def test_a_ball_that_falls_on_the_floor_stays_there(height: float, timestep: float) -> None:
-    _, x = after_landing([height, 0, 0, 0, 0, 0, 0.02, 0], timestep)
-    assert np.abs(x[:, 1]).max() < FALLING.g * timestep  # m s-1: what gravity does in a step
-    assert np.abs(x[:, 0]).max() < FALLING.g * timestep**2
-
-
-@pytest.mark.parametrize("height", HEIGHTS)
-def test_the_wall_answers_in_the_same_step(height: float) -> None:
-    """Friction of the landing drives the ball into the wall, which it touches: no speed is left at either contact."""
-    timestep = 1e-3
-    speed, x = after_landing([height, 0, 0, 0, 0, 100.0, 0.0, 0], timestep)
-    assert FALLING.mu * speed > 0.1  # m s-1: what the wall would see a step late
-    assert np.abs(x[:, [1, 7]]).max() < 2 * FALLING.g * timestep
