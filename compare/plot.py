@@ -1,4 +1,4 @@
-"""Figures of one's own: each function draws into axes of matplotlib, new ones if none are given, and returns them.
+"""Figures of one's own: functions draw into axes of matplotlib, new ones if none are given, and return them.
 
 For example::
 
@@ -16,8 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from compare import gallery
 from compare.kit import pages, style
+from compare.kit.drawing import GapError
 from compare.kit.quantities import QUANTITIES
 from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
@@ -51,6 +54,20 @@ def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> 
     thresholds.regions(axes, p, equal)
     style.legend(axes, loc="upper right")
     return axes
+
+
+def figure(name: str, p: Parameters) -> Figure:
+    """A figure of the paper, or beyond it, of a set: "fig-9", "unloading", as `dualball figures` names them.
+
+    Raises `InputError` for an unknown name, and for a figure of which the set has nothing to show.
+    """
+    known = gallery.of_set(p)
+    check_names([name], list(known), "figure")
+    try:
+        drawn, _ = gallery.FIGURES[name].draw(known[name]())
+    except GapError as error:
+        raise InputError(f"{name} can't be drawn of this set: {error}") from error
+    return drawn
 
 
 def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = None) -> Axes:

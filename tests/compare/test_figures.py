@@ -213,6 +213,9 @@ def test_functions_that_draw_into_axes():
     axes = plot.characteristic(p)
     assert (axes.get_xlabel(), axes.get_ylabel()) == (style.OMEGA_0, style.OMEGA_C)
     assert plot.regions(p, equal=True).get_xlabel().startswith("friction")
+    assert plot.figure("fig-10", p).axes[0].get_xlabel() == style.OMEGA_0
+    with pytest.raises(InputError, match="fig-11 can't be drawn of this set: it is for η > j"):
+        plot.figure("fig-11", p)
     run = analytic.simulate(p.replace(omega_0=25.0), State(y=0.003, omega_c=5.0), 2.0)
     mine = style.figure(3, 3).add_subplot()
     assert plot.motion(run, "slip_x", "slip_z", axes=mine) is mine
