@@ -1,7 +1,9 @@
 """Shared by the tests of `compare`."""
 
 import dataclasses
+import shutil
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -33,3 +35,18 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
     """Where protocols run MuJoCo at the quick level."""
     with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
         yield Lab(campaign, MUJOCO, Level.QUICK)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, without a window; contexts and pages of it may have nothing to complain of."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if path is None:
+        pytest.skip("no Chromium is installed")
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(
+            executable_path=path, args=["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"]
+        )
+        yield chromium
+        chromium.close()

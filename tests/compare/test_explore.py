@@ -8,7 +8,6 @@ import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ import pytest
 from compare.commands import cli
 from compare.view import explore
 from model import InputError, Parameters, State, storage
-from tests.compare.test_report import BROWSER
 
 P = Parameters.named("reference")
 
@@ -51,50 +49,46 @@ def address() -> Iterator[str]:
         assert "Traceback" not in error
 
 
-def test_what_is_moved_clicked_and_typed_shows_and_is_saved(address: str, tmp_path: Path) -> None:
-    sync = pytest.importorskip("playwright.sync_api")
-    if BROWSER is None:
-        pytest.skip("there is no browser")
-    with sync.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
-        page, other = (browser.new_page(viewport={"width": 1500, "height": 900}) for _ in range(2))
-        for tab in (page, other):
-            tab.goto(address)
-            tab.wait_for_selector(".map .nsewdrag", timeout=60_000)
+def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tmp_path):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    page, other = (browser.new_page(viewport={"width": 1500, "height": 900}) for _ in range(2))
+    for tab in (page, other):
+        tab.goto(address)
+        tab.wait_for_selector(".map .nsewdrag", timeout=60_000)
 
-        def shows(text: str) -> None:
-            page.wait_for_function("t => document.querySelector('.said').innerText.includes(t)", arg=text)
+    def shows(text: str) -> None:
+        page.wait_for_function("t => document.querySelector('.said').innerText.includes(t)", arg=text)
 
-        def click(where: str, x: float, y: float, tab: Any = page) -> None:
-            box = tab.locator(where).bounding_box()
-            place = box["x"] + box["width"] * x, box["y"] + box["height"] * y
-            tab.mouse.move(*place)
-            tab.wait_for_timeout(300)  # plotly looks for the point below when the pointer rests
-            tab.mouse.click(*place)
+    def click(where: str, x: float, y: float, tab: Any = page) -> None:
+        box = tab.locator(where).bounding_box()
+        place = box["x"] + box["width"] * x, box["y"] + box["height"] * y
+        tab.mouse.move(*place)
+        tab.wait_for_timeout(300)  # plotly looks for the point below when the pointer rests
+        tab.mouse.click(*place)
 
-        shows("RR at ω_c = 12")
-        click("[aria-label=omega_0]", 25 / 80, 0.5)
-        shows("SS at ω_c = ")
-        click(".map .nsewdrag", 0.5, 0.5)  # eta = 0.6, omega_0 = 40
-        shows("NR at ω_c = 40")
-        click(".curve .nsewdrag", 0.75, 0.25)  # omega_0 = 60, from omega_c = 60
-        shows("NR at ω_c = 60")
-        moving = page.frame_locator(".motion")
-        sync.expect(moving.locator("#case")).to_have_text("NR")
-        place = moving.locator("#place").input_value()
-        sync.expect(moving.locator("#place")).not_to_have_value(place)  # it plays
-        for button, name in (("Set as TOML", "set.toml"), ("Run as HDF5", "run.h5")):
-            with page.expect_download() as saved:
-                page.get_by_text(button).click()
-            saved.value.save_as(tmp_path / name)
-        number = page.locator("input[type=number]").first
-        number.fill("-3")
-        number.press("Tab")
-        page.wait_for_selector("text=mu = -3 is out of range")
-        assert "RR at ω_c = 12" in other.inner_text(".said")
-        click(".curve .nsewdrag", 0.75, 0.25, other)
-        other.close()  # in the middle of a run, of which the server says nothing in the end
-        browser.close()
+    shows("RR at ω_c = 12")
+    click("[aria-label=omega_0]", 25 / 80, 0.5)
+    shows("SS at ω_c = ")
+    click(".map .nsewdrag", 0.5, 0.5)  # eta = 0.6, omega_0 = 40
+    shows("NR at ω_c = 40")
+    click(".curve .nsewdrag", 0.75, 0.25)  # omega_0 = 60, from omega_c = 60
+    shows("NR at ω_c = 60")
+    moving = page.frame_locator(".motion")
+    expect(moving.locator("#case")).to_have_text("NR")
+    place = moving.locator("#place").input_value()
+    expect(moving.locator("#place")).not_to_have_value(place)  # it plays
+    for button, name in (("Set as TOML", "set.toml"), ("Run as HDF5", "run.h5")):
+        with page.expect_download() as saved:
+            page.get_by_text(button).click()
+        saved.value.save_as(tmp_path / name)
+    number = page.locator("input[type=number]").first
+    number.fill("-3")
+    number.press("Tab")
+    page.wait_for_selector("text=mu = -3 is out of range")
+    assert "RR at ω_c = 12" in other.inner_text(".said")
+    click(".curve .nsewdrag", 0.75, 0.25, other)
+    other.close()  # in the middle of a run, of which the server says nothing in the end
+    page.close()
     p, run = Parameters.load(tmp_path / "set.toml"), storage.load(tmp_path / "run.h5")
     assert (p.eta, p.omega_0) == (pytest.approx(0.6, abs=0.02), pytest.approx(60, abs=1.5))
     assert run.header.parameters == p

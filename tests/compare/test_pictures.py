@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -15,7 +14,6 @@ from compare.commands import cli
 from compare.commands.bench import LEAGUE_PAGE
 from compare.kit import pages
 from compare.kit.pictures import embedded, plain, svg
-from tests.compare.test_report import BROWSER
 
 
 def made() -> Figure:
@@ -69,17 +67,6 @@ def test_pictures_of_a_page_share_letters_and_nothing_else() -> None:
 )
 def test_labels_are_read_without_tex(label: str, read: str) -> None:
     assert plain(label) == read
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api")
-    if BROWSER is None:
-        pytest.skip("there is no browser")
-    with playwright.sync_playwright() as p:
-        chromium = p.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
-        yield chromium
-        chromium.close()
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning")

@@ -15,7 +15,6 @@ from compare.kit import style
 from compare.view import geometry, render
 from model import Case, InputError, Parameters, Trajectory, storage
 from model.kinematics import angular_velocity
-from tests.compare.test_report import BROWSER
 
 WIDTH = 320
 
@@ -79,30 +78,25 @@ def test_command_writes_pictures_and_films(run: Trajectory, tmp_path: Path, caps
     assert "320 × 200" in capsys.readouterr().out
 
 
-def test_a_page_plays_in_a_browser_without_network(run: Trajectory, tmp_path: Path) -> None:
+def test_a_page_plays_in_a_browser_without_network(browser, run, tmp_path):
     """Frames, numbers and the case follow the slider; nothing is fetched, nothing fails."""
     pytest.importorskip("nicegui")
-    sync = pytest.importorskip("playwright.sync_api")
-    if BROWSER is None:
-        pytest.skip("there is no browser")
     file = tmp_path / "run.html"
     assert render.write(run, file, at=0.1, speed=0.5, rate=50).endswith(": 71 frames")  # ends of 0.7 s of the run
     assert file.stat().st_size < 3e6
-    with sync.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--enable-unsafe-swiftshader"])
-        page, wrong, fetched = browser.new_page(), list[str](), list[str]()
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("request", lambda request: fetched.append(request.url))
-        page.goto(file.as_uri())
-        page.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
-        for k, time in ((0, 0.1), (70, 0.8)):
-            page.locator("#place").fill(str(k))
-            page.wait_for_function(f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')")
-            now = geometry.resampled(run, np.array([time]))
-            assert page.locator("#case").inner_text() == Case(now.case[0]).name
-            assert f"ωc = {now.omega_c[0]:.2f} rad/s" in page.locator("#numbers").inner_text()
-        assert page.locator("#play").inner_text() == "Play"
-        browser.close()
+    page, wrong, fetched = browser.new_page(), list[str](), list[str]()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda request: fetched.append(request.url))
+    page.goto(file.as_uri())
+    page.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
+    for k, time in ((0, 0.1), (70, 0.8)):
+        page.locator("#place").fill(str(k))
+        page.wait_for_function(f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')")
+        now = geometry.resampled(run, np.array([time]))
+        assert page.locator("#case").inner_text() == Case(now.case[0]).name
+        assert f"ωc = {now.omega_c[0]:.2f} rad/s" in page.locator("#numbers").inner_text()
+    assert page.locator("#play").inner_text() == "Play"
+    page.close()
     assert not wrong
     assert [url for url in fetched if not url.startswith(("file:", "data:", "blob:"))] == []
 

@@ -6,8 +6,6 @@ import html
 import json
 import pickle
 import re
-import shutil
-import subprocess
 import zlib
 from pathlib import Path
 from typing import Any
@@ -31,7 +29,6 @@ from model import Parameters, StorageError
 from tests.measured import measured
 
 pytestmark = pytest.mark.usefixtures("few_figures")
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 P = Parameters.named("reference")
 RUNS = ("runs/there.h5",)
 
@@ -263,18 +260,6 @@ def test_errata_are_the_documented_ones() -> None:
 # --- in a real browser ---------------------------------------------------------------------------------------
 
 
-HARNESS = """<!doctype html><iframe style="width:WIDTHpx; height:844px; border:0" srcdoc="PAGE"></iframe>
-<pre></pre><script>
-const frame = document.querySelector("iframe"), answers = [];
-frame.onload = async () => {
-  for (const each of ASKED) {
-    await new Promise(done => setTimeout(done, 300));
-    answers.push(frame.contentWindow.eval(each));
-  }
-  document.querySelector("pre").textContent = JSON.stringify(answers);
-};
-</script>"""
-"""The page in a frame, with expressions that are evaluated in it one after the other."""
 ROWS = "[...document.querySelectorAll('details.claim')]"
 SHOWN = f"{ROWS}.filter(row => !row.hidden).map(row => row.id)"
 FOUND = "[...document.querySelectorAll('#numbers-found tr')].map(row => [...row.cells].map(cell => cell.textContent))"
@@ -310,8 +295,6 @@ NUMBERS = (
     (f"{FOUND}[0].toSpliced(3, 1).join()", "reference,12,ω_c rad/s,mujoco,12,1e-9, 12,0,3e-9,good"),
 )
 OPEN = "document.querySelectorAll('details').forEach(row => { row.open = true; }); document.documentElement.scrollWidth"
-DARK = """for (const sheet of document.styleSheets) for (const rule of sheet.cssRules)
-    if (rule.media?.mediaText.includes("prefers-color-scheme")) rule.media.mediaText = "screen";"""
 CONTRAST = """(() => {
     const light = colour => { const [r, g, b] = colour.match(/[\\d.]+/g).map(Number).map(v => v / 255)
         .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
@@ -323,51 +306,44 @@ CONTRAST = """(() => {
 })()"""
 
 
-def browsed(folder: Path, *what: str) -> str:
-    """What Chromium, without a window, prints of a page; it may have nothing to complain of."""
-    if BROWSER is None:
-        pytest.skip("no Chromium is installed")
-    flags = "--headless --no-sandbox --disable-gpu --disable-dev-shm-usage --enable-logging=stderr"
-    patience = "--virtual-time-budget=60000", f"--user-data-dir={folder / 'profile'}"
-    command = [BROWSER, *flags.split(), *patience, *what]
-    answer = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert "CONSOLE" not in answer.stderr
-    return answer.stdout
-
-
-def asked(page: Path, folder: Path, width: int, *expressions: str) -> list[Any]:
-    text = HARNESS.replace("WIDTH", str(width)).replace("ASKED", json.dumps(expressions))
-    harness = folder / "harness.html"
-    framed = page.read_text("utf-8").replace("<head>", '<head><base href="about:srcdoc">', 1)  # links stay within it
-    harness.write_text(text.replace("PAGE", html.escape(framed)), "utf-8")
-    shown = browsed(folder, f"--window-size={max(width, 800)},1000", "--dump-dom", harness.as_uri())
-    return list(json.loads(html.unescape(shown.rsplit("<pre>", 1)[1].split("</pre>")[0])))
+@pytest.fixture
+def tab(browser, page):
+    """The page, which may have nothing to complain of and fetches nothing."""
+    opened, wrong = browser.new_page(viewport={"width": 1200, "height": 844}), []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.on("console", lambda message: wrong.append(message.text))
+    opened.on("request", lambda request: wrong.append(request.url) if request.url.startswith("http") else None)
+    opened.goto(f"{page.as_uri()}#good")
+    yield opened
+    opened.close()
+    assert not wrong
 
 
 @pytest.mark.parametrize("table", [FILTERED, NUMBERS], ids=["claims", "numbers"])
-def test_claims_and_numbers_are_found(page: Path, tmp_path: Path, table: tuple[tuple[str, Any], ...]) -> None:
-    assert asked(page, tmp_path, 1200, *(each for each, _ in table)) == [expected for _, expected in table]
+def test_claims_and_numbers_are_found(tab, table):
+    tab.wait_for_function("document.getElementById('found').textContent")
+    for asked, expected in table:
+        assert tab.evaluate(asked) == expected, asked
 
 
-def test_nothing_runs_over_the_side_and_text_is_legible(page: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("width", [390, 1200])
+def test_nothing_runs_over_the_side_and_text_is_legible(tab, width):
     """All rows open, on a phone, too; text against its ground has the contrast 4.5 of WCAG AA, light and dark."""
-    for width in (390, 1200):
-        reached, light, _, dark = asked(page, tmp_path, width, OPEN, CONTRAST, f"{DARK} 0", CONTRAST)
-        assert reached <= width
-        assert min(light, dark) >= 4.5
-        assert light != dark
+    tab.set_viewport_size({"width": width, "height": 844})
+    assert tab.evaluate(OPEN) <= width
+    contrast = set()
+    for scheme in ("light", "dark"):
+        tab.emulate_media(color_scheme=scheme)
+        contrast.add(tab.evaluate(CONTRAST))
+    assert min(contrast) >= 4.5
+    assert len(contrast) == 2
 
 
-def test_an_address_opens_its_row_and_the_page_prints(page: Path, tmp_path: Path) -> None:
-    shown = browsed(tmp_path, "--dump-dom", f"{page.as_uri()}#good")
-    opened = re.findall(r'<details[^>]* id="(\w+)"[^>]*\bopen=', shown) + re.findall(
-        r'<details[^>]*\bopen=[^>]* id="(\w+)"', shown
-    )
-    assert opened == ["good"]
-    browsed(tmp_path, f"--print-to-pdf={tmp_path / 'page.pdf'}", page.as_uri())
-    printed = (tmp_path / "page.pdf").read_bytes()
+def test_an_address_opens_its_row_and_the_page_prints(tab):
+    assert tab.evaluate(f"{ROWS}.filter(row => row.open).map(row => row.id)") == ["good"]
+    printed = tab.pdf()
     assert printed.startswith(b"%PDF")
-    assert printed.count(b"/Type /Page\n") + printed.count(b"/Type /Page ") + printed.count(b"/Type/Page") > 1
+    assert len(re.findall(rb"/Type ?/Page\b[^s]", printed)) > 1
 
 
 @pytest.mark.parametrize(
