@@ -158,7 +158,7 @@ class Stretch:
             )  # fmt: skip
             if why == solvers.STUCK or not np.isfinite(here).all():
                 raise StalledError(f"steps become too short in case {Case(chart.motion.case).name}")
-            t = self.until if why == solvers.DONE else start + tau
+            t = self.until if why == solvers.DONE else max([start + tau, *times[before:taken][-1:].tolist()])
             self._level = level.tolist()
             name = chart.ends[guard] if why == solvers.FIRED else None
             yield Step(t, here.tolist(), times[before:taken], samples[before:taken], name, REPORT_EVERY)

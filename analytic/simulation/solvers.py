@@ -195,6 +195,12 @@ def _left(z: Array, rate: Array, slips: npt.NDArray[np.int64], unit: float, rtol
     return left
 
 
+@register_jitable  # type: ignore[untyped-decorator]
+def _passed(time: float, start: float, tau: float) -> bool:
+    """Whether start + tau is at a time or later, however that is rounded: a stretch that ends there reaches it."""
+    return time <= start + tau or time - start <= tau
+
+
 @_compiled
 def explicit(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
@@ -261,11 +267,11 @@ def explicit(
             low = min(one, two, end)
             clear = clear and low > CLEAR * (max(one, two, end) - low)
         fired, until = -1, after
-        if not clear or (taken < len(times) and times[taken] <= start + after):
+        if not clear or (taken < len(times) and _passed(times[taken], start, after)):
             _dense(start + tau, h, k, z, new, K, now, F)
             fired, share = _first_fall(start + tau, h, k, z, F, arm, level, seen, now, values)
             until = tau + share * h if fired >= 0 else after
-            while taken < len(times) and times[taken] <= start + until:
+            while taken < len(times) and _passed(times[taken], start, until):
                 _between(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
                 taken += 1
             if fired >= 0:
@@ -284,7 +290,7 @@ def explicit(
             least = min(least, z[i] / unit)
         slow = slow + 1 if least <= small else 0
         left = _left(z, K[0], slips, unit, rtol) if least < DYING else math.inf
-        if tau + left <= span and (taken == len(times) or times[taken] > start + tau + left):
+        if tau + left <= span and (taken == len(times) or not _passed(times[taken], start, tau + left)):
             for i in range(n):
                 z[i] += left * K[0, i]
             equations.guards(start + tau + left, z, k, values)
@@ -420,7 +426,7 @@ def implicit(
             return FIRED, tau + high, h, guard, taken
         z[:] = now
         tau = after
-        while taken < len(times) and times[taken] <= start + tau:
+        while taken < len(times) and _passed(times[taken], start, tau):
             samples[taken] = z
             taken += 1
         if length == h or error < 0.01:

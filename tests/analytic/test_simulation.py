@@ -218,3 +218,11 @@ def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
         assert simulate(p, [0] * 6, 1e-8, flow, method=method).complete
     with pytest.raises(InputError, match="t_end = 1 s is out of range: "):
         simulate_many(p, [0] * 6, 1.0, flow)
+
+
+def test_the_end_is_always_a_sample():
+    """Also where a stretch that ends there begins at a time from which the end can't be reached to the last digit."""
+    p, frequency = P.replace(omega_0=11.5), 6.550213947459355
+    flow = Flow.sine(11.5, 8.0 * (1 + 2 * frequency), frequency)
+    run = simulate(p, [0, 0, 11.8, 0, 0, 0], 1 / frequency, flow, rtol=1e-6, sample_interval=1 / frequency)
+    assert run.time.tolist() == [0.0, 1 / frequency]

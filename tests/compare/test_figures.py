@@ -193,7 +193,7 @@ def test_what_a_figure_file_is_called_decides_its_format(tmp_path: Path) -> None
 
 def test_figures_of_a_set_of_ones_own(tmp_path, capsys):
     """All that theory alone can draw, by the friction of its wall, and why the others aren't drawn."""
-    drawn = {"fig-4", "fig-5", "fig-7", "fig-8", "fig-9", "fig-11", "fig-13-right", "unloading"}
+    drawn = {"fig-4", "fig-5", "fig-7", "fig-8", "fig-9", "fig-11", "fig-13-right", "unloading", "pulsation"}
     assert cli.main(["figures", "--set", "high-wall-friction", "-o", str(tmp_path / "rough")]) == 0
     assert {path.stem for path in (tmp_path / "rough").glob("*.svg")} == drawn
     told = capsys.readouterr().out
@@ -214,6 +214,8 @@ def test_functions_that_draw_into_axes():
     assert (axes.get_xlabel(), axes.get_ylabel()) == (style.OMEGA_0, style.OMEGA_C)
     assert plot.regions(p, equal=True).get_xlabel().startswith("friction")
     assert plot.figure("fig-10", p).axes[0].get_xlabel() == style.OMEGA_0
+    ramps = plot.figure("unsteady", Parameters.named("glass-in-water")).axes[2]
+    assert len(ramps.get_lines()) == 2
     with pytest.raises(InputError, match="fig-11 can't be drawn of this set: it is for η > j"):
         plot.figure("fig-11", p)
     run = analytic.simulate(p.replace(omega_0=25.0), State(y=0.003, omega_c=5.0), 2.0)

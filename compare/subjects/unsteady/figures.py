@@ -8,26 +8,30 @@ from functools import cache, partial
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import pulsation, response
-from compare.branches import slipping
+from compare.branches import check_thresholds, ends, slipping
 from compare.kit import style
-from compare.kit.drawing import Drawing, Evidence, Motion
+from compare.kit.drawing import Drawing, Evidence, GapError, Motion, only_where
 from compare.kit.record import Measurement
-from compare.subjects.unsteady.measure import caught_up, odd_part
+from compare.subjects.unsteady.measure import RAMP_ENDS, ROLLS_AT, caught_up, odd_part
 from model import Case, Flow, Parameters
 
 SET = "reference"
 REFERENCE = Parameters.named(SET)
-DECADES = (0.04, 12.0)
-"""Frequencies shown, Hz."""
+SLOWEST, FASTEST, SPAN = 0.04, 0.86, 3e3
+"""Frequencies shown: in units of c, of sqrt(g/R), and the greatest ratio of the two."""
+LASTS = 4.0, 56.0
+"""Times shown after a jump: in units of 1/c, and of sqrt(R/g), whichever is shorter."""
 FREQUENCIES = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
-FLOWS = (18.0, 25.0, 35.0)
-"""Flows about which the jumps of a slipping ball are shown, rad s-1."""
+SHARES = 0.2, 0.4, RAMP_ENDS[0]
+"""Flows about which the jumps of a ball that slips are shown, as parts of the way from omega_01 to where it ends."""
+RATES = 0.002, 0.01, 0.04
+"""Of ramps, in c times that range of flows."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,7 @@ class Measurements:
 
     rows: tuple[Measurement, ...] = ()
     runs: tuple[Motion, ...] = ()
+    p: Parameters = REFERENCE
 
     def of(self, quantity: str) -> list[Measurement]:
         """Those of one quantity."""
@@ -44,7 +49,19 @@ class Measurements:
     @property
     def mean(self) -> Parameters:
         """The set, with the mean flow of the pulsations."""
-        return next((m.parameters for m in self.of("gain")), REFERENCE)
+        usual = self.p.replace(omega_0=ROLLS_AT * ends(self.p)[0])
+        return next((m.parameters for m in self.of("gain")), usual)
+
+    @property
+    def slips(self) -> tuple[float, float]:
+        """The flows between which balls slip at both points, rad s-1; nan where the wall's friction is too great."""
+        t = bifurcation.thresholds(self.p)
+        return t.omega_01, t.omega_02 if math.isnan(t.omega_04) else t.omega_04
+
+    def slipping(self, share: float) -> Parameters:
+        """The set, with a flow that is so far between those."""
+        low, high = self.slips
+        return self.p.replace(omega_0=low + share * (high - low))
 
 
 def select(evidence: Evidence, figure: str) -> Measurements:
@@ -54,27 +71,41 @@ def select(evidence: Evidence, figure: str) -> Measurements:
     return Measurements(own, tuple(runs[:2]))
 
 
+def of_set(p: Parameters, figure: str) -> Measurements:
+    """What theory has of a set: pulsations where rolling ends, jumps and ramps where slipping does."""
+    if figure == "unsteady":
+        only_where(p, folds=True)
+        check_thresholds(p)
+    elif not 0 < ends(p)[0] < math.inf:
+        raise GapError("there is no flow at which two-point rolling ends")
+    return Measurements(p=p)
+
+
 @cache
 def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     """Frequencies, amplitudes at which slip begins, mean errors at half as much again."""
-    f = np.geomspace(*DECADES, FREQUENCIES).tolist()
+    fastest = FASTEST * math.sqrt(p.g / p.R)
+    f = np.geomspace(max(SLOWEST * p.c, fastest / SPAN), fastest, FREQUENCIES).tolist()
     onsets = [pulsation.slip_onset(p, each) for each in f]
-    return f, onsets, [pulsation.mean_error(p, 1.5 * a, each, 1e-4) for each, a in zip(f, onsets, strict=True)]
+    return f, onsets, [pulsation.mean_error(p, 1.5 * a, each) for each, a in zip(f, onsets, strict=True)]
 
 
 def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
     """Gain, phase, onset, mean error over frequency."""
     p = of.mean
     figure, ((gain, onset), (phase, error)) = style.panels(9.0, 5.6, 2, 2, sharex=True)
-    f = np.geomspace(*DECADES, 400)
-    for q, case in ((p, Case.RR), (REFERENCE.replace(omega_0=FLOWS[1]), Case.SS)):
+    frequencies, onsets, errors = _theory(p)
+    f = np.geomspace(frequencies[0], frequencies[-1], 400)
+    cases = {Case.RR: p} | ({Case.SS: of.slipping(SHARES[1])} if p.eta < p.j else {})
+    for case, q in cases.items():
         ratio = response.transfer(q, case, f)
         style.curve(gain, case, f, np.abs(ratio))
         style.curve(phase, case, f, -np.degrees(np.unwrap(np.angle(ratio))))
-        style.name(gain, f[60], abs(ratio[60]), case.name, (0, -8), style.COLOURS[case])
-    frequencies, onsets, errors = _theory(p)
+        k = 330 if case is Case.RR else 60
+        style.name(gain, f[k], abs(ratio[k]), case.name, (0, -8), style.COLOURS[case])
     style.curve(onset, Case.RR, frequencies, onsets)
-    for limit, way, at, shift in (pulsation.slow_onset(p), "slow", 1.0, 3), (pulsation.fast_onset(p), "fast", 0.12, -3):
+    limits = (pulsation.slow_onset(p), "slow", f[225], 3), (pulsation.fast_onset(p), "fast", f[75], -3)
+    for limit, way, at, shift in limits:
         onset.axhline(limit, **style.GUIDE)
         style.name(onset, at, limit, f"limit of {way} pulsations", (0, shift))
     error.plot(frequencies, errors, ".-", color=style.COLOURS[Case.SS], lw=1.5, ms=5)
@@ -89,10 +120,11 @@ def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
     onset.margins(y=0.12)
     error.set(ylabel="mean of $\\omega_c - \\omega_0$ (rad/s)", xlabel="frequency (Hz)")
     style.legend(gain, loc="lower left")
+    both = f", and where it slips at both (SS, ω₀ = {cases[Case.SS].omega_0:.3g} rad/s)" if Case.SS in cases else ""
     return figure, style.caption(
-        of.mean,
-        f"A ball in a flow that pulsates about ω₀ = {of.mean.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, "
-        f"where it rolls at both points (RR) and where it slips at both (SS, ω₀ = {FLOWS[1]:g} rad/s). "
+        p,
+        f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, "
+        f"where it rolls at both points (RR){both}. "
         "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast "
         "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
         states=of.rows,
@@ -102,56 +134,59 @@ def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
 def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
     """Step responses, ramps, overshoot over rate."""
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
-    t = np.linspace(0.0, 4.0, 800)
-    jump.plot(t, response.step_response(REFERENCE, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
-    slowest = next((m.parameters.omega_0 for m in of.of("jump_height")), FLOWS[0])
-    for omega_0, shade in zip(sorted([slowest, *FLOWS[1:]]), (0.4, 0.7, 1.0), strict=True):
-        p = REFERENCE.replace(omega_0=omega_0)
+    t = np.linspace(0.0, min(LASTS[0] / of.p.c, LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
+    jump.plot(t, response.step_response(of.mean, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
+    flows = [of.slipping(share) for share in SHARES]
+    flows[0] = next((m.parameters for m in of.of("jump_height")), flows[0])
+    for p, shade in zip(flows, (0.4, 0.7, 1.0), strict=True):
         y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
-        jump.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {omega_0:.3g} rad/s")
+        jump.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {p.omega_0:.3g} rad/s")
     if len(of.runs) == 2:
         up, down = (motion.load() for motion in of.runs)
         shown = np.flatnonzero(up.time <= t[-1])[::5]
         jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="mujoco")
     jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$ / final change")
     style.legend(jump)
-    ends, fold = of.of("ramp_end"), bifurcation.thresholds(REFERENCE).omega_04
-    p = ends[0].parameters if ends else REFERENCE.replace(omega_0=34.9)
-    slipping(ramp, REFERENCE, lambda slip_x, omega_c: omega_c, unstable=(0.2, (-4, 6)))
-    rates, passed, start = np.array([0.05, 0.3, 1.0]), [], analytic.solution(p, Case.SS).x
+    (low, fold), measured = of.slips, of.of("ramp_end")
+    p = measured[0].parameters if measured else flows[-1]
+    slipping(ramp, of.p, lambda slip_x, omega_c: omega_c)
+    rates, passed, start = np.array(RATES) * p.c * (fold - low), [], analytic.solution(p, Case.SS)
+    last = of.slipping(RAMP_ENDS[1]).omega_0
     for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
-        lasts = 15.0 / rate
-        flow = Flow.ramp(p.omega_0, p.omega_0 + 15.0, lasts)
-        run = analytic.simulate(p, start, lasts, flow, sample_interval=lasts / 5000, rtol=1e-6)
+        lasts = (last - p.omega_0) / rate
+        flow = Flow.ramp(p.omega_0, last, lasts)
+        run = analytic.simulate(p, start.x, lasts, flow, sample_interval=lasts / 5000, rtol=1e-6)
         passed.append(caught_up(run) - fold)
-        ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=f"rising by {rate:g} rad/s²")
-    beyond = np.array([fold - 6, fold + 7])
+        ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=f"rising by {rate:.2g} rad/s²")
+    beyond = np.array([p.omega_0, last])
     style.curve(ramp, Case.NR, beyond, beyond, "NR", (0.9, (-5, 5)))
-    ramp.set(xlim=beyond, ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    ramp.set(xlim=beyond, ylim=(0.7 * start.state.omega_c, 1.1 * last), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(ramp, {"omega_04": fold})
-    law.loglog(rates, response.ramp_coefficient(REFERENCE) * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
+    law.loglog(rates, response.ramp_coefficient(of.p) * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
     law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
-    style.points(law, ends, lambda m: float(m.conditions["rate"]), lambda m: m.value - fold)
-    law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)", yticks=[0.5, 1, 2, 5])
+    style.points(law, measured, lambda m: float(m.conditions["rate"]), lambda m: m.value - fold)
+    law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
     for axis in (law.xaxis, law.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter(NullFormatter())
     for axes in (ramp, law):
         style.legend(axes, loc="upper left")
-    measured = " Dots: mujoco, half the difference of two small jumps, up and down." if of.runs else ""
+    dots = " Dots: mujoco, half the difference of two small jumps, up and down." if of.runs else ""
     return figure, style.caption(
-        REFERENCE,
+        of.p,
         "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls approaches its "
-        f"new reading slowly, one that slips at both points swings.{measured} Middle: ramps of the flow past the fold "
-        "ω₀₄; the faster the ramp, the later the ball catches up. Right: by how much the flow has passed ω₀₄ when the "
-        "ball's lag has halved; dashed: the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
-        states=of.of("ramp_end"),
+        f"new reading slowly, one that slips at both points swings.{dots} Middle: ramps of the flow past the fold "
+        "ω₀₄; the faster the ramp, the later the ball catches up; dashed: SS where it is unstable. "
+        "Right: by how much the flow has passed ω₀₄ when the ball's lag has halved; dashed: the law of slow ramps, "
+        "2.338 (ρ²/(ab))^(1/3).",
+        states=measured,
     )
 
 
 _PULSATION = ("pulsation-lag", "pulsation-slip", "pulsation-mean")
 FIGURES = {
-    name: Drawing(f"Unsteady flow: {title}", partial(select, figure=name), draw, claims)
+    name: Drawing(f"Unsteady flow: {title}", partial(select, figure=name), draw, claims, partial(of_set, figure=name))
     for name, title, draw, claims in (
         ("pulsation", "pulsation", draw_pulsation, _PULSATION),
         ("unsteady", "jumps and ramps", draw_unsteady, ("jump-slipping", "ramp-fold")),
