@@ -40,17 +40,21 @@ def data(directory):
     return numbers
 
 
+def completed(directory, workers=0, asked=None, **how):
+    """What failed of tasks in a campaign, of those of `tasks` unless others are asked."""
+    with Campaign(directory, workers, **how) as campaign:
+        return campaign.complete(asked or tasks())
+
+
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     directory = tmp_path_factory.mktemp("undisturbed")
-    with Campaign(directory, workers=0) as campaign:
-        assert campaign.complete(tasks()) == []
+    assert completed(directory) == []
     return data(directory)
 
 
 def test_workers_and_batches_change_no_bit(tmp_path, undisturbed):
-    with Campaign(tmp_path, workers=2, batch=2) as campaign:
-        assert campaign.complete(reversed(tasks())) == []
+    assert completed(tmp_path, workers=2, batch=2, asked=reversed(tasks())) == []
     assert data(tmp_path) == undisturbed
 
 
@@ -61,8 +65,7 @@ def test_what_is_done_is_not_done_again(tmp_path):
         before = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
         campaign.complete(tasks(4))
     assert seen[-1] == ("it", 4, 4, 0)
-    with Campaign(tmp_path, workers=0) as again:
-        assert again.complete(tasks(4)) == []
+    assert completed(tmp_path, asked=tasks(4)) == []
     assert len(before) == 1
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}.items()
     assert len(list(tmp_path.iterdir())) == 2
@@ -136,13 +139,11 @@ def edited(content):
 
 @pytest.mark.parametrize("damage", [cut, edited])
 def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path, undisturbed, capsys, damage):
-    with Campaign(tmp_path, workers=0, batch=3) as campaign:
-        campaign.complete(tasks())
+    completed(tmp_path, batch=3)
     path = min(tmp_path.iterdir())
     path.write_bytes(damage(path.read_bytes()))
     untouched = {each: each.stat().st_mtime_ns for each in tmp_path.iterdir() if each != path}
-    with Campaign(tmp_path, workers=0, batch=3) as campaign:
-        assert campaign.complete(tasks()) == []
+    assert completed(tmp_path, batch=3) == []
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"dualball: cannot read {path}: it is ")
     assert line.endswith("; it is set aside, its runs are carried out again")
@@ -154,8 +155,7 @@ def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
     """Those of other versions by what they say, those of before there were batches by their names."""
     with monkeypatch.context() as other:
         other.setattr("model.storage.current_versions", lambda: {"dualball": "9.9"})
-        with Campaign(tmp_path, workers=0) as campaign:
-            campaign.complete(tasks(2))
+        completed(tmp_path, asked=tasks(2))
     (tmp_path / f"{tasks(1)[0].key}.h5").write_bytes(b"as it was")
     (tmp_path / "sweep.h5").write_bytes(b"somebody's own")
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
@@ -200,8 +200,7 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path):
 def test_a_run_that_takes_too_long_is_reported(tmp_path):
     endless = Task(engine="mujoco", parameters=P, x0=REST, t_end=6000.0)
     slow = Task(engine="time-stepping", parameters=endless.parameters, x0=REST, t_end=6000.0, sample_interval=0.01)
-    with Campaign(tmp_path, workers=0, limit=2) as campaign:
-        failures = campaign.complete([endless, *tasks(1, t_end=0.01), slow])
+    failures = completed(tmp_path, limit=2, asked=[endless, *tasks(1, t_end=0.01), slow])
     assert [failure.task for failure in failures] == [endless, slow]
     assert {failure.reason for failure in failures} == {"it took longer than 2 s"}
     assert len(list(tmp_path.glob("*.h5"))) == 1
@@ -216,8 +215,7 @@ def deadly(tasks, *where):
 
 def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(tmp_path, undisturbed, monkeypatch):
     monkeypatch.setattr("compare.kit.campaign.run_batch", deadly)
-    with Campaign(tmp_path, workers=2, batch=3) as campaign:
-        failures = campaign.complete(tasks())
+    failures = completed(tmp_path, workers=2, batch=3)
     assert failures == [Failure(tasks()[2], "its worker died (killed, or out of memory)")]
     stored = data(tmp_path)
     assert len(stored) == 8
@@ -264,8 +262,7 @@ def test_a_killed_dask_worker_changes_no_bit(tmp_path, undisturbed):
                 killed.append(next(iter(cluster.workers.values())).pid)
                 os.kill(killed[0], signal.SIGKILL)
 
-        with Campaign(tmp_path, dask(cluster.scheduler_address), batch=1, report=kill_one) as campaign:
-            assert campaign.complete(tasks()) == []
+        assert completed(tmp_path, dask(cluster.scheduler_address), batch=1, report=kill_one) == []
     assert killed
     assert data(tmp_path) == undisturbed
 
@@ -294,8 +291,7 @@ def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(slow, tmp_path, u
     with pytest.raises(StorageError, match=gone), Campaign(tmp_path, fleet, batch=1) as campaign:
         campaign.complete(tasks())
     assert len(data(tmp_path)) == 2
-    with Campaign(tmp_path, workers=0) as again:
-        assert again.complete(tasks()) == []
+    assert completed(tmp_path) == []
     assert data(tmp_path) == undisturbed
 
 
