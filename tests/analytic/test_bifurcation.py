@@ -1,4 +1,4 @@
-"""Thresholds, fold and the maps of Figs. 7 and 8 are where solutions come and go, to all digits."""
+"""Solutions come and go at the thresholds, whose curves meet where double points say they do."""
 
 import numpy as np
 import pytest

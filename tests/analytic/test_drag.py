@@ -1,4 +1,4 @@
-"""Each law of drag has the coefficient of its source, and time stepping moves by it as the event-driven simulation."""
+"""Each law of drag has the coefficient of its source."""
 
 import math
 

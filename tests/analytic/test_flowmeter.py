@@ -1,4 +1,4 @@
-"""What ends the flowmeter's range, and where slip begins in a pulsation, solutions and simulations find again."""
+"""Ranges, slopes and onsets of slip have the limits that they should, and say where there are none."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Both simulators keep the laws at every sample, reflect, refuse what is wrong, and can be interrupted."""
+"""Both simulators keep the laws at every sample, reflect, refuse what is wrong, and keep what a stopped run has."""
 
 import itertools
 import json

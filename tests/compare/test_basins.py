@@ -1,4 +1,4 @@
-"""Basins are those of theory, are kept, and go on where they stopped; kept searches are whole."""
+"""Basins are those of theory, are kept, and go on where they stopped."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The program in environments that are not a developer's: encodings, backends, closed and full outputs, no home."""
+"""The program works in environments that are not a developer's: encodings, backends, closed outputs, no home."""
 
 import os
 import subprocess

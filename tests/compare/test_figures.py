@@ -1,4 +1,4 @@
-"""Figures: each draws from made-up results without any simulation, says its parameters, and puts points on curves."""
+"""Each figure draws what it is given without any simulation, says its parameters, and puts points on curves."""
 
 import dataclasses
 import functools

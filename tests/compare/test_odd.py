@@ -1,4 +1,4 @@
-"""Odd command lines, drawn from the parsers: no traceback, nothing lost or half written, nothing that doesn't end.
+"""No odd command line gives a traceback, loses or half writes anything, or doesn't end; lines come from the parsers.
 
 Beside bad values (`drawn`) whole lines (`lines`): several options, each with a value that may be right, wrong, absurd,
 a file that is damaged, a directory, a link, an input of the same line.

@@ -1,4 +1,4 @@
-"""Thresholds are bracketed and extrapolated to where they are known to be, and say when they are not."""
+"""Thresholds are bracketed where they are known to be, and what has none says so."""
 
 import math
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Nothing of a user's is overwritten, and what can't be written leaves nothing behind: drawn over all commands."""
+"""Nothing of a user's is overwritten by any command, and what can't be written leaves nothing behind."""
 
 import resource
 import shutil

@@ -1,4 +1,4 @@
-"""Pictures that pages can play with: what is in them, and what a browser makes of it."""
+"""Pictures on pages hold series and scales, and a browser makes of them what a reader can play with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of runs: they show the case and the ball where it is, and say clearly what can't be shown."""
+"""Pictures, films and pages of runs show the case and the ball where it is, or say clearly why they can't."""
 
 import dataclasses
 from collections.abc import Callable

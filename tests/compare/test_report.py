@@ -1,4 +1,4 @@
-"""The report page: what it says, what it shows where results are missing, and how it behaves in a real browser."""
+"""The report says what was found, shows where results are missing, and works in a real browser."""
 
 import base64
 import dataclasses

@@ -1,4 +1,4 @@
-"""Siconos in a process of its own: what becomes of a process that can't be had, ends, hangs or gives no numbers."""
+"""A process for Siconos that can't be had, ends, hangs or gives no numbers is the run's failure, in a line."""
 
 import sys
 

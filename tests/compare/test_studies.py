@@ -1,4 +1,4 @@
-"""Tables and figures of pages have each their place, and their numbers hold together."""
+"""Tables of pages have each their place, formulas are what MuJoCo does, and a ladder changes one thing at a time."""
 
 import dataclasses
 import itertools

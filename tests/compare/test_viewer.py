@@ -1,4 +1,4 @@
-"""The viewer's loop, with a window and a clock that are not there: it is the study's own."""
+"""The viewer's loop, with a window and a clock that are not there, is the study's own."""
 
 from contextlib import nullcontext
 

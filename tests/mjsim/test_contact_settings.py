@@ -1,4 +1,4 @@
-"""What settings are refused, and those that fit a problem."""
+"""Bad settings are refused by name, and those that fit a problem keep slipping continuous."""
 
 import contextlib
 import dataclasses

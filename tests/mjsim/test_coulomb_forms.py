@@ -1,4 +1,4 @@
-"""Coulomb's law in its two forms, compiled loops and formulas on arrays: both must say the same."""
+"""Coulomb's law says the same in its two forms, compiled loops and formulas on arrays."""
 
 import mujoco
 import numpy as np

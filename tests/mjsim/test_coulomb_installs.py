@@ -1,4 +1,4 @@
-"""What serves where: compiled loops, and formulas where numba or the memory of MuJoCo is not as they need it."""
+"""Compiled loops serve where numba and the memory of MuJoCo are as they need it, formulas elsewhere."""
 
 import subprocess
 import sys

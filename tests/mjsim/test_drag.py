@@ -1,4 +1,4 @@
-"""MuJoCo under each law of drag: the force itself, known motions, and the event-driven simulation beside it."""
+"""MuJoCo moves under each law of drag by the force of its source, as the event-driven simulation does."""
 
 import numpy as np
 import pytest

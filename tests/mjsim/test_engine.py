@@ -1,4 +1,4 @@
-"""The engine against motions whose exact form is short enough to stand in the test, and itself compiled."""
+"""The engine has the motions of exact forms, the same alone, in batches, on threads, compiled or not."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A free ball under Coulomb's law for any model: how its step shows, what is left without one, and what must not be."""
+"""A free ball under Coulomb's law for any model is right in the limit of no step, and wrong where it must be."""
 
 from dataclasses import replace
 

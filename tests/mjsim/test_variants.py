@@ -1,4 +1,4 @@
-"""Variants of the scene, for comparison: what each gets wrong is as predicted."""
+"""What each variant of the scene gets wrong is as predicted."""
 
 import numpy as np
 import pytest
