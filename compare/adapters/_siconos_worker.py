@@ -31,7 +31,7 @@ def main() -> None:
         given, answer = json.loads(line), None
         try:
             if isinstance(given, dict):
-                scene = (Turning if given["turning"] else FreeBall)(given)
+                scene = Scene(given)
             elif len(given) == 9:
                 scene.start(given[:3], given[3:6], given[6:])
             else:
@@ -42,17 +42,24 @@ def main() -> None:
 
 
 class Scene:
-    """The problem, and the simulation that `start` begins."""
-
-    directions = "C"
-    """What a relation calls its matrix: normal and tangents (rows) by velocities, first those of the centre."""
-    axes = np.eye(3)
-    """Of those velocities, as rows."""
+    """A ball in axes that turn with it, outward, along and up, so that floor and wall are planes."""
 
     def __init__(self, given: dict[str, Any]) -> None:
         self.given, self.R, self.r, self.mass = given, given["R"], given["r"], given["m"]
         self.inertia = given["inertia"]
         self.weight = self.mass * given["g"]
+
+    def start(self, position: list[float], velocity: list[float], spin: list[float]) -> None:
+        """Begin at a position with a velocity and a spin, in world axes."""
+        x, y, z = position
+        self.azimuth, h, r = math.atan2(y, x), self.R - math.hypot(x, y), self.r
+        self.axes = turned(self.azimuth)
+        ball = TurningBall(
+            [-h, 0, z - r, 0, 0, 0], [*self.axes @ velocity, *self.axes @ spin], self.mass, self.inertia, self.R
+        )
+        floor = [[0, 0, 1, 0, 0, 0], [1, 0, 0, 0, -r, 0], [0, 1, 0, r, 0, 0]]
+        wall = [[-1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, r], [0, 0, 1, 0, -r, 0]]
+        self.simulate(ball, *(kernel.LagrangianLinearTIR(np.array(rows, float)) for rows in (floor, wall)))
 
     def simulate(self, ball: Any, floor: Any, wall: Any) -> None:
         """Begin with a ball and its contacts; there is no floor where none has a friction."""
@@ -70,26 +77,31 @@ class Scene:
         options = solver.numericsSolverOptions()
         options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 1000
         options.dparam[numerics.SICONOS_DPARAM_TOL] = given["tolerance"]
-        clock, projection = kernel.TimeDiscretisation(0.0, given["timestep"]), given["projection"]
-        if projection is None:
-            stepping = kernel.MoreauJeanOSI(given["theta"])
-            self.simulation = kernel.TimeStepping(system, clock, stepping, solver)
-        else:
-            stepping = kernel.MoreauJeanDirectProjectionOSI(given["theta"])
-            gaps = kernel.MLCPProjectOnConstraints(numerics.SICONOS_MLCP_ENUM, 1.0)
-            self.simulation = kernel.TimeSteppingDirectProjection(system, clock, stepping, solver, gaps)
-            self.simulation.setConstraintTolUnilateral(projection)
+        clock = kernel.TimeDiscretisation(0.0, given["timestep"])
+        stepping = kernel.MoreauJeanDirectProjectionOSI(given["theta"])
+        gaps = kernel.MLCPProjectOnConstraints(numerics.SICONOS_MLCP_ENUM, 1.0)
+        self.simulation = kernel.TimeSteppingDirectProjection(system, clock, stepping, solver, gaps)
+        self.simulation.setConstraintTolUnilateral(given["projection"])
         stepping.setConstraintActivationThreshold(given["activation"])
         self.simulation.setNewtonTolerance(given["newton"])
         self.simulation.initialize()
 
-    def take_step(self, force: list[float]) -> None:
-        """A step under a force that is constant over it."""
-        self.ball.setFExtPtr(np.array(force))
+    def advance(self, force: list[float]) -> Any:
+        """Take a step under a force in world axes, constant over it; position, velocity and spin after it."""
+        self.axes, q = turned(self.azimuth), self.ball.q()
+        before, way = self.R + q[0], q[1]
+        outward, along, upward = self.axes @ force
+        self.ball.setFExtPtr(np.array([outward, along, upward - self.weight, 0.0, 0.0, 0.0]))
         self.ball.computeForces(0.0, self.ball.q(), self.ball.velocity())
         self.ball.swapInMemory()  # a theta method takes a part of the force that is kept from before the step
         self.simulation.computeOneStep()
         self.simulation.nextStep()
+        q, rates = self.ball.q(), self.ball.velocity()
+        rho = self.R + q[0]
+        self.azimuth += 2 * (q[1] - way) / (before + rho)
+        axes = turned(self.azimuth)
+        position = rho * math.cos(self.azimuth), rho * math.sin(self.azimuth), self.r + q[2]
+        return position, (rates[:3] @ axes).tolist(), (rates[3:] @ axes).tolist()
 
     def touches(self) -> list[Any]:
         """Number, force on the ball and gap of each contact that carried something in the last step."""
@@ -97,7 +109,7 @@ class Scene:
         for number, contact in enumerate(self.contacts):
             impulse = contact.lambda_(1)
             if impulse[0] > 0:
-                force = getattr(contact.relation(), self.directions)()[:, :3].T @ impulse / self.given["timestep"]
+                force = contact.relation().C()[:, :3].T @ impulse / self.given["timestep"]
                 shown.append((number, (force @ self.axes).tolist(), contact.y(0)[0]))
         return shown
 
@@ -135,79 +147,10 @@ class TurningBall(kernel.LagrangianDS):  # type: ignore[misc]
         self.jacobianFGyrqDot()[:] = jacobian / (self.R + q[0])
 
 
-class Turning(Scene):
-    """A ball in axes that turn with it, outward, along and up, so that floor and wall are planes."""
-
-    def start(self, position: list[float], velocity: list[float], spin: list[float]) -> None:
-        """Begin at a position with a velocity and a spin, in world axes."""
-        x, y, z = position
-        self.azimuth, h, r = math.atan2(y, x), self.R - math.hypot(x, y), self.r
-        self.axes = turned(self.azimuth)
-        ball = TurningBall(
-            [-h, 0, z - r, 0, 0, 0], [*self.axes @ velocity, *self.axes @ spin], self.mass, self.inertia, self.R
-        )
-        floor = [[0, 0, 1, 0, 0, 0], [1, 0, 0, 0, -r, 0], [0, 1, 0, r, 0, 0]]
-        wall = [[-1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, r], [0, 0, 1, 0, -r, 0]]
-        self.simulate(ball, *(kernel.LagrangianLinearTIR(np.array(rows, float)) for rows in (floor, wall)))
-
-    def advance(self, force: list[float]) -> Any:
-        """Take a step under a force in world axes; position, velocity and spin after it."""
-        self.axes, q = turned(self.azimuth), self.ball.q()
-        before, way = self.R + q[0], q[1]
-        outward, along, upward = self.axes @ force
-        self.take_step([outward, along, upward - self.weight, 0.0, 0.0, 0.0])
-        q, rates = self.ball.q(), self.ball.velocity()
-        rho = self.R + q[0]
-        self.azimuth += 2 * (q[1] - way) / (before + rho)
-        axes = turned(self.azimuth)
-        position = rho * math.cos(self.azimuth), rho * math.sin(self.azimuth), self.r + q[2]
-        return position, (rates[:3] @ axes).tolist(), (rates[3:] @ axes).tolist()
-
-
 def turned(azimuth: float) -> Any:
     """Outward, along and up, as rows, in world axes."""
     cos, sin = math.cos(azimuth), math.sin(azimuth)
     return np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-
-
-class Contact(kernel.NewtonEuler3DR):  # type: ignore[misc]
-    """A ball's contact with a surface that says how far it is from a centre, and its normal there."""
-
-    def __init__(self, r: float, surface: Any) -> None:
-        super().__init__()
-        self.r, self.surface = r, surface
-
-    def computeh(self, time: float, q: Any, gap: Any) -> None:
-        """Set gap, contact points and normal of a ball at q."""
-        distance, normal = self.surface(q)
-        gap[0] = distance - self.r
-        self.nc()[:] = normal
-        self.pc1()[:] = self.pc2()[:] = q[:3] - self.r * normal
-
-
-class FreeBall(Scene):
-    """A free ball in a true cylinder."""
-
-    directions = "jachqT"
-
-    def start(self, position: list[float], velocity: list[float], spin: list[float]) -> None:
-        """Begin at a position with a velocity and a spin, in world axes."""
-
-        def wall(q: Any) -> Any:
-            rho = math.hypot(q[0], q[1])
-            return self.R + self.r - rho, np.array([-q[0] / rho, -q[1] / rho, 0.0])
-
-        up, orientation = np.array([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0, 0.0]
-        ball = kernel.NewtonEulerDS([*position, *orientation], [*velocity, *spin], self.mass, self.inertia * np.eye(3))
-        self.simulate(ball, *(Contact(self.r, surface) for surface in (lambda q: (q[2], up), wall)))
-
-    def advance(self, force: list[float]) -> Any:
-        """Take a step under a force in world axes; position, velocity and spin after it."""
-        self.take_step([force[0], force[1], force[2] - self.weight])
-        (x, y, z, w, *axis), velocity = self.ball.q(), self.ball.velocity()
-        spin = velocity[3:]  # in the axes of the ball
-        turn = 2 * np.cross(axis, spin)
-        return (x, y, z), velocity[:3].tolist(), (spin + w * turn + np.cross(axis, turn)).tolist()
 
 
 if __name__ == "__main__":

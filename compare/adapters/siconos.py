@@ -18,7 +18,6 @@ import select
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,16 +33,14 @@ PATIENCE = 60.0
 """For how long, s, an answer is waited for."""
 
 
-BEST = {"turning": True, "theta": 0.5, "activation": 1e-9, "projection": 1e-12, "newton": 1e-15, "tolerance": 1e-14}
-DEFAULTS = {"turning": False, "theta": 0.5, "activation": 0.0, "projection": None, "newton": 1e-6, "tolerance": 1e-4}
-"""Settings: a ball in axes that turn with it, or a free one in a true cylinder, since the user of Siconos writes the
-contacts; theta of `MoreauJeanOSI`, the share of forces that is taken at the end of a step;
+SETTINGS = {"theta": 0.5, "activation": 1e-9, "projection": 1e-12, "newton": 1e-15, "tolerance": 1e-14}
+"""theta of `MoreauJeanDirectProjectionOSI`, the share of forces that is taken at the end of a step;
 `ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is less than that, and at
 zero a resting contact that is open by round-off is left open, so that the ball falls for a step;
-`ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection` takes a ball out of an overlap, None for
-`TimeStepping`, which leaves it there, up to a step's way after an impact, for as long as the contact lasts;
-`NewtonTolerance`, N s, of the iteration on the equations of motion: with 1e-10 spin changes in flight; relative
-tolerance of `FrictionContact`'s solver, non-smooth Gauss-Seidel."""
+`ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection` takes a ball out of an overlap; `TimeStepping`
+leaves it there, up to a step's way after an impact, for as long as the contact lasts; `NewtonTolerance`, N s, of the
+iteration on the equations of motion: with 1e-10 spin changes in flight; relative tolerance of `FrictionContact`'s
+solver, non-smooth Gauss-Seidel. Its own settings are none: the user of Siconos writes the contacts."""
 _NAMED = "DUALBALL_SICONOS_PYTHON"
 
 
@@ -87,9 +84,9 @@ class Siconos(Free):
     AHEAD = 0.0
     _process: subprocess.Popen[str] | None = None
 
-    def __init__(self, name: str, declared: str, note: str, settings: Mapping[str, Any]) -> None:
-        super().__init__(name, note)
-        self.DECLARED, self.settings = declared, settings
+    def __init__(self) -> None:
+        super().__init__("siconos", "a contact closes up to half a step early or late")
+        self.DECLARED = "equations of motion in turning axes, no scene"
 
     def make(self) -> None:
         """Raises `InputError` if Siconos doesn't work in its process."""
@@ -113,7 +110,7 @@ class Siconos(Free):
         numbers |= {"R": wall.radius - body.size[0], "eta": wall.friction}
         numbers["mu"] = floors[0].friction if floors else None
         try:
-            self._ask({**self.settings, **numbers, "timestep": self.timestep})
+            self._ask({**SETTINGS, **numbers, "timestep": self.timestep})
             self._ask([*body.position, *body.velocity, *body.spin])
         except BreakdownError as error:
             self.close()
@@ -158,16 +155,4 @@ class Siconos(Free):
             self._process = None
 
 
-best = Siconos(
-    "siconos",
-    "equations of motion in turning axes, no scene",
-    "a contact closes up to half a step early or late",
-    BEST,
-)
-defaults = Siconos(
-    "siconos-defaults",
-    "equations of motion, no scene",
-    "each step ends along a chord of the cylinder, and the wall takes away what then points into it: a ball that "
-    "it should carry loses its speed and falls",
-    DEFAULTS,
-)
+best = Siconos()

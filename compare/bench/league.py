@@ -29,9 +29,10 @@ ENTRIES: dict[str, str] = {
     "mujoco": f"{_OWN}.mujoco_free:best",
     "mujoco-plain": "compare.bench.simulators:mujoco_plain",
     "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
+    "siconos": f"{_OWN}.siconos:best",
     **{
         f"{name}{suffix}": f"{_OWN}.{name}:{which}"
-        for name in ("siconos", "pybullet", "drake", "dart", "rapier", "sapien")
+        for name in ("pybullet", "drake", "dart", "rapier", "sapien")
         for suffix, which in (("", "best"), ("-defaults", "defaults"))
     },
     "mujoco-warp": f"{_OWN}.mujoco_warp:best",

@@ -157,7 +157,7 @@ def engine(name: str) -> Any:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-FOREIGN = "dart, drake, pybullet, rapier, sapien, siconos"
+FOREIGN = "dart, drake, pybullet, rapier, sapien"
 """Those that others have written, each as NAME and NAME-defaults: tests see to it that none is missing."""
 PREFIX = "parameter_"
 """How the destinations of options begin that are parameters of the ball."""
@@ -296,7 +296,7 @@ def add_engine_name(parser: argparse._ActionsContainer, default: str | None, usu
     """The option that chooses an engine; `usual` says what is if none is named."""
     known = (
         "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as it comes; others: "
-        f"mujoco-coulomb, event, time-stepping, and NAME or NAME-defaults of {FOREIGN} ({usual})"
+        f"mujoco-coulomb, event, time-stepping, siconos, and NAME or NAME-defaults of {FOREIGN} ({usual})"
     )
     parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
 

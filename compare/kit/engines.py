@@ -67,8 +67,6 @@ class Engine:
     """Packages whose versions do."""
     needs: Library | None = None
     """An optional library that it needs; the version of that is one of `versions`."""
-    as_it_comes: str = ""
-    """Name of the same engine as a newcomer would use it."""
     title: str = ""
     """What it is, in a few words."""
     about: str = ""
@@ -159,8 +157,8 @@ def _theory(method: str, *task: Any) -> Trajectory:
         return run
 
 
-def _adapted(library: Library, marks: str) -> tuple[Engine, Engine]:
-    """Records of an engine with the best settings of its adapter and with its own, each with a mark."""
+def _adapted(library: Library, marks: str) -> list[Engine]:
+    """Records of an engine with the best settings of its adapter and, with a second mark, with its own."""
     name = library.module.rpartition(".")[2]
     best = Engine(
         name=name,
@@ -171,12 +169,12 @@ def _adapted(library: Library, marks: str) -> tuple[Engine, Engine]:
         sources=("model", "mjsim", "compare.adapters"),
         stands_on=("numpy",),
         needs=library,
-        as_it_comes=f"{name}-defaults",
         refine=(1, 2, 4),  # a free body's errors are of first or second order in the step
         mark=marks[0],
     )
-    as_it_comes = partial(vessel.simulate, best.as_it_comes, library, "defaults")
-    return best, replace(best, name=best.as_it_comes, simulate=as_it_comes, mark=marks[1])
+    own = f"{name}-defaults"
+    theirs = partial(vessel.simulate, own, library, "defaults")
+    return [best, *(replace(best, name=own, simulate=theirs, mark=mark) for mark in marks[1:])]
 
 
 MUJOCO = Engine(
@@ -188,7 +186,6 @@ MUJOCO = Engine(
     stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
-    as_it_comes="mujoco-defaults",
     title="MuJoCo with corrections between its steps",
     about="they make rigid stationary states exact by construction; measured at two time steps of at most 4 and 2 ms",
     mark="o",
@@ -249,7 +246,7 @@ MOREAU = replace(
 )
 _PACKAGES = {name: Library(KNOWN[name].partition(" ")[0], f"compare.adapters.{name}") for name in KNOWN}
 _OTHERS = (
-    *_adapted(siconos.LIBRARY, "p2"),
+    *_adapted(siconos.LIBRARY, "p"),
     *_adapted(_PACKAGES["pybullet"], "v1"),
     *_adapted(_PACKAGES["drake"], "D+"),
     *_adapted(_PACKAGES["dart"], "<3"),
