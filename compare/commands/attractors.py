@@ -22,7 +22,7 @@ from compare.kit.statistics import plain
 from compare.kit.sweep import Axis, grid
 from compare.kit.tasks import carry_out
 from compare.subjects.attractors.basins import FATES, basins
-from model import Parameters, State, Trajectory
+from model import InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
@@ -152,14 +152,17 @@ def plane(args: argparse.Namespace) -> int:
     p, start = options.parameters(args), running.start(args)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
+    for name in (across.name, up.name):
+        if any(item.partition("=")[0] == name for item in args.start):
+            raise InputError(f"--start {name} has no effect: {name} spans the plane")
     with running.campaign(args, "basins") as campaign:
         mapped = basins(campaign, p, start._asdict(), (across, up), args.mujoco, args.timestep)
-    if args.map:
-        mapped.save(args.map)
-    if args.plot:
+    if args.map and args.map.suffix.lower() in drawing.SUFFIXES:
         from compare.subjects.attractors import figures  # here, because drawing takes a second to load
 
-        drawing.save(figures.draw_basins(mapped), args.plot)
+        drawing.save(figures.draw_basins(mapped), args.map)
+    elif args.map:
+        mapped.save(args.map)
     shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
     differ = mapped.differences().tolist() if args.mujoco else []
     said = []

@@ -19,10 +19,6 @@ def figures(args: argparse.Namespace) -> int:
     if args.results and not args.results.is_dir():
         raise InputError(f"cannot read {args.results}: there is no such directory")
     if own := list(options.own_set(args).values()):
-        if args.results:
-            raise InputError(
-                "--results shows what was measured, --set and --parameters what theory alone says of a set"
-            )
         chosen = registry.of_set(*own)
     else:
         chosen = registry.of_results(validation.stored_evidence(args.results or Path("results")))

@@ -35,6 +35,16 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **given: Any) -> None:
         super().__init__(allow_abbrev=False, **given)
+        self.rules: list[tuple[str, str, bool]] = []
+        """Options that mean nothing without another one, or (False) beside it."""
+
+    def needs(self, option: str, other: str) -> None:
+        """Refuse an option unless another one is there."""
+        self.rules.append((option, other, True))
+
+    def excludes(self, option: str, *others: str) -> None:
+        """Refuse others beside an option, which would have no effect."""
+        self.rules += [(other, option, False) for other in others]
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message}; see '{self.prog} --help'")
@@ -47,6 +57,11 @@ class Parser(argparse.ArgumentParser):
                 option = word.partition("=")[0]
                 self.error(f"there is no option {option!r}{suggestion(option, self._option_string_actions)}")
             self.error(f"{word!r} is one argument too many")
+        known = self._option_string_actions
+        there = {known[word].option_strings[-1] for each in given[0] if (word := each.partition("=")[0]) in known}
+        for option, other, together in self.rules:
+            if option in there and (other in there) != together:
+                self.error(f"{option} is for {other}" if together else f"{option} has no effect beside {other}")
         for action in (each for each in self._actions if isinstance(each.type, Output)):
             output: Path | None = getattr(found, action.dest, None)
             others = (value for name, value in vars(found).items() if name != action.dest)
@@ -131,12 +146,12 @@ class Output:
 
 
 HDF5 = Output("HDF5", (".h5", ".hdf5", ".nc"))
-JSON = Output("JSON", (".json",))
 MARKDOWN = Output("Markdown", (".md",))
 PAGE = Output("an HTML page", (".html", ".htm"))
 FIGURE = Output("a figure", (".png", ".svg", ".pdf"))
+MAP = Output("a map", (*FIGURE.suffixes, ".json"))
 FILM = Output("a picture, a film or a page", (".png", ".gif", ".html"))
-ENDINGS = {suffix for each in (HDF5, JSON, MARKDOWN, PAGE, FIGURE, FILM) for suffix in each.suffixes}
+ENDINGS = {suffix for each in (HDF5, MARKDOWN, PAGE, MAP, FILM) for suffix in each.suffixes}
 """Names of files end in these."""
 
 
@@ -280,6 +295,7 @@ def add_flow(parser: Parser) -> None:
     choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
     longest = "longest time between lines of --flow (default: ten times the usual one)"
     group.add_argument("--longest-interval", type=seconds, help=longest)
+    parser.needs("--longest-interval", "--flow")
 
 
 def add_engine(parser: Parser, default: str = "mujoco") -> None:
@@ -362,7 +378,10 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
 
 
 def parameters(args: argparse.Namespace) -> Parameters:
-    """The parameters that the options of `add_parameters` name."""
+    """The parameters that the options of `add_parameters` name; `InputError` for one that ``--vary`` replaces."""
+    for name in (text.partition("=")[0] for text in getattr(args, "vary", ())):
+        if getattr(args, f"{PREFIX}{name}", None) is not None:
+            raise InputError(f"--{name.replace('_', '-')} has no effect: {name} is varied")
     chosen = Parameters.load(args.parameters) if args.parameters else Parameters.named(args.set)
     p = chosen.replace(**given(args, [field.name for field in dataclasses.fields(Parameters)], PREFIX))
     if max(p.r, p.R) > _LARGE:

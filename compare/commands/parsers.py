@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from compare.commands import options
-from compare.commands.options import FILM, HDF5, JSON, MARKDOWN, PAGE, Number, Parser
+from compare.commands.options import FILM, HDF5, MAP, MARKDOWN, PAGE, Number, Parser
 from model import InputError
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range
@@ -58,6 +58,7 @@ def validate(parser: Parser) -> None:
     options.add_workers(parser)
     options.add_directory(parser, "results")
     options.add_verdicts(parser)
+    parser.excludes("--list", "--claim", "--engine", "--json", "--parameters", "--set", "--verbose")
 
 
 @command("study", "validate.judge", "results --claim prop-1")
@@ -78,6 +79,7 @@ def figures(parser: Parser) -> None:
     parser.add_argument("--results", type=Path, metavar="DIR", help=stored)
     options.add_own_set(parser)
     parser.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
+    parser.excludes("--results", "--parameters", "--set")  # it shows what was measured, they what theory says of a set
 
 
 @command("the ball", "predict.catalogue", "--set steel-in-water")
@@ -108,6 +110,8 @@ def simulate(parser: Parser) -> None:
     parser.add_argument("--view", action="store_true", help=live)
     parser.add_argument("--speed", type=options.speed, help="speed of --view (default 1, real time)")
     options.add_json(parser, "print the description as JSON")
+    parser.needs("--speed", "--view")
+    parser.excludes("--view", "--json", "--output", "--sample-interval", "--time")
 
 
 @command("the ball", "look.inspect", "run.h5 --plot run.png")
@@ -148,6 +152,8 @@ def sweep(parser: Parser) -> None:
     parser.add_argument("--batch", type=options.count, default=64, help="runs in one MuJoCo batch")
     options.add_directory(parser, "sweep")
     options.add_json(parser, "print a summary as JSON")
+    parser.needs("--seed", "--random")
+    parser.excludes("--random", "--direction")
 
 
 @command("the ball", "simulate.collect", "sweep -o sweep.h5")
@@ -174,6 +180,7 @@ def attractors(parser: Parser) -> None:
     tables = "write the tables as Markdown, too (default: don't)"
     parser.add_argument("-o", "--output", type=MARKDOWN, dest="page", help=tables)
     options.add_json(parser)
+    parser.excludes("--start", "--random", "--seed")
 
 
 @command("the ball", "attractors.plane", "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21")
@@ -188,10 +195,11 @@ def basins(parser: Parser) -> None:
     parser.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
     parser.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
     options.add_workers(parser)
-    parser.add_argument("-o", "--output", type=JSON, dest="map", help="write the map as JSON")
-    options.add_plot(parser, "the map")
+    drawn = "write the map: drawn as png, svg or pdf, or its data as json (default: don't)"
+    parser.add_argument("-o", "--output", type=MAP, dest="map", help=drawn)
     options.add_directory(parser, "basins", "--results")
     options.add_json(parser, "print the shares as JSON")
+    parser.needs("--timestep", "--mujoco")
 
 
 @command("the ball", "design.run", "meter.toml -o meter.html")
@@ -213,10 +221,10 @@ def render(parser: Parser) -> None:
     parser.add_argument("--at", type=options.moment, help=at)
     lasts = "duration of a film, at most (default: 6, of a page 60)"
     parser.add_argument("--time", type=options.seconds, help=lasts)
-    speed = "speed of a film or page; 1 is real time"
-    parser.add_argument("--speed", type=options.speed, default=0.25, help=speed)
+    speed = "speed of a film or page (default 0.25; 1 is real time)"
+    parser.add_argument("--speed", type=options.speed, help=speed)
     parser.add_argument("--rate", type=rates, help="frames a second (default: 20, of a page 60)")
-    parser.add_argument("--width", type=pixels, help="pixels (default: 960, of a film 640)")
+    parser.add_argument("--width", type=pixels, help="pixels of a picture (default: 960) or film (640)")
     radii, names = Number("radii", NOT_NEGATIVE), ("FORCE", "SLIP")
     lengths = "lengths of the arrows of a force m g and of the fastest slip (default 3 3)"
     parser.add_argument("--arrows", nargs=2, type=radii, default=(3.0, 3.0), metavar=names, help=lengths)
@@ -281,6 +289,7 @@ MOVED = {
     "attractors --page": "-o",
     "attractors --starts": "--random",
     "basins --save": "-o",
+    "basins --plot": "-o",
     "sweep --hold": "--time",
     "render --from": "--at",
     "render --seconds": "--time",

@@ -20,8 +20,6 @@ from model.parameters import REACH, Range, check_names, check_number, parse_numb
 
 def flow(args: argparse.Namespace) -> Flow | None:
     """The flow that the options of `add_flow` describe; None for a steady one."""
-    if args.longest_interval is not None and not args.flow:
-        raise InputError("--longest-interval is for --flow")
     chosen = [name for name in ("ramp", "staircase", "sine", "flow") if getattr(args, name)]
     if chosen and args.parameter_omega_0 is not None:
         raise InputError(f"--omega-0 is for a steady flow, and can't be given beside --{chosen[0]}")

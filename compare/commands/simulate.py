@@ -26,8 +26,6 @@ def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
     if args.view:
         return live(args)
-    if args.speed:
-        raise InputError("--speed is for --view")
     args.time = args.time or DURATION
     task = running.task(args, options.parameters(args), flow=running.flow(args))
     heard: list[int] = []  # the first signal ends the run with its samples, the second without
@@ -52,9 +50,6 @@ def live(args: argparse.Namespace) -> int:
     """Open the viewer."""
     from compare.view import viewer  # here, because nothing else needs it
 
-    for name in ("output", "time", "sample_interval"):
-        if getattr(args, name):
-            raise InputError(f"--view keeps nothing and ends with its window: it goes without --{name}")
     p = options.parameters(args)
     settings = running.settings(args, p)
     if not isinstance(settings, ContactSettings):

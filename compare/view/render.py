@@ -62,7 +62,7 @@ def write(
     at: float | None = None,
     width: int | None = None,
     time: float | None = None,
-    speed: float = 0.25,
+    speed: float | None = None,
     rate: int | None = None,
     **arrows: Any,
 ) -> str:
@@ -72,8 +72,8 @@ def write(
     ----------
     at : the time of a picture, the end for None; where a film or page begins, 0 for None; s
     width : pixels; 960 for a picture and 640 for a film if None
-    time, speed, rate : a film or page is slowed down by `speed`, has `rate` frames a second, and takes `time` in s,
-        less if the run ends before; 6 s at 20 frames a second, of a page 60 s at 60
+    time, speed, rate : a film or page is slowed down by `speed`, .25 if None, has `rate` frames a second, and takes
+        `time` in s, less if the run ends before; 6 s at 20 frames a second, of a page 60 s at 60
     arrows : `force_arrow` and `slip_arrow` of `frames`
 
     Raises `InputError` for what can't be shown, or on a machine without OpenGL; `StorageError` if the file can't be
@@ -83,11 +83,16 @@ def write(
     if kind not in (".png", ".gif", ".html"):
         raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif, a page to look round in an .html")
     check_writable(output)
+    unused: dict[str, Any] = {"time": time, "speed": speed, "rate": rate} if kind == ".png" else {}
+    for name, value in (unused or {"width": width if kind == ".html" else None}).items():
+        if value is not None:
+            raise InputError(f"a {'page' if kind == '.html' else 'picture'} has no {name}: it would have no effect")
     if len(run.time) == 0:
         raise InputError("the run has no samples to show")
     film, end = kind != ".png", float(run.time[-1])
     usual = (60.0, 60) if kind == ".html" else (6.0, 20)
     lasts, rate = usual[0] if time is None else time, usual[1] if rate is None else rate
+    speed = 0.25 if speed is None else speed
     begin, width = (0.0 if film else end) if at is None else at, width or (640 if film else 960)
     check_number("at", begin, "s", Range(float(run.time[0]), end), "to be within the run it")
     check_number("width", width, "pixels", WIDTHS)

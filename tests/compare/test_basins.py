@@ -102,5 +102,8 @@ def test_no_basins(changes, start, message, tmp_path):
 def test_command_basins(capsys, tmp_path):
     to = ["--results", str(tmp_path), "--workers", "0"]
     across = ["--omega-0", "40", "--across", "omega_c=5:45:2", "--up", "slip_x=0:1:2"]
-    assert cli.main(["basins", *across, *to, "--json"]) == 0
+    assert cli.main(["basins", *across, *to, "--json", "-o", str(tmp_path / "map.png")]) == 0
     assert '"shares"' in capsys.readouterr().out
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert cli.main(["basins", *across, *to, "-o", str(tmp_path / "map.json")]) == 0
+    assert Basins.load(tmp_path / "map.json").parameters.omega_0 == 40.0

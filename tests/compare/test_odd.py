@@ -29,9 +29,14 @@ NUMBERS = ("x", "nan", "inf", "-1", "0", "1e300", "1e-300", "1" * 400)
 
 
 def drawn(command: str) -> Iterator[list[str]]:
-    """Bad inputs by a command's own parser: of each option a wrong type, sign, size, nothing, or what isn't there."""
+    """Bad inputs by a command's own parser: of each option a wrong type, sign, size, nothing, or what isn't there; and
+    options that have no effect."""
     yield ["--nonsense"]
-    for action in parser_of(command)._actions:
+    parser = parser_of(command)
+    for option, other, together in parser.rules:
+        both = (parser._option_string_actions[each] for each in ([option] if together else [other, option]))
+        yield [word for each in both for word in (each.option_strings[-1], *right(each))]
+    for action in parser._actions:
         if action.nargs == 0:
             continue
         option = action.option_strings[-1:]
@@ -47,6 +52,16 @@ def drawn(command: str) -> Iterator[list[str]]:
         if action.dest == "start":
             values += [[f"omega_c={text}"] for text in ("x", "nan", "1e300", "")]
         yield from ([*option, *value] for value in values)
+
+
+def right(action: argparse.Action) -> list[str]:
+    """A value that an option takes, if it takes any."""
+    values: list[str] = [*action.choices] if action.choices else []
+    if isinstance(action.type, options.Number):
+        values = ["1"]
+    elif isinstance(action.type, options.Output):
+        values = [f"new{action.type.suffixes[0]}"]
+    return [] if action.nargs == 0 else [*values, "event" if action.dest == "engine" else "set.toml"][:1]
 
 
 def refuses(parse: options.Number, text: str) -> bool:

@@ -132,6 +132,8 @@ def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
     [
         ("film.mp4", {}, r"cannot write film\.mp4: a picture is a \.png, a film a \.gif, a page"),
         ("nowhere/p.png", {}, "there is no directory nowhere"),
+        ("p.png", {"rate": 5}, "a picture has no rate"),
+        ("p.html", {"width": 640}, "a page has no width"),
         ("p.png", {"at": 9.0}, r"at = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$"),
         ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
         ("p.gif", {"at": 2.0}, "at = 2 s is out of range"),
