@@ -30,10 +30,10 @@ mutants: $(VENV)/installed
 	$(BIN)/python -m tests.mutants results results/default --whole --engines --witness mujoco-plain --witness mujoco-coulomb=results/coulomb --least 0.95 --page docs/mutants.md
 
 test: $(VENV)/installed-dev
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist worksteal
 
 test-all: $(VENV)/installed-dev
-	$(BIN)/pytest -n 2 --dist loadfile -m "slow or not slow"
+	$(BIN)/pytest -n 2 --dist worksteal -m "slow or not slow"
 
 verdicts: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import itertools
+import pkgutil
 import statistics
-from collections import Counter
-from collections.abc import Mapping, Sequence
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
+from types import CodeType
+from typing import TypeVar
 
+import analytic
+from compare.catalogue import CLAIMS
+from compare.claim import Outcome, Text
+from compare.judge import judge
 from compare.kit import pages
 from compare.kit.quantities import QUANTITIES
-from tests.mutants.theories import FOR_TESTS
+from tests.mutants import trial
+from tests.mutants.theories import FOR_TESTS, THEORIES
 from tests.mutants.trial import KINDS, PATIENCE, Judged, Trial
 
 SUBJECTS = {
@@ -51,8 +62,46 @@ BY_HAND = {
     "square_of_the_step",
 }
 """Faults in compiled code, in methods and in MuJoCo's corrections, put in by hand, and the test that saw each."""
+Resolved = tuple[float, str, str]
+"""The relative error of a theory that a check notices, its set, and its claim."""
+R = TypeVar("R")
 PAGE = Path(__file__).with_name("mutants.md")
 """What the page says around its tables."""
+
+
+def watched(act: Callable[[], R]) -> tuple[R, set[CodeType]]:
+    """What a function returns, and the code of all Python functions that were called till then."""
+    called = set[CodeType]()
+    sys.setprofile(lambda frame, event, of: called.add(frame.f_code) if event == "call" else None)
+    try:
+        return act(), called
+    finally:
+        sys.setprofile(None)
+
+
+def untried(called: Container[CodeType]) -> list[str]:
+    """Public functions of `analytic`, as ``module.function``, that were not called and that no wrong theory changes."""
+    changed, names = {f"{wrong.module}.{wrong.function}" for wrong in THEORIES}, []
+    for module in pkgutil.walk_packages(analytic.__path__, "analytic."):
+        for name, value in vars(importlib.import_module(module.name)).items():
+            if name.startswith("_") or not callable(value) or hasattr(value, "py_func"):  # private, or numba's
+                continue
+            function = inspect.unwrap(value)
+            own = inspect.isfunction(function) and function.__module__ == module.name
+            if own and function.__code__ not in called and f"{module.name}.{name}" not in changed:
+                names.append(f"{module.name}.{name}".removeprefix("analytic."))
+    return sorted(names)
+
+
+def _resolving(directory: Path) -> tuple[dict[str, list[Resolved]], list[str]]:
+    """By quantity what the checks of a results directory resolve, the coarsest first; and what nothing tries."""
+    power, records = defaultdict[str, list[Resolved]](list), trial.measured(directory)
+    verdicts, called = watched(lambda: judge(CLAIMS, records))
+    for each in verdicts:
+        if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
+            for check in each.checks:
+                power[check.measurement.quantity].append((check.resolves, check.measurement.set, each.claim.id))
+    return {quantity: sorted(rows)[::-1] for quantity, rows in power.items()}, untried(called)
 
 
 def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Judged] = ()) -> str:
@@ -60,12 +109,13 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
 
     And what witnesses `alone` notice.
     """
+    powers, untried_at = zip(*(_resolving(level.directory) for level in levels), strict=True)
     columns = [f"{level.name}: {what}" for level in levels for what in ("largest", "median", "a tenth")]
     rows = [["quantity", "ceiling", *columns, "where"]]
     for name, quantity in QUANTITIES.items():
-        if quantity.resolves and name in levels[-1].power:
-            cells = [_power([each[0] for each in level.power.get(name, ())], quantity.resolves) for level in levels]
-            where = "{1}, {2}".format(*levels[-1].power[name][0])
+        if quantity.resolves and name in powers[-1]:
+            cells = [_power([each[0] for each in power.get(name, ())], quantity.resolves) for power in powers]
+            where = "{1}, {2}".format(*powers[-1][name][0])
             rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *itertools.chain(*cells), where])
     tables = _table("theories", {each.name: each.trials for each in (*levels, *alone)})
     tables += _table("engines", {"quick": measured}) if measured else ""
@@ -77,7 +127,7 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
     kinds = Counter(trial.kind for trial in tried)
     words = {"first": levels[0].name, "tried": len(tried), **{name: kinds[name] for name in KINDS}}
     words |= {"levels": names, "until": until, "patience": PATIENCE, "level": levels[-1].name}
-    lists = {"untried": _by_module(levels[-1].untried), "powers": pages.markdown(rows)}
+    lists = {"untried": _by_module(untried_at[-1]), "powers": pages.markdown(rows)}
     lists |= {"subjects": pages.markdown(_subjects(levels[0].trials))}
     return PAGE.read_text("utf-8").format(trials=tables, **words, **lists)
 

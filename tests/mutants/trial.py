@@ -7,24 +7,19 @@
 from __future__ import annotations
 
 import functools
-import importlib
-import inspect
-import pkgutil
 import signal
 import sys
 import time
-from collections import defaultdict
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import CodeType, FrameType
+from types import FrameType
 from typing import TypeVar
 
-import analytic
 from compare import validation
 from compare.catalogue import CLAIMS
-from compare.claim import Claim, Outcome, Text
-from compare.judge import forget, judge, verdict
+from compare.claim import Claim, Outcome
+from compare.judge import forget, verdict
 from compare.kit import levels
 from compare.kit.record import Records
 from compare.kit.workers import processes
@@ -72,10 +67,6 @@ class Trial:
         return ", ".join([*named, *(f"{name} hangs" for name in self.hung)])
 
 
-Resolved = tuple[float, str, str]
-"""The relative error of a theory that a check notices, its set, and its claim."""
-
-
 @dataclass(frozen=True)
 class Judged:
     """What the measurements of a results directory notice."""
@@ -84,64 +75,30 @@ class Judged:
     """Of the level, and of the witness that judges alone if it isn't the engine on trial."""
     trials: Sequence[Trial]
     """Of all wrong theories."""
-    power: Mapping[str, Sequence[Resolved]] = field(default_factory=dict)
-    """By quantity what its checks resolve, the coarsest first."""
-    untried: Sequence[str] = ()
-    """Public functions of `analytic` that no claim calls and no wrong theory changes, as ``module.function``."""
+    directory: Path
     whole: bool = True
     """Whether by all claims, or by the quickest ones first and only until one notices."""
 
 
-def _measured(directory: Path) -> Records:
+def measured(directory: Path) -> Records:
     """What the engine on trial measured."""
     (steps, *_) = validation.stored(directory).values()
     return steps[1]
 
 
 def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
-    """Every wrong theory judged on the measurements stored in a results directory, and their resolving power.
+    """Every wrong theory judged on the measurements stored in a results directory.
 
     By all claims; unless `whole`, by the quickest ones first and only until one notices it.
     """
-    power, records = defaultdict[str, list[Resolved]](list), _measured(directory)
-    verdicts, called = watched(lambda: judge(CLAIMS, records))
-    for each in verdicts:
-        if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
-            for check in each.checks:
-                power[check.measurement.quantity].append((check.resolves, check.measurement.set, each.claim.id))
     tried = _tried(functools.partial(_theory, directory, whole, ""), len(THEORIES), workers)
-    name, coarsest_first = results.load(directory).level.lower(), {q: sorted(rows)[::-1] for q, rows in power.items()}
-    return Judged(name, tried, coarsest_first, untried(called), whole)
+    return Judged(results.load(directory).level.lower(), tried, directory, whole)
 
 
 def heard(directory: Path, by: str, workers: int = 2) -> Judged:
     """Every wrong theory judged on what a witness, alone, says of it, by the quickest claims first."""
     tried = _tried(functools.partial(_theory, directory, False, by), len(THEORIES), workers)
-    return Judged(f"{results.load(directory).level.lower()}, by {by}", tried, whole=False)
-
-
-def watched(act: Callable[[], R]) -> tuple[R, set[CodeType]]:
-    """What a function returns, and the code of all Python functions that were called till then."""
-    called = set[CodeType]()
-    sys.setprofile(lambda frame, event, of: called.add(frame.f_code) if event == "call" else None)
-    try:
-        return act(), called
-    finally:
-        sys.setprofile(None)
-
-
-def untried(called: Container[CodeType]) -> list[str]:
-    """Public functions of `analytic`, as ``module.function``, that were not called and that no wrong theory changes."""
-    changed, names = {f"{wrong.module}.{wrong.function}" for wrong in THEORIES}, []
-    for module in pkgutil.walk_packages(analytic.__path__, "analytic."):
-        for name, value in vars(importlib.import_module(module.name)).items():
-            if name.startswith("_") or not callable(value) or hasattr(value, "py_func"):  # private, or numba's
-                continue
-            function = inspect.unwrap(value)
-            own = inspect.isfunction(function) and function.__module__ == module.name
-            if own and function.__code__ not in called and f"{module.name}.{name}" not in changed:
-                names.append(f"{module.name}.{name}".removeprefix("analytic."))
-    return sorted(names)
+    return Judged(f"{results.load(directory).level.lower()}, by {by}", tried, directory, whole=False)
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
@@ -177,7 +134,7 @@ class HangError(BaseException):
 def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
     """The verdict on a claim by a witness; by the engine on trial if it has no name."""
     if not by:
-        return verdict(claim, _measured(directory)).outcome
+        return verdict(claim, measured(directory)).outcome
     witnesses = full_verdict(claim, validation.stored(directory)).witnesses
     return {each.engine: each.outcome for each in witnesses}[by]
 
