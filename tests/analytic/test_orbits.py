@@ -44,16 +44,6 @@ def test_newton_closes_the_orbit(hop, swing):
         assert orbit.turn == pytest.approx((run.theta[-1] - run.theta[0]) / 5, rel=1e-8)
 
 
-def test_what_the_orbits_are(hop, swing):
-    """The hop lands once a period; the swinging ball slips all the time."""
-    assert sum(before.A.name == "N" != after.A.name for before, after in hop.changes) == 1
-    assert set(swing.cases) == {Case.SS}
-    for orbit in (hop, swing):
-        assert orbit.stable
-        assert np.all(orbit.cycle.x.min(axis=0) <= orbit.mean)
-        assert np.all(orbit.mean <= orbit.cycle.x.max(axis=0))
-
-
 def test_multipliers_are_how_disturbances_change(hop, swing):
     """Simulated returns to the section: the disturbance p periods later is M^p of it, within 1 %."""
     for orbit in (hop, swing):

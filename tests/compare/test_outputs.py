@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import analytic
-from compare.commands import cli, options
+from compare.commands import options
 from compare.kit import collection
 from compare.kit.campaign import Campaign
 from compare.kit.tasks import Task
@@ -121,9 +121,3 @@ def test_a_page_of_somebody_else_is_left_alone(command, name, tmp_path, capsys):
     (tmp_path / name).write_text("mine")
     assert f"{name} is not of this program" in refused(capsys, *command.split(), "-o", tmp_path)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
-
-
-def test_cases_are_written_again(tmp_path):
-    for _ in range(2):
-        assert cli.main(["cases", "-o", str(tmp_path)]) == 0
-    assert (tmp_path / "README.md").exists()

@@ -71,9 +71,3 @@ def test_a_missing_file_is_named_and_an_unknown_quantity_refused(tmp_path):
         record.load(tmp_path / "nothing.h5")
     with pytest.raises(InputError, match="omega_c"):
         measurement("omega_d")
-
-
-def test_select():
-    assert [m.quantity for m in RECORDS.select("settled")] == ["omega_c", "force_Ay", "case", "slip_x"]
-    assert [m.value for m in RECORDS.select("settled", "force_Ay")] == [0.1]
-    assert not list(RECORDS.select("settled", where=lambda m: m.value > 100))
