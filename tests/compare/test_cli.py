@@ -163,9 +163,7 @@ def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path: Path, design: l
     assert len({tuple(header.settings["solref"]) for header in headers}) == 2
 
 
-def test_a_run_that_diverges_is_kept_and_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_diverges_is_kept_and_told(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)  # where MuJoCo would leave its MUJOCO_LOG.TXT
     run = tmp_path / "run.h5"
     assert cli.main(["simulate", "--start", "omega_c=1e9", "--time", "0.1", "-o", str(run)]) == 1
@@ -232,9 +230,7 @@ def test_an_interrupted_run_is_kept_and_goes_on(tmp_path: Path) -> None:
     assert run.x[: len(part.x)].tobytes() == part.x.tobytes()
 
 
-def test_a_long_description_is_that_of_its_parts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_long_description_is_that_of_its_parts(tmp_path, monkeypatch, capsys):
     run = str(tmp_path / "run.h5")
     assert cli.main(["simulate", "--time", "1", "--omega-0", "20", "-o", run, "--json"]) == 0
     whole = capsys.readouterr().out
@@ -251,8 +247,8 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_example(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    capsys,
+):
     with pytest.raises(SystemExit, match="0"):
         cli.main(["--help"])
     shown = capsys.readouterr().out
@@ -344,9 +340,7 @@ def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> No
         ("design absent.toml", "cannot read absent.toml: No such file or directory"),
     ],
 )
-def test_mistakes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], argv: str, says: str
-) -> None:
+def test_mistakes(tmp_path, monkeypatch, capsys, argv, says):
     monkeypatch.chdir(tmp_path)
     Path("broken.toml").write_text("m = ")
     before = sorted(Path().iterdir())

@@ -155,9 +155,7 @@ def results_of(measurements: Path) -> Path:
         ("measurements", "figures --results RESULTS -o DIRECTORY"),
     ],
 )
-def test_every_command_names_the_damaged_file(
-    tmp_path: Path, files: dict[str, Path], capsys: pytest.CaptureFixture[str], kind: str, command: str
-) -> None:
+def test_every_command_names_the_damaged_file(tmp_path, files, capsys, kind, command):
     path = tmp_path / "results" / "measurements" / "bad.h5"
     path.parent.mkdir(parents=True)
     content = bytearray(files[kind].read_bytes())
@@ -288,9 +286,7 @@ def test_nothing_in_a_file_is_followed(tmp_path, files, foreign, capsys, outside
         ({"data": 1.0}, "'y' is no column of numbers"),
     ],
 )
-def test_what_is_no_column_is_said(
-    foreign: Path, capsys: pytest.CaptureFixture[str], made: dict[str, Any], says: str
-) -> None:
+def test_what_is_no_column_is_said(foreign, capsys, made, says):
     with h5py.File(foreign, "r+") as file:
         file.create_dataset("y", **made)
     assert foreign.stat().st_size < 20_000

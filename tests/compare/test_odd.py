@@ -73,9 +73,7 @@ def refuses(parse: options.Number, text: str) -> bool:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_bad_inputs_drawn_from_the_parsers(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_inputs_drawn_from_the_parsers(command, tmp_path, monkeypatch, capsys):
     """Each is refused in a line, within 10 s, and leaves no file; there are more than a thousand."""
     furnish(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -31,9 +31,7 @@ def uninterrupted() -> dict[bool, np.ndarray]:
 
 @pytest.mark.parametrize("batched", [False, True])
 @pytest.mark.parametrize("blocks", [0, 1, 2, 3])
-def test_taken_up_after_some_blocks(
-    tmp_path: Path, uninterrupted: dict[bool, np.ndarray], blocks: int, batched: bool
-) -> None:
+def test_taken_up_after_some_blocks(tmp_path, uninterrupted, blocks, batched):
     list(islice(run(tmp_path / "journal", batched), blocks))
     again = run(tmp_path / "journal", batched)
     np.testing.assert_array_equal(joined(again), uninterrupted[batched])
