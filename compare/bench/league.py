@@ -24,10 +24,8 @@ if TYPE_CHECKING:
 
 _OWN = "compare.adapters"
 ENTRIES: dict[str, str] = {
-    "event": "compare.bench.simulators:event",
-    "time-stepping": "compare.bench.simulators:time_stepping",
     "mujoco": f"{_OWN}.mujoco_free:best",
-    "mujoco-plain": "compare.bench.simulators:mujoco_plain",
+    "mujoco-plain": "compare.bench.joints:best",
     "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
     "siconos": f"{_OWN}.siconos:best",
     **{

@@ -270,7 +270,7 @@ def league(parser: Parser) -> None:
     """All installed engines on the exact cases, as they come and in the best settings known."""
     parser.add_argument("--quick", action="store_true", help="one time step")
     named = (
-        "only this one (repeatable), or a module of your own: event, time-stepping, siconos, mujoco-plain, NAME or "
+        "only this one (repeatable), or a module of your own: siconos, mujoco-plain, NAME or "
         f"NAME-defaults of {options.FOREIGN}, mujoco, mujoco-warp, newton-xpbd; newton-kamino, "
         "newton-semiimplicit-defaults, newton-vbd-defaults"
     )

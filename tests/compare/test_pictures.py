@@ -72,7 +72,8 @@ def test_labels_are_read_without_tex(label: str, read: str) -> None:
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_the_league_page_answers(browser: Any, tmp_path: Path) -> None:
     """Values under the pointer, a series switched off, zoom; without scripts the picture; and no network."""
-    words = ["league", "--quick", "--engine", "event", "--engine", "time-stepping", "--workers", "1", "--quiet"]
+    names = [f"tests.compare.test_runner:{name}" for name in ("EXACT", "ROUGH")]
+    words = ["league", "--quick", "--engine", names[0], "--engine", names[1], "--workers", "1", "--quiet"]
     assert cli.main([*words, "-o", str(tmp_path)]) == 0
     page = browser.new_page()
     asked: list[str] = []
@@ -82,13 +83,12 @@ def test_the_league_page_answers(browser: Any, tmp_path: Path) -> None:
     figure = page.locator("figure.plot")
     figure.scroll_into_view_if_needed()
     figure.locator(".series label").first.wait_for()  # a figure answers from when it is first seen
-    names = figure.locator(".series label").all_inner_texts()
-    assert names == ["event", "time-stepping"]
-    mark = figure.locator('[data-series="time-stepping"] use').first
+    assert figure.locator(".series label").all_inner_texts() == names
+    mark = figure.locator(f'[data-series="{names[1]}"] use').first
     place = mark.bounding_box()
     page.mouse.move(place["x"] + place["width"] / 2, place["y"] + place["height"] / 2)
-    assert figure.locator("output").inner_text().startswith("time-stepping")
-    figure.get_by_label("time-stepping").uncheck()
+    assert figure.locator("output").inner_text().startswith(names[1])
+    figure.get_by_label(names[1]).uncheck()
     assert not mark.is_visible()
     figure.get_by_label("closer").click()
     page.wait_for_timeout(300)
