@@ -22,9 +22,9 @@ from model import Case, Flow, Parameters
 
 SET = "reference"
 REFERENCE = Parameters.named(SET)
-SLOWEST, FASTEST, SPAN = 0.04, 0.86, 3e3
+_SLOWEST, _FASTEST, _SPAN = 0.04, 0.86, 3e3
 """Frequencies shown: in units of c, of sqrt(g/R), and the greatest ratio of the two."""
-LASTS = 4.0, 56.0
+_LASTS = 4.0, 56.0
 """Times shown after a jump: in units of 1/c, and of sqrt(R/g), whichever is shorter."""
 FREQUENCIES = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
@@ -84,8 +84,8 @@ def of_set(p: Parameters, figure: str) -> Measurements:
 @cache
 def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     """Frequencies, amplitudes at which slip begins, mean errors at half as much again."""
-    fastest = FASTEST * math.sqrt(p.g / p.R)
-    f = np.geomspace(max(SLOWEST * p.c, fastest / SPAN), fastest, FREQUENCIES).tolist()
+    fastest = _FASTEST * math.sqrt(p.g / p.R)
+    f = np.geomspace(max(_SLOWEST * p.c, fastest / _SPAN), fastest, FREQUENCIES).tolist()
     onsets = [pulsation.slip_onset(p, each) for each in f]
     return f, onsets, [pulsation.mean_error(p, 1.5 * a, each) for each, a in zip(f, onsets, strict=True)]
 
@@ -134,7 +134,7 @@ def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
 def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
     """Step responses, ramps, overshoot over rate."""
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
-    t = np.linspace(0.0, min(LASTS[0] / of.p.c, LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
+    t = np.linspace(0.0, min(_LASTS[0] / of.p.c, _LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
     jump.plot(t, response.step_response(of.mean, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
     flows = [of.slipping(share) for share in SHARES]
     flows[0] = next((m.parameters for m in of.of("jump_height")), flows[0])
