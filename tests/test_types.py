@@ -11,7 +11,6 @@ import mjsim
 from model import Flow, InputError, Parameters, State
 
 P, AT_REST, WORDS = Parameters.named("reference"), [0] * 6, {"mu": 0.2}
-BOTH = analytic, mjsim
 
 
 @pytest.mark.parametrize(

@@ -82,25 +82,18 @@ def test_design_warns_and_says_when_there_is_no_range(tmp_path, capsys):
 FLUID, FLOW, BOUNDS = METER["fluid"], METER["flow"], METER["bounds"]
 WRONG = [
     ({"fluid": FLUID | {"nu_f": -1.0}}, "fluid.nu_f = -1 m2 s-1 is out of range: must be > 0"),
-    ({"fluid": FLUID | {"rho_f": -5}}, "fluid.rho_f = -5 kg m-3 is out of range: must be > 0"),
-    ({"fluid": {"rho_f": 998.2}}, "missing entry of [fluid] 'nu_f'"),
     ({"fluid": FLUID | {"drag": "stoks"}}, "fluid.drag = 'stoks' must be one of"),
     ({"fluid": FLUID | {"rho": 1}}, "unknown entry of [fluid] 'rho' (did you mean 'rho_f'?)"),
     ({"fluid": 3}, "fluid = 3 must be a table, [fluid]"),
     ({"flow": {"slowest": 5, "fastest": 4}}, "flow.fastest = 4 rad s-1 is out of range: must be > flow.slowest = 5"),
-    ({"flow": {"slowest": "x", "fastest": 4}}, "flow.slowest = 'x' must be a number in rad s-1"),
     ({"flow": FLOW | {"response": 1e-3}}, "response = 0.001 s excludes everything: within the bounds"),
     ({"fluid": FLUID | {"drag": "quadratic"}, "flow": FLOW | {"response": 9}}, "flow.response can't"),
     ({"bounds": BOUNDS | {"eta": [0.3, 0.1]}}, "steel: eta = [0.3, 0.1] 1 excludes everything"),
-    ({"bounds": BOUNDS | {"eta": [0.3]}}, "steel: eta = [0.3] must be a number in 1, or the two between"),
-    ({"bounds": BOUNDS | {"R": 0}}, "steel: R = 0 m is out of range: must be > 0"),
     ({"bounds": {"r": 0.01}}, "missing bound of steel: 'R', 'mu', 'eta'"),
     ({"material": [{"name": "cork", "rho_b": 200}]}, "cork: rho_b = 200 kg m-3 is out of range: a ball not denser"),
-    ({"material": [{"rho_b": 200}]}, "missing property of a material 'name'"),
     ({"material": [{"name": "a", "rho_b": 2e3}] * 2}, "material.name = 'a' must be a text, and no other material's"),
     ({"material": {"name": "a"}}, "material must be a list of tables"),
     ({"tolerances": {"mu": 1.5}}, "tolerances.mu = 1.5 is out of range: must be >= 0 and < 1"),
-    ({"tolerances": {"j": 0.1}}, "unknown entry of [tolerances] 'j'; known: mu, eta, r, R"),
     ({"tables": {}}, "unknown table 'tables'"),
 ]
 

@@ -134,7 +134,6 @@ def test_contact_is_lost_from_the_predicted_speed_on(name):
 
 LEVEL = FLOOR.format("") + box(place="0 0 .0499", angle="0 0 0")
 ROUND = '<body name="ball" pos="0 0 .0499"><freejoint/><geom name="ball" type="sphere" size=".05" mass="1"/></body>'
-PILE = FLOOR.format("") + "".join(box(f"0 0 {0.0499 + k * 0.0998}", "0 0 0", f"box{k}") for k in range(3))
 UNSAFE = '<flag refsafe="disable"/>'
 STEPS = {
     "springs": mjcf(LEVEL, 'cone="elliptic"', 'solref="-5000 -100"'),

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import math
 from pathlib import Path
 
 import pytest
@@ -14,10 +13,6 @@ from model import InputError
 
 DOCS = Path(__file__).parents[2] / "docs"
 ROWS = [["a", "b"], ["1", "2"], ["3", "4"]]
-ROUNDED = 0.05 + 0.1 / math.log(2)
-"""An order as it is written, to a digit, less the slope of errors as they are written, to two."""
-
-STEP = 4e-3
 
 
 def test_a_table_is_put_in_its_place(tmp_path):

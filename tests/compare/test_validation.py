@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import threading
-from collections.abc import Iterator
 
 import pytest
 
@@ -14,14 +13,13 @@ from compare.kit import programme
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
 from compare.kit.programme import UNDAMPED, Protocol
-from compare.kit.record import Check, Measurement, Missing, Records
+from compare.kit.record import Check, Missing, Records
 from compare.report import results
 from model import Parameters, StorageError
 from tests.measured import measured
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("reference").replace(c=0.0)}
-Rows = Iterator[Measurement | Missing]
 
 
 def going_round(lab, sets, records):

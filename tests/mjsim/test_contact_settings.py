@@ -11,8 +11,6 @@ import mjsim
 from mjsim import ContactSettings
 from model import Case, InputError, Parameters
 
-P = Parameters.named("reference")
-
 
 @pytest.mark.parametrize(
     ("changes", "words"),

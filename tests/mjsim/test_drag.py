@@ -14,7 +14,6 @@ from tests import drag_laws
 from tests.drag_laws import BY_LAW
 
 SLIPPING = [0, 0, 13.0, -20.0, -5.0, 22.0]
-OTHERS = LAWS[1:]
 
 
 @pytest.mark.parametrize("law", LAWS)
