@@ -11,7 +11,7 @@ from compare.catalogue import CLAIMS
 from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
-from compare.kit.fits import turning
+from compare.kit.fits import turning, zero_and_slope
 from compare.kit.lab import time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
@@ -79,6 +79,16 @@ def test_the_drag_at_which_a_fold_is_born_is_judged_where_that_of_the_set_is_too
     for value, outcome in (born, Outcome.CONFIRMED), (1.01 * born, Outcome.REFUTED):
         row = measured("birth", "critical_drag", value, 1e-4 * born, p, "mine")
         assert judge(select(CLAIMS, ["double-points"]), Records((row,)))[0].outcome is outcome
+
+
+@pytest.mark.parametrize("power", [1.3, 1.687, 2.0])
+def test_a_bent_line_has_its_zero_and_slope(power):
+    """Of growth along a line, where drag isn't linear: few claims of few sets would notice."""
+    x, noise = np.array([0.0, 1.1, 1.5, 2.0]), np.full(4, 1e-6)
+    zero, slope = zero_and_slope(x, x**power - 1.7, noise)
+    assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
+    assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
+    assert np.isnan([m.value for m in zero_and_slope(x, x + 1, noise)]).all()
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-15, -1e-15, 1e-4])
