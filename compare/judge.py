@@ -15,8 +15,8 @@ from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records
 from compare.kit.settling import ERROR_GROUPS, scale
-from compare.kit.short import slip_unit
 from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.trials import slip_unit
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
 from model.kinematics import VARIABLES, state_units

@@ -78,7 +78,7 @@ class Effort:
     recurrent_flows: Flows = (1.0,)  # of the staircase in units of that of the set
     choice_sets: int = 1  # the contacts of the second hover for long
 
-    # Parts of a step of `short.REFINED`. Contacts with much friction answer more slowly: with whole steps the slope of
+    # Parts of a step of `trials.REFINED`. Contacts with much friction answer more slowly: with whole steps the slope of
     # gamma was too coarse on 11 of the 24 sets of the default level.
     bounds_refined: int = 1
     growth_more: int = 1  # multiples of the numbers of directions in growth.PUSHES

@@ -1,14 +1,18 @@
-"""Numbers with uncertainties from sampled runs: window means and peaks; and numbers as JSON holds them."""
+"""Numbers with uncertainties: window means and peaks of sampled runs, curves through points; numbers as JSON has them.
+
+Of curves: values, slopes, zeros and maxima of polynomials, and exponents of linear motions.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import Polynomial
 
 from model import Case, Trajectory
 from model.arrays import Array
@@ -101,3 +105,159 @@ def hops(run: Trajectory, share: float = 1 / 3) -> bool:
     if highest < 1e-4 * run.header.parameters.R or not len(near):
         return False
     return bool(late[near[0] : near[-1] + 1].max() > highest / 2)
+
+
+POINTS = 5
+"""Least number of points that `vanishing`, `initial_slope` and `turning` extrapolate from."""
+LEAST_RATIO, LARGEST_RATIO = 0.2, 0.9
+"""Range of the ratio of the geometric series by which the changes of an estimate, point by point, are continued: two
+changes may be small by chance, and with a ratio near 1 the sum has no bound."""
+FAR = 10.0
+"""Largest distance of a maximum from the nearest point, divided by the length of the row of points: farther away the
+maximum is one of round-off."""
+
+
+def value_and_slope(x: Array, y: Array, degree: int, at: float = 0.0) -> tuple[Array, Array]:
+    """Value and slope at a place of the polynomial through points x (n,), y (n,) or (n, k), by least squares: (k,)."""
+    unit = float(np.ptp(x)) / 2
+    powers = np.vander((x - at) / unit, degree + 1, increasing=True)
+    fit = np.linalg.lstsq(powers, y, rcond=None)[0]
+    return fit[0], fit[1] / unit
+
+
+def slope_error(x: Array, degree: int) -> float:
+    """Standard uncertainty of the slope at 0 of the polynomial through points x (n,), if that of each y is 1."""
+    return float(np.linalg.norm(np.linalg.pinv(np.vander(x, degree + 1, increasing=True))[1]))
+
+
+def straight_line(x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike) -> tuple[Measured, Measured]:
+    """Zero and slope of the line through points x, y (n,) whose y have the standard uncertainties `noise`.
+
+    The uncertainties are those of the points carried over, and the scatter about the line where that is larger.
+    """
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    weight = np.maximum(np.broadcast_to(noise, y.shape), np.finfo(float).eps * np.abs(y).max()) ** -2.0
+    # About the weighted mean, height and slope are independent of each other, and one point may outweigh all others.
+    x0, y0 = np.average(x, weights=weight), np.average(y, weights=weight)
+    spread = np.sum(weight * (x - x0) ** 2)
+    slope = np.sum(weight * (x - x0) * (y - y0)) / spread
+    scatter = max(1.0, np.sum(weight * (y - y0 - slope * (x - x0)) ** 2) / max(1, len(x) - 2))
+    height, rise = np.sqrt(scatter / weight.sum()), np.sqrt(scatter / spread)
+    zero = x0 - y0 / slope
+    return (
+        Measured(float(zero), math.hypot(height / slope, (zero - x0) / slope * rise)),
+        Measured(float(slope), float(rise)),
+    )
+
+
+def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured]:
+    """Zero of the polynomial through all points x, y (n,), and its slope there; nan without one zero between them.
+
+    Uncertain by the noise of every y, and a third of what the last degree changes.
+    """
+
+    def fitted(values: Array, degree: int) -> Array:
+        fit = Polynomial.fit(x, values, degree)
+        zeros = [zero for zero in _real_roots(fit) if x.min() < zero < x.max()]
+        return np.array([zeros[0], fit.deriv()(zeros[0])] if len(zeros) == 1 else [math.nan, math.nan])
+
+    degree = len(x) - 1
+    best = fitted(y, degree)
+    shifted = [fitted(y + shift, degree) - best for shift in np.diag(noise)]
+    spread = np.linalg.norm([(best - fitted(y, degree - 1)) / 3, *shifted], axis=0)
+    zero, slope = (Measured(*pair) for pair in zip(best.tolist(), spread.tolist(), strict=True))
+    return zero, slope
+
+
+def vanishing(where: Array, values: Sequence[Measured]) -> Measured:
+    """The place at which a quantity is zero, from places (n,) and its values there, the one nearest to zero first."""
+    return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0)), values)
+
+
+def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:
+    """Derivative of the place with respect to a quantity where that is zero; arguments as for `vanishing`."""
+    size = max(abs(m.value) for m in values)
+    return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size, values)
+
+
+def turning(where: Array, values: Sequence[Measured], others: Array | None = None) -> Measured:
+    """The maximum of the place as a function of a quantity, the value nearest to it first; nan if there is none.
+
+    Or what another quantity is there, with its values `others` at the places.
+    """
+
+    def maximum(y: Array, n: int) -> float:
+        y = y[:n] / np.abs(y).max()
+        fit = Polynomial.fit(y, where[:n], n - 1)
+        beyond = [root for root in _real_roots(fit.deriv()) if 0 < (root - y[0]) / (y[0] - y[-1]) < FAR]
+        nearest = min(beyond, key=lambda root: abs(root - y[0]), default=math.nan)
+        return float((fit if others is None else Polynomial.fit(y, others[:n], n - 1))(nearest))
+
+    return _extrapolated(maximum, values)
+
+
+def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Measured]) -> Measured:
+    """An estimate (values, n) from the first n values, with n all of them; uncertain by its convergence and noise.
+
+    It is made without the last two points, without the last, and with all. Its changes are continued as a geometric
+    series with the larger ratio of any two, at most 1, from the last change but one, since the last may be small by
+    chance, or from the last if it is larger. The error is the term after the last, or the sum of all further terms
+    where the last two changes have the same sign: with the largest ratio where their ratio has grown, as it does where
+    the quantity is no smooth function.
+    """
+    values, noise = (np.array([getattr(m, name) for m in points]) for name in ("value", "uncertainty"))
+    count = len(values)
+    row = np.array([estimate(values, n) for n in range(count - 3, count + 1)])
+    changes = np.abs(np.diff(row))
+    ratios = np.divide(changes[1:], changes[:-1], out=np.ones(2), where=changes[:-1] > 0)
+    ratio = float(np.clip(ratios.max(), LEAST_RATIO, 1.0))
+    rest = max(float(changes[-2]) * ratio**2, float(changes[-1]) * ratio)
+    if (row[-1] - row[-2]) * (row[-2] - row[-3]) > 0:
+        rest /= 1 - (LARGEST_RATIO if ratios[1] > ratios[0] > 0 else min(ratio, LARGEST_RATIO))
+    carried = [estimate(values + shift, count) - row[-1] for shift in np.diag(noise)]
+    rounding = np.finfo(float).eps * abs(row[-1]) * 2**count
+    return Measured(float(row[-1]), math.hypot(rest, rounding, *carried))
+
+
+def _real_roots(polynomial: Polynomial) -> list[float]:
+    return [float(root.real) for root in np.asarray(polynomial.roots()) if abs(root.imag) < 1e-9]
+
+
+def propagator(record: Array, lag: int) -> Array:
+    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d) of a linear motion.
+
+    The columns of record[k] are d independent motions at sample k; rows should be scaled to be of like size.
+    """
+    now, later = record[:-lag], record[lag:]
+    gram = np.einsum("nij,nkj->ik", now, now)
+    return np.asarray(np.linalg.solve(gram, np.einsum("nij,nkj->ik", now, later)).T)
+
+
+def exponents(at: Callable[[int], Array], interval: float, longest: int) -> npt.NDArray[np.complex128]:
+    """All exponents (d,) in s-1 of a linear motion whose propagator for k sample intervals is at(k), (d, d).
+
+    Each is measured at lags that double up to its own time constant or `longest`: a longer lag shows slow exponents
+    more sharply, and fast motions have decayed by then.
+    """
+
+    def rates_at(lag: int) -> npt.NDArray[np.complex128]:
+        values = np.linalg.eigvals(at(lag)).astype(complex)
+        logarithms = np.log(np.where(values == 0, np.finfo(float).eps, values))  # a zero is a decay to round-off
+        return np.asarray(logarithms / (lag * interval))
+
+    lag, rates = 1, rates_at(1)
+    while 2 * lag <= longest:
+        lag *= 2
+        slow = np.abs(rates) * lag * interval < 1
+        if not slow.any():
+            break
+        rates = np.where(slow, matched(rates_at(lag), rates), rates)
+    return rates
+
+
+def matched(values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+    """Values (d,) reordered so that each stands where the nearest of others (d,) does, one to one."""
+    from scipy.optimize import linear_sum_assignment  # here, because it takes half a second to load
+
+    order = linear_sum_assignment(np.abs(to[:, None] - values[None, :]))[1]
+    return np.asarray(values[order])

@@ -24,11 +24,10 @@ from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import Protocol
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import reading
-from compare.kit.short import constrained
 from compare.kit.statistics import Measured, hops, peaks, top
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, TrialResult, carry_out, finer
+from compare.kit.trials import Start, Trial, TrialResult, carry_out, constrained, finer
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 

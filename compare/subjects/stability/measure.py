@@ -22,13 +22,12 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.kit.engines import STUDY_SLIP
-from compare.kit.fits import exponents, matched, propagator
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
-from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.statistics import COVERAGE, Measured, exponents, matched, propagator
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory

@@ -22,20 +22,23 @@ import numpy as np
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.settling import PRESSES
-from compare.kit.short import (
+from compare.kit.statistics import Measured
+from compare.kit.tasks import Task
+from compare.kit.trials import (
     DOUBT,
     EXTRAPOLATION,
     HALF_WINDOW,
     REFINED,
     WINDOW_DEGREES,
+    Start,
+    Trial,
+    TrialResult,
+    carry_out,
     constrained,
     lag_error,
     polynomials,
     random_state,
 )
-from compare.kit.statistics import Measured
-from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS

@@ -18,23 +18,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.kit.fits import slope_error
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
-from compare.kit.short import (
+from compare.kit.statistics import Measured, slope_error
+from compare.kit.tasks import Task
+from compare.kit.trials import (
     DOUBT,
     EXTRAPOLATION,
     HALF_WINDOW,
     REFINED,
     WINDOW_DEGREES,
+    Start,
     lag_error,
     polynomials,
     random_state,
     slip_unit,
 )
-from compare.kit.statistics import Measured
-from compare.kit.tasks import Task
-from compare.kit.trials import Start
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ

@@ -17,14 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compare.kit.fits import straight_line, vanishing, zero_and_slope
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import named_start, settle_groups
-from compare.kit.short import DOUBT, EXTRAPOLATION, REFINED, lag_error, polynomials, slip_unit
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Measured, straight_line, vanishing, zero_and_slope
 from compare.kit.tasks import Task
-from compare.kit.trials import Start
+from compare.kit.trials import DOUBT, EXTRAPOLATION, REFINED, Start, lag_error, polynomials, slip_unit
 from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, without_size
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -260,7 +258,7 @@ class Arrow:
         return self.p.replace(omega_0=leads * omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
 
     def task(self, omega_c: float, times: int = 1) -> Task:
-        """The run from there, with steps half as long as those of `short`, divided by `times`."""
+        """The run from there, with steps half as long as those of `REFINED`, divided by `times`."""
         step = coarse_step(self.p) / (2 * REFINED * times)
         return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
 

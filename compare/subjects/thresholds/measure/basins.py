@@ -20,12 +20,11 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
-from compare.kit.fits import vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
 from compare.kit.settling import Patience, lasting, named_start, physical_case, settle_groups
-from compare.kit.statistics import Measured, tail, taper
+from compare.kit.statistics import Measured, tail, taper, vanishing
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array

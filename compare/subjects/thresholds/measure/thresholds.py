@@ -23,7 +23,6 @@ import numpy as np
 
 from compare.kit.brackets import Answer, Attempt, Bracket, Search, narrow
 from compare.kit.engines import sliding_speeds
-from compare.kit.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
 from compare.kit.settling import (
@@ -37,7 +36,17 @@ from compare.kit.settling import (
     settle_groups,
     settled_cases,
 )
-from compare.kit.statistics import COVERAGE, Measured, settled_case, tail
+from compare.kit.statistics import (
+    COVERAGE,
+    POINTS,
+    Measured,
+    initial_slope,
+    settled_case,
+    straight_line,
+    tail,
+    turning,
+    vanishing,
+)
 from compare.kit.tasks import Task
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
