@@ -2,7 +2,7 @@
 
 A free ball takes the curve of the wall from the engine: the more independent witness and the less accurate one, since
 MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis. Of the
-corrections between the steps only drag, the turning of the wall and the servo of the margins apply to it.
+corrections between the steps only drag and the turning of the wall apply to it.
 
 With ``law="rigid"`` its contacts obey `mjsim.Coulomb`, which serves any model and knows nothing of this one.
 Semi-implicit steps are leapfrog: places are half a step ahead of velocities. The wall is a block that is turned to the
@@ -14,8 +14,8 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -23,24 +23,91 @@ import numpy.typing as npt
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, followed
+from mjsim.corrections import Ball
 from mjsim.coulomb import Coulomb
-from mjsim.world_axes import against, driven, outwards, slip, spun, unwrapped
+from mjsim.coulomb.law import Law
+from mjsim.world_axes import against, driven, joint_velocities, slip, spun, unwrapped
 from model import Parameters, State
 from model.arrays import Array
 from model.kinematics import to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
+_A_x, _A_y, _B_x, _B_y = (recorder.SLIPS - recorder.SENSORS).tolist()
+
+
+class Body(NamedTuple):
+    """A ball in the engine's memory."""
+
+    qpos: Any
+    qvel: Any
+    last: Any
+    """Accelerations in the last step."""
+    applied: Any
+    """Forces on ball and wall."""
+    sensors: Any
+    wall: Any
+    at: Any
+    """Quaternion and place of the wall."""
+    heavy: float
+    """Mass of a wall that moves, kg."""
+    margins: Any
+    """Gaps below which contacts are seen, A and B, m."""
+    ball: Ball
+    served: Any
+    """What takes a step, see `under_law`."""
+
+
+def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, seen: Any) -> float:
+    """Take a step of so many seconds under Coulomb's law, with places half of it ahead of velocities, and see it.
+
+    `theta` is the azimuth before the last step; that before this one is returned.
+    """
+    ahead, ball, qpos, qvel, applied = duration / 2, body.ball, body.qpos, body.qvel, body.applied
+    x, y = qpos[0], qpos[1]
+    forces = driven(qpos, qpos[3:], qvel, body.last, ahead, omega_0, ball)
+    for i in range(6):
+        applied[i] = forces[i]
+    theta = unwrapped(math.atan2(y, x), theta)
+    body.wall[0], body.wall[3] = math.cos(theta / 2), math.sin(theta / 2)
+    spin = spun(qpos[3:], qvel)
+    A_x, A_y, B_x, B_y = slip(qpos, qvel, spin, ahead, ball)
+    inwards, onwards, up = against(qpos, qvel, spin, ahead, ball.R, ball.r)
+    qvel[6], qvel[7], qvel[8] = -inwards, onwards, -up
+    applied[6], applied[8] = body.heavy / ahead * inwards, body.heavy / ahead * up
+    body.at[2], qpos[7], qpos[8], qpos[9] = qpos[2], 0.0, 0.0, 0.0
+    seen[-2], seen[-1] = qpos[2] - ball.r, ball.R - math.hypot(x, y)
+    under_law(body.served, duration, anew)
+    for i in range(len(body.sensors)):
+        seen[i] = body.sensors[i]
+    # the engine has them of a wall that is ahead
+    seen[_A_x], seen[_A_y], seen[_B_x], seen[_B_y] = A_x, A_y, B_x, B_y
+    return theta
+
+
+def steps(body: Body, duration: float, fluid: Array, theta: float, seen: Array) -> float:
+    """A `step` for each omega_0."""
+    for number in range(len(fluid)):
+        theta = step(body, duration, False, fluid[number], theta, seen[number])
+    return theta
+
+
+def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:
+    """A step of MuJoCo's under the law, with what it remembers or `anew`; compiled, it is served by addresses."""
+    law, data = served
+    law.model.opt.timestep = duration
+    if anew:
+        law.reset()
+    law.step(data)
 
 
 @functools.cache
-def loops() -> Callable[..., float] | None:
-    """`mjsim.compiled_free.advance`, if numba is installed."""
+def compiled() -> Any:
+    """`mjsim.compiled_free`, which has loops over `step` compiled, if numba is installed."""
     try:
-        from mjsim.compiled_free import advance
+        from mjsim import compiled_free
     except ImportError:
         return None
-    return advance
+    return compiled_free
 
 
 class Free:
@@ -64,7 +131,6 @@ class Free:
         seen = np.empty((*fluid.shape, recorder.NSENSOR)) if sensors is None else sensors
         for k, ball in enumerate(self._balls):
             ball.advance(fluid[:, k], seen[:, k])
-            self.margins[:, k] = ball.model.pair_margin[:2]
         if row is not None and sensors is not None:
             row[:, recorder.SENSORS : -1] = sensors[0]
             row[:, -1] = [ball.ahead for ball in self._balls]
@@ -74,18 +140,13 @@ class Free:
         for ball, own in zip(self._balls, kept, strict=True):
             mujoco.mj_getState(ball.model, ball.data, own, _INTEGRATION)
         laws = [(k, *kept) for k, ball in enumerate(self._balls) for kept in ball.law_state().items()]
-        return {f"{name}_{k}": values for k, name, values in laws} | {
-            "integration": kept,
-            "theta": np.array([ball.theta for ball in self._balls]),
-            "margins": self.margins.copy(),
-        }
+        theta = np.array([ball.theta for ball in self._balls])
+        return {f"{name}_{k}": values for k, name, values in laws} | {"integration": kept, "theta": theta}
 
     def restore(self, state: dict[str, Array]) -> None:
-        self.margins[:] = state["margins"]
         for k, ball in enumerate(self._balls):
             mujoco.mj_setState(ball.model, ball.data, state["integration"][k], _INTEGRATION)
             ball.theta = float(state["theta"][k])
-            ball.model.pair_margin[:2] = state["margins"][:, k]
             if ball.law:
                 ball.law.restore({name: state[f"{name}_{k}"] for name in ball.law_state()})
 
@@ -93,20 +154,31 @@ class Free:
 class FreeBall:
     """One of them, with an engine of its own."""
 
-    def __init__(self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float) -> None:
-        self.model = copy.copy(model)  # its margins move
-        self.data = mujoco.MjData(self.model)
-        self.p, self.theta = p, theta_0
-        self._ball = Ball(*map(float, Ball.of(p, settings)))
-        self.law = Coulomb(self.model, rigid=True) if settings.rigid else None
+    def __init__(
+        self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float,
+        share: float = Law.share,
+    ) -> None:  # fmt: skip
+        self.model = model = copy.copy(model)  # its wall moves
+        self.data = mujoco.MjData(model)
+        self.p, self.theta, self._timestep = p, theta_0, settings.timestep
+        self.law = Coulomb(self.model, rigid=True, share=share) if settings.rigid else None
         self.ahead = settings.timestep / 2 if self.law else 0.0
-        self.place(x, theta_0)
+        data, wall = self.data, self.model.body("wall") if self.law else None
+        self.body = Body(
+            qpos=data.qpos,
+            qvel=data.qvel,
+            last=data.qacc_warmstart,
+            applied=data.qfrc_applied,
+            sensors=data.sensordata,
+            wall=wall.quat if wall else data.mocap_quat[0],
+            at=wall and wall.pos,
+            heavy=float(model.dof_M0[-1]),
+            margins=model.pair_margin,
+            ball=Ball(*map(float, Ball.of(p, settings))),
+            served=self.law and (self.law.addresses(data) if compiled() else (self.law, data)),
+        )
         self._turns = settings.wall == "tangent"
-        wall = self.model.body("wall") if self.law else None
-        self._wall = wall.quat if wall else self.data.mocap_quat[0]
-        self._at = wall.pos if wall else np.zeros(3)
-        self._reach = settings.touching(p.g)
-        self._served: tuple[int, ...] = ()
+        self.place(x, theta_0)
 
     def place(self, x: npt.ArrayLike, theta: float) -> None:
         """Begin anew in a state."""
@@ -125,19 +197,9 @@ class FreeBall:
         The place is `ahead` of the velocities; these are along the axes of where the ball was.
         """
         place, velocity = self.data.qpos[:3].tolist(), self.data.qvel[:6].tolist()
-        spin, (out_x, out_y) = spun(self.data.qpos[3:7].tolist(), velocity), outwards(place, velocity, self.ahead)
-        self.unwrap(math.atan2(place[1], place[0]))
-        rho, (v_x, v_y, v_z) = math.hypot(place[0], place[1]), velocity[:3]
-        omega_c = (out_x * v_y - out_y * v_x) / rho if rho > 0 else math.nan
-        joints = self.theta, self.p.R - rho, place[2] - self.p.r, 1.0, 0.0, 0.0, 0.0
-        speeds = omega_c, -out_x * v_x - out_y * v_y, v_z
-        return (
-            *joints,
-            *speeds,
-            -out_x * spin[0] - out_y * spin[1],
-            spin[2] - omega_c,
-            out_x * spin[1] - out_y * spin[0],
-        )
+        self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
+        there = self.theta, self.p.R - math.hypot(place[0], place[1]), place[2] - self.p.r
+        return *there, 1.0, 0.0, 0.0, 0.0, *joint_velocities(place, self.data.qpos[3:7].tolist(), velocity, self.ahead)
 
     def law_state(self) -> dict[str, Array]:
         """What the law of rigid contacts remembers, if there is one."""
@@ -145,42 +207,19 @@ class FreeBall:
 
     def advance(self, fluid: Array, seen: Array) -> None:
         """Take a step for each omega_0; `seen` (steps, `NSENSOR`) takes the sensors and the gaps of A and B, m."""
-        if self.law and (loop := loops()):
-            self._served = self._served or self.law.addresses(self.data)
-            given = self._served, self.data, self._wall, self._at, self._ball, self.ahead
-            self.theta = loop(*given, fluid, seen, self.theta)
+        if self.law:
+            take = compiled().steps if compiled() else steps
+            self.theta = take(self.body, self._timestep, fluid, self.theta, seen)
             return
         for row, omega_0 in zip(seen, fluid.tolist(), strict=False):
-            self._step(omega_0, row)
+            self._soft_step(omega_0, row)
 
-    def _step(self, omega_0: float, seen: Array) -> None:
-        data, p, gain = self.data, self.p, self._ball.gain
+    def _soft_step(self, omega_0: float, seen: Array) -> None:
+        data, p = self.data, self.p
         place, turned, velocity = data.qpos[:3].tolist(), data.qpos[3:7].tolist(), data.qvel[:6].tolist()
-        last = data.qacc_warmstart[:6].tolist()
-        data.qfrc_applied[:6] = driven(place, turned, velocity, last, self.ahead, omega_0, self._ball)
-        gaps = place[2] - p.r, p.R - math.hypot(place[0], place[1])
-        self.unwrap(math.atan2(place[1], place[0]))
+        data.qfrc_applied[:] = driven(place, turned, velocity, [0.0] * 6, 0.0, omega_0, self.body.ball)
+        self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
         if self._turns:
-            self._wall[:] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
-        if gain:
-            for contact, gap in enumerate(gaps):
-                if gap < self._reach:
-                    self.model.pair_margin[contact] = followed(self.model.pair_margin[contact], gap, gain)
-        if self.law:
-            spin = spun(turned, velocity)
-            inwards, onwards, up = against(place, velocity, spin, self.ahead, p.R, p.r)
-            self._at[2], data.qpos[7:], data.qvel[6:] = place[2], 0.0, (-inwards, onwards, -up)
-            data.qfrc_applied[[6, 8]] = (
-                self.model.dof_M0[6] / self.ahead * inwards,
-                self.model.dof_M0[8] / self.ahead * up,
-            )
-            self.law.step(data)
-        else:
-            mujoco.mj_step(self.model, data)
-        seen[:] = *data.sensordata, *gaps
-        if self.law:  # the engine has them of a wall that is ahead
-            seen[recorder.SLIPS - recorder.SENSORS] = slip(place, velocity, spin, self.ahead, self._ball)
-
-    def unwrap(self, azimuth: float) -> None:
-        """Take the turn of this azimuth that is nearest to the last one; leave it in a run that has diverged."""
-        self.theta = unwrapped(azimuth, self.theta)
+            self.body.wall[:] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
+        mujoco.mj_step(self.model, data)
+        seen[:] = *data.sensordata, place[2] - p.r, p.R - math.hypot(place[0], place[1])

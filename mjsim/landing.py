@@ -1,35 +1,34 @@
 """Landings: a ball that lands, or comes near the vessel's axis, is a free body under Coulomb's law for that step.
 
-`mjsim.free` takes it through the step in fine ones, with the rigid law that serves any model, and no axis. From what
+`mjsim.free` takes it through the step in shorter ones, with the rigid law that serves any model, and no axis. From what
 comes out the ball goes on upon its joints: places, velocities, accelerations, and the forces of its contacts, from
 which the margins follow (`ContactSettings.held`).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mjsim import recorder, scene
 from mjsim.contact_settings import ContactSettings
-from mjsim.free import FreeBall
-from mjsim.world_axes import unwrapped
+from mjsim.free import Body, FreeBall, compiled, step
+from mjsim.world_axes import joint_velocities, unwrapped
 from model import Parameters, State
 from model.arrays import Array
-from model.kinematics import Motion, from_world, rotated
 
-FINE = 128
-"""Fine steps in one of the settings."""
-_LATEST = 16
-"""Fine steps over which accelerations are taken."""
-_FIRST = 16
-"""Fine steps after which the forces of a state are known."""
-_BLOWS = 8
-"""Most blows in a step whose moments are found."""
-_OPEN = 1e-9
-"""Gap of a contact that is open, in units of R."""
-_UPRIGHT = 1.0, 0.0, 0.0, 0.0
+FINE = 1024
+"""The step in which a contact closes is that part of one of the settings;"""
+COARSE = 64
+"""the longest is that one, which those after a blow come to by doubling."""
+_SHARE = 5e-3
+"""`share` of the law: contact forces must be steady enough for their change in a step to be told."""
+_TOUCHES = 1e-6
+"""Gap of a contact that touches, in units of R."""
+_LEAST = 16
+"""A blow just after the beginning or before the end of a whole step has a step shorter by up to that."""
 
 
 class Landed(NamedTuple):
@@ -45,85 +44,108 @@ class Landed(NamedTuple):
     change: float
     """What a component of the contact forces would change in a whole step at the pace of the end, at most, N."""
     seen: Array
-    """Sensors of the fine steps, (n, `NSENSOR`)."""
+    """Sensors at the beginning, (`NSENSOR`,)."""
 
 
 class Fine:
-    """One ball that takes steps of some settings in fine ones."""
+    """One ball that takes steps of some settings in shorter ones."""
 
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
-        self._p, self._step = p, settings.timestep / FINE
-        rigid = ContactSettings.rigid_at(self._step)
-        self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0)
-        self._slow = settings.slowest_fall(p.g) * self._step
-        """What a gap loses in a fine step in which the contact closes with a blow, m."""
+        self._p, self._whole, self._fall = p, settings.timestep, settings.slowest_fall(p.g)
+        rigid = ContactSettings.rigid_at(settings.timestep / COARSE)
+        self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0, _SHARE)
+        self._ball.ahead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
 
-    def forces(self, x: State, theta: float, omega_0: float) -> Landed:
-        """What accelerates a ball in a state, and the forces of its contacts."""
-        self._ball.place(x, theta)
-        return self._advance(omega_0, _FIRST)
+    def step(self, x: State, theta: float, rates: Array, omega_0: float) -> Landed:
+        """A whole step from a state, with velocities of the joints that change at such rates."""
+        ball, seen = self._ball, np.zeros((3, recorder.NSENSOR))
+        ball.place(x, theta)
+        rho = self._p.R - float(x.h)
+        if rho > self._p.R / 4:  # nearer to the axis it flies
+            turn, (cos, sin) = float(x.omega_c), (math.cos(theta), math.sin(theta))
+            away, along = -rates[1] - rho * turn * turn, rho * rates[0] - 2 * x.v_h * turn
+            ball.body.last[:3] = away * cos - along * sin, away * sin + along * cos, rates[2]
+        take = compiled().through if compiled() else through
+        given = ball.body, self._whole, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
+        place, velocity, before, duration, since = take(*given)
+        v = np.array(velocity)
+        first, last = recorder.forces(seen[1:], np.array([place[0] - v[0] * since, place[0]]))
+        (A_x, A_y, A_z), (B_x, B_y, B_z) = last
+        forces = np.array([0, A_x + B_x, A_y + B_y, -self._p.r * A_z, self._p.r * B_z, 0, A_y, B_x])
+        change = float(np.abs(last - first).max()) / since * self._whole if since else math.inf
+        return Landed(np.array(place), v, (v - before) / duration, forces, change, seen[0])
 
-    def step(self, x: State, theta: float, omega_0: float) -> Landed:
-        """A whole step, with the sensors of its first fine one.
 
-        Where a contact closes, the fine steps begin anew so that it does in the middle of one: of a blow that two
-        share, friction, which turns, would have two directions. Those after it are late; that is taken back at the end.
-        """
-        left, late, gaps, first = FINE, 0.0, np.array([x.y, x.h]), np.empty(0)
-        for _ in range(_BLOWS):
-            self._ball.place(x, theta)
-            landed = self._advance(omega_0, left)
-            first = landed.seen[:1] if len(first) == 0 else first
-            closing = self._closing(landed.seen, gaps)
-            if closing is None:
-                break
-            count, contact = closing
-            self._ball.place(x, theta)
-            if count:
-                before = self._advance(omega_0, count)
-                place, v, rates = before.place, before.velocity, before.rates
-            else:
-                (place, v), rates = self._joints(), np.zeros(6)
-            gap = 2 - contact  # as the joints are ordered
-            wait = float(np.clip(-place[gap] / v[gap], 0.0, 2 * self._step)) - self._step / 2
-            place, v = place + wait * v[:3], v + wait * rates
-            place[gap] = -self._step / 2 * v[gap]
-            x, theta = recorder.state(np.append(place, _UPRIGHT), v, self._p), float(place[0])
-            left, late, gaps = left - count, late + wait, np.array([x.y, x.h])
-            gaps[contact] = 0.0
-        place, v = landed.place - late * landed.velocity[:3], landed.velocity - late * landed.rates
-        if left < _FIRST:  # the forces found may be those of a blow
-            x = recorder.state(np.append(place, _UPRIGHT), v, self._p)
-            landed = self.forces(x, float(place[0]), omega_0)._replace(change=np.inf)
-        return landed._replace(place=place, velocity=v, seen=first)
+def closes(gap: float, speed: float, rate: float, fall: float) -> float:
+    """Time until a gap closes faster than `fall`, s; infinite if it doesn't."""
+    if gap <= 0:
+        return 0.0 if speed < -fall else math.inf
+    square = speed * speed - 2 * rate * gap
+    root = math.sqrt(max(square, 0.0))
+    return 2 * gap / (root - speed) if square > fall * fall and root > speed else math.inf
 
-    def _closing(self, seen: Array, gaps: Array) -> tuple[int, int] | None:
-        """The first fine step in which a contact closes, and which, or None; `gaps` are those before."""
-        loads, open_ = seen[:, recorder.NORMALS], np.abs(gaps) > _OPEN * self._p.R
-        was_open = np.vstack([open_, loads[:-1] == 0])
-        falls = np.diff(seen[:, -2:], axis=0, prepend=gaps[None]) < -self._slow
-        found = np.argwhere((loads > 0) & was_open & falls)
-        return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
 
-    def _advance(self, omega_0: float, count: int) -> Landed:
-        """So many fine steps."""
-        seen, fluid, latest = np.empty((count, recorder.NSENSOR)), np.full(count, omega_0), min(_LATEST, count // 2)
-        self._ball.advance(fluid[latest:], seen[: count - latest])
-        _, before = self._joints()
-        self._ball.advance(fluid[:latest], seen[count - latest :])
-        place, v = self._joints()
-        rates = (v - before) / (self._step * max(latest, 1))
-        half = count - count // 2
-        forces = recorder.forces(seen[[-1, -2 % count]], place[0]).mean(axis=0)
-        change = np.abs(forces - recorder.forces(seen[-half:][:1], place[0] - v[0] * self._step * half)[0]).max()
-        (A_x, A_y, A_z), (B_x, B_y, B_z) = forces
-        given = np.array([0, A_x + B_x, A_y + B_y, -self._p.r * A_z, self._p.r * B_z, 0, A_y, B_x])
-        return Landed(place, v, rates, given, float(change) * FINE / half, seen)
+def through(
+    body: Body, whole: float, fall: float, reach: float, omega_0: float, theta: float, rates: tuple[float, float],
+    seen: Any,
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float, float]:  # fmt: skip
+    """Take a ball through a whole step, from a place at the time of its velocities.
 
-    def _joints(self) -> tuple[Array, Array]:
-        """Places (3,) and velocities (6,) of the joints at one time."""
-        (qpos, qvel), ball = (self._ball.data.qpos, self._ball.data.qvel), self._ball
-        place, spin = qpos[:3] - ball.ahead * qvel[:3], rotated(qpos[3:7], qvel[3:6])
-        x, azimuth = from_world(Motion(place, qvel[:3].copy(), spin), self._p)
-        place, v = recorder.joint_state(x, unwrapped(float(azimuth), ball.theta), self._p)
-        return place[:3], v
+    A contact that closes faster than `fall` does so in the middle of a short step: of a blow that two steps share,
+    friction, which turns, would have two directions. Until then it isn't seen; others are within `reach`, m. `rates`
+    are what a second changes of the speeds of h and y, m s-2.
+
+    `seen` gets the sensors at the beginning (after a landing in the first fine step) and those half a whole step before
+    the end, or after the last blow, and at the end.
+
+    Returns
+    -------
+    azimuth, h and y; velocities of the joints, and those before the last step; its duration; time between what was seen
+    last, or 0, s
+    """
+    qpos, qvel, last, ball, margins = body.qpos, body.qvel, body.last, body.ball, body.margins
+    rate_h, rate_y = rates
+    left, growing, finest, shown, then = whole, whole / COARSE, whole / FINE, False, -1.0
+    velocity = joint_velocities(qpos, qpos[3:], qvel, 0.0)
+    before, duration, blow, anew = velocity, 0.0, False, True
+    while left > 1e-9 * whole:
+        soon_h = closes(ball.R - math.hypot(qpos[0], qpos[1]), velocity[1], rate_h, fall)
+        soon_y = closes(qpos[2] - ball.r, velocity[2], rate_y, fall)
+        soon = min(soon_h, soon_y)
+        own = min(max(2 * min(soon, left - soon), finest / _LEAST), finest)
+        blow = soon <= 0.55 * own
+        margins[0] = 0.0 if soon_y < math.inf and not (blow and soon_y == soon) else reach
+        margins[1] = 0.0 if soon_h < math.inf and not (blow and soon_h == soon) else reach
+        span = max(min(left, soon - own / 2), own / 4)
+        duration = own if blow else span / math.ceil(span / growing - 1e-9)
+        ahead = duration / 2
+        for i in range(3):
+            qpos[i] += ahead * (qvel[i] + ahead / 2 * last[i])
+        if blow:  # of contacts that touch, too, gaps are nothing: divided by a short step they would be speeds
+            rho, least = math.hypot(qpos[0], qpos[1]), _TOUCHES * ball.R
+            if soon_y == soon or abs(qpos[2] - ball.r) < least:
+                qpos[2] = ball.r
+            if soon_h == soon or abs(ball.R - rho) < least:
+                qpos[0], qpos[1] = qpos[0] * ball.R / rho, qpos[1] * ball.R / rho
+        begin, before = whole - left, velocity
+        theta = step(body, duration, anew, omega_0, theta, seen[2])
+        if blow:
+            growing, then = finest / 2, -1.0
+            for i in range(6):
+                last[i] = 0.0
+        elif not shown and duration >= finest / 2:
+            shown = True
+            seen[0] = seen[2]
+        for i in range(3):
+            qpos[i] -= ahead * (qvel[i] + ahead / 2 * last[i])
+        velocity = joint_velocities(qpos, qpos[3:], qvel, 0.0)
+        rate_h = 0.0 if blow else (velocity[1] - before[1]) / duration
+        rate_y = 0.0 if blow else (velocity[2] - before[2]) / duration
+        left, anew = left - duration, blow
+        if then < 0 and not blow and growing > finest and begin >= 0.499 * whole:
+            then = begin + ahead
+            seen[1] = seen[2]
+        growing = min(2 * growing, whole / COARSE)
+    rho = math.hypot(qpos[0], qpos[1])
+    place = unwrapped(math.atan2(qpos[1], qpos[0]), theta), ball.R - rho, qpos[2] - ball.r
+    return place, velocity, before, duration, (whole - left - ahead - then if then >= 0 and not blow else 0.0)

@@ -162,17 +162,17 @@ class Polar:
             row[:, -1] = self._lead
         for k, fluid in enumerate(omega_0):
             some = self._drive(fluid, *self._arguments)
-            lands = [(run, self._where(run), self._gaps[:, run].copy()) for run in self._landing()] if some else []
+            lands = [(run, *self._where(run), self._gaps[:, run].copy()) for run in self._landing()] if some else []
             self._last[:] = self._qvel
             self._step()
             self._held[:] = self._due[:] = False
             if sensors is not None:
                 sensors[k] = self._sensors
-            for run, (x, theta), gaps in lands:
-                landed = self._finely(self._parameters[run]).step(x, theta, float(fluid[run]))
+            for run, x, theta, rates, gaps in lands:
+                landed = self._finely(self._parameters[run]).step(x, theta, rates, float(fluid[run]))
                 self._land(run, landed)
                 if sensors is not None:
-                    sensors[k, run] = landed.seen[0]
+                    sensors[k, run] = landed.seen
                     sensors[k, run, -2:] = gaps
         if row is not None and sensors is not None:
             row[:, recorder.SENSORS : -1] = sensors[0]
@@ -183,11 +183,12 @@ class Polar:
         runs: list[int] = np.flatnonzero(self._due & sound).tolist()
         return runs
 
-    def _where(self, run: int) -> tuple[State, float]:
-        """State and azimuth of a run at the time of its velocities."""
+    def _where(self, run: int) -> tuple[State, float, Array]:
+        """State and azimuth of a run at the time of its velocities, and what a second changes of these."""
         qpos, v, lead = self._qpos[:, run].copy(), self._qvel[:, run], self._lead
-        qpos[:3] -= lead * (v + (v - self._last[:, run]) / self._h * lead / 2)[:3]
-        return recorder.state(qpos, v, self._parameters[run]), float(qpos[0])
+        rates = (v - self._last[:, run]) / self._h
+        qpos[:3] -= lead * (v + rates * lead / 2)[:3]
+        return recorder.state(qpos, v, self._parameters[run]), float(qpos[0]), rates
 
     def _land(self, run: int, landed: Landed) -> None:
         """Go on after a step in fine ones: upon the joints, if forces change slowly and the axis is far."""

@@ -56,6 +56,19 @@ def outwards(place: Any, velocity: Any, ahead: float) -> tuple[float, float]:
     return (x / rho, y / rho) if rho > 0 else (0.0, 0.0)
 
 
+def joint_velocities(place: Any, turned: Any, velocity: Any, ahead: float) -> tuple[float, ...]:
+    """Velocities of the joint chain, as `recorder.joint_state` has them, along the axes of where the ball was."""
+    out_x, out_y = outwards(place, velocity, ahead)
+    (o_x, o_y, o_z), (v_x, v_y) = spun(turned, velocity), (velocity[0], velocity[1])
+    v_h = -out_x * v_x - out_y * v_y
+    rho = math.hypot(place[0], place[1]) + ahead * v_h
+    omega_c = (out_x * v_y - out_y * v_x) / rho if rho > 0 else math.nan
+    return (
+        omega_c, v_h, velocity[2],
+        -out_x * o_x - out_y * o_y, o_z - omega_c, out_x * o_y - out_y * o_x,
+    )  # fmt: skip
+
+
 def against(place: Any, velocity: Any, spin: Any, ahead: float, R: float, r: float) -> tuple[float, float, float]:
     """Velocity of a plane inwards, onwards and upwards, m/s, at which what is at rest against it is so against the
     cylinder `ahead` s later, when velocities are where the place is now.

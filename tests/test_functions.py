@@ -38,8 +38,7 @@ EXCEPTIONS = {
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "explicit")),
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "implicit")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
-    *("mjsim/compiled.py:drive", "mjsim/stepping.py:drive"),
-    *("mjsim/compiled_free.py:_advance", "mjsim/compiled_free.py:advance"),
+    *("mjsim/compiled.py:drive", "mjsim/stepping.py:drive", "mjsim/landing.py:through"),
     *("mjsim/coulomb/compiled.py:_holds", "mjsim/coulomb/compiled.py:_put_back", "mjsim/corrections.py:corrections"),
     "mjsim/world_axes.py:driven",
     # what an exact case is made of

@@ -10,7 +10,6 @@ import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
@@ -54,7 +53,6 @@ WAYS: dict[str, tuple[Way, AbstractContextManager[object]]] = {
     "forces of the beginning of a step (order 1)": (_without(order=1), nullcontext()),
     "friction damped as strongly however fast the slip (hover 0)": (_without(hover=0.0), nullcontext()),
     "contacts as fast on rough balls": (lambda p: ContactSettings.at(STEP), nullcontext()),
-    "a landing in 16 steps of the law in the place of 128": (_usual, patch("mjsim.landing.FINE", 16)),
     "landings left to the contacts": (_landings_left, nullcontext()),
 }
 """How a ball is simulated, each with one thing taken away."""

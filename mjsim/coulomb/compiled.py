@@ -380,7 +380,7 @@ def control(m: int, d: int, head: int) -> None:
         _turn(m, d, head, since)
     _hold(m, d, head)
     enough = numbers[SHARE] * _gravity(m)
-    if _foresee(m, d, head, enough):
+    if _foresee(m, d, head, enough) or not known:
         _solve(m, d, head, enough)
     elif numbers[RIGID]:
         _slide_on(m, d, head)
@@ -395,9 +395,10 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
     kept, start, last = _block(head, KEPT), _array(d, START), math.inf
     mj_fwdActuation(m, d)
     mj_fwdAcceleration(m, d)
-    for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
-        kept[W * i + law.GUESS] = -1.0
+    slides = numbers[RIGID] > 0
     for _ in range(numbers[MOST]):
+        for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
+            kept[W * i + law.GUESS] = -1.0
         _refer(m, d, head)
         mj_fwdConstraint(m, d)
         counts[SOLVES] += 1
@@ -407,7 +408,13 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
         worst = _weigh(m, d, head)
         _take_over(m, d, head)
         if worst <= 1e-6 * enough or (worst <= enough and (not numbers[RIGID] or worst > 0.1 * last)):
-            break
+            if not slides:
+                break
+            _multiply(m, head, qacc)
+            _lack(head)
+            if not _slide_on(m, d, head):
+                break
+            slides, worst = False, math.inf
         last = worst
 
 
@@ -939,15 +946,21 @@ def _slip(rows: Any, r: int, length: int, elliptic: bool, axes: Any, mu: int) ->
 
 
 @compiled
+def _lack(head: int) -> None:
+    """What accelerations J a lack of the reference, as `RESIDUAL`."""
+    counts, rows = _int64(head), _block(head, ROWS)
+    for r in range(0, ROW * counts[COUNT_ROWS], ROW):
+        rows[r + RESIDUAL] -= rows[r + REFERENCE]
+        rows[r + FOUND] = 0.0
+
+
+@compiled
 def _foresee(m: int, d: int, head: int, enough: float) -> bool:
     """Foresee slip from the velocities now and the accelerations of the last step; whether that is in doubt."""
     counts, elliptic, rigid, gravity = _int64(head), _elliptic(m), _real(head)[RIGID] > 0, _gravity(m)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    diagonal = _array(d, DIAG)
-    for r in range(0, ROW * counts[COUNT_ROWS], ROW):
-        rows[r + RESIDUAL] -= rows[r + REFERENCE]
-        rows[r + FOUND] = 0.0
-    doubt = False
+    diagonal, doubt = _array(d, DIAG), False
+    _lack(head)
     for i in range(counts[COUNT]):
         k, r, length, state = W * i, ROW * places[4 * i + AT], places[4 * i + LENGTH], kept[W * i + law.STATE]
         slip = _slip(rows, r, length, elliptic, axes, 24 * i + 18)
@@ -977,11 +990,11 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
 
 
 @compiled
-def _slide_on(m: int, d: int, head: int) -> None:
-    """Friction of what slides on opposes its slip in the middle of the step, see `Law.fast`."""
+def _slide_on(m: int, d: int, head: int) -> bool:
+    """Friction of what slides on opposes its slip in the middle of the step, see `Law.fast`; whether anything does."""
     counts, elliptic, h = _int64(head), _elliptic(m), _value(m, STEP)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    velocity = _array(d, VEL)
+    velocity, some = _array(d, VEL), False
     for i in range(counts[COUNT]):
         k, a, r, length = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT], places[4 * i + LENGTH]
         if kept[k + law.STATE] != law.SLIDES or kept[k + law.SLIP] == 0:
@@ -1002,7 +1015,8 @@ def _slide_on(m: int, d: int, head: int) -> None:
             rows[r + ROW * e + REFERENCE] -= more
             rows[r + ROW * e + RESIDUAL] += more
         kept[k + law.GUESS] = _slip(rows, r, length, elliptic, axes, mu)
-        kept[k + law.SLIP] = max(kept[k + law.GUESS] + kept[k + law.MISS], 0.0)
+        kept[k + law.SLIP], some = max(kept[k + law.GUESS] + kept[k + law.MISS], 0.0), True
+    return some
 
 
 @compiled
@@ -1230,13 +1244,32 @@ retain_linked = _function("retain", *(types.intp,) * 3)
 
 
 @compiled
+def step(m: int, d: int, head: int) -> None:
+    mj_step1(m, d)
+    control_linked(m, d, head)
+    mj_step2(m, d)
+    retain_linked(m, d, head)
+
+
+@compiled
 def advance(m: int, d: int, head: int, nstep: int) -> None:
     """So many steps."""
     for _ in range(nstep):
-        mj_step1(m, d)
-        control_linked(m, d, head)
-        mj_step2(m, d)
-        retain_linked(m, d, head)
+        step(m, d, head)
+
+
+@compiled
+def step_of(m: int, d: int, head: int, duration: float, anew: bool) -> None:
+    """A step of so many seconds, with nothing remembered or with what is."""
+    _real(m + _at(STEP))[0] = duration
+    if anew:
+        _reset(head)
+    step(m, d, head)
+
+
+@compiled
+def _reset(head: int) -> None:
+    _real(head)[MOMENT], _int64(head)[PENDING], _int64(head)[TURNED] = math.nan, 0, 0
 
 
 @compiled

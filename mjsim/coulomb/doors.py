@@ -31,11 +31,13 @@ class Coulomb:
         Jean's time stepping, in which contacts have no depth to speak of and land within one step. Geoms get a `margin`
         in which contacts are seen ahead, but bear nothing: at least the way of a step at the speed of a fall through
         the scene, or a fifth of their radius. Dampers become inertia, of the same effect, which contacts know: the
-        integrator is Euler's from then on. Both are for the model's time step as it is now.
+        integrator is Euler's from then on. Margins are for steps up to the model's as it is now, dampers for that one.
     restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
     servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It needs geoms with
         a `margin`, more than bodies sink in, of which an open contact then takes no notice; and it must be slower than
         the contact, best five times the time constant of `solref`.
+    share : share of gravity to which a step must know beforehand how contacts slip, and what rigid ones bear; if it
+        doesn't, it is solved again
 
     What is remembered belongs to one simulation: make one for each `MjData` (under `installed` that is done for you).
     It takes part in the state of the simulation, so save and restore both. Contacts of flexes are left as they are.
@@ -47,7 +49,13 @@ class Coulomb:
     """
 
     def __init__(
-        self, model: Any, *, rigid: bool = False, restitution: float = 0.0, servo: float | None = None
+        self,
+        model: Any,
+        *,
+        rigid: bool = False,
+        restitution: float = 0.0,
+        servo: float | None = None,
+        share: float = Law.share,
     ) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ValueError(f"model is a {type(model).__name__}; a mujoco.MjModel is needed")
@@ -58,12 +66,13 @@ class Coulomb:
             _check_number("servo", servo, " s", float(model.opt.timestep), math.inf)
             if rigid:
                 raise ValueError("servo is for soft contacts: rigid ones have no depth")
-        self.model, self._law = model, Law(rigid, float(restitution), servo or 0.0)
-        self._step = float(model.opt.timestep)
+        _check_number("share", share, "", 1e-9, 1.0)
+        self.model, self._law = model, Law(rigid, float(restitution), servo or 0.0, float(share))
+        self._step, self._damped = float(model.opt.timestep), False
         self._check()
         if rigid:
             _see_ahead(model)
-            _damp_at_the_end(model)
+            self._damped = _damp_at_the_end(model)
         self._own = kernels.Simulation(model, self._law)
         self._adopted: dict[int, Any] | None = None
 
@@ -73,7 +82,7 @@ class Coulomb:
         if name not in _INTEGRATORS or (name == "RK4" and self._law.rigid):
             why = "is of another order than blows" if name == "RK4" else "computes reference accelerations of its own"
             raise ValueError(f"integrator = {name} {why}; Coulomb's law needs Euler, implicit or implicitfast")
-        if self._law.rigid and option.timestep != self._step:
+        if self._law.rigid and (option.timestep > self._step or (self._damped and option.timestep != self._step)):
             raise ValueError(
                 f"timestep = {option.timestep:g} s was {self._step:g} s when Coulomb(…, rigid=True) was made"
             )
@@ -132,7 +141,7 @@ class Coulomb:
         self._own.advance(self.model, data, nstep)
 
     def addresses(self, data: Any) -> tuple[int, int, int]:
-        """Of model, data and what is remembered, for compiled loops that take steps by `compiled.control`."""
+        """Of model, data and what is remembered, for compiled loops that take steps by `compiled.step_of`."""
         self._begin(data)
         return self.model._address, data._address, self._own.serve(data._address)
 
@@ -234,27 +243,30 @@ def _see_ahead(model: Any) -> None:
     np.maximum(model.pair_margin, np.minimum(ahead, most[np.array(pairs)].max(axis=0)), out=model.pair_margin)
 
 
-def _damp_at_the_end(model: Any) -> None:
+def _damp_at_the_end(model: Any) -> bool:
     """Dampers, at the speed after a step, as inertia: h times their damping; the integrator becomes Euler's.
+
+    Returns whether there are any.
 
     That is what MuJoCo's integrators do, but only after contacts have been solved for, so that velocities are not those
     which contacts asked for. Of implicit integrators the dampers of joints, tendons and servos on them are kept.
     """
     option, euler, h = model.opt, mujoco.mjtIntegrator.mjINT_EULER, model.opt.timestep
-    implicit = option.integrator != euler
+    implicit, joints = option.integrator != euler, np.zeros(model.nv)
+    tendons = h * implicit * model.tendon_damping
     if implicit or not option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
-        model.dof_armature += h * model.dof_damping
+        joints += h * model.dof_damping
     option.integrator = euler
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-    if not implicit:
-        return
-    tendons = h * model.tendon_damping
-    for k in np.flatnonzero(model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)).tolist():
+    servos = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    for k in np.flatnonzero(servos & implicit).tolist():
         servo = -h * model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
         kind, target = mujoco.mjtTrn(model.actuator_trntype[k]), model.actuator_trnid[k, 0]
         if kind == mujoco.mjtTrn.mjTRN_TENDON:
             tendons[target] += servo
         elif kind == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[target] >= int(mujoco.mjtJoint.mjJNT_SLIDE):
-            model.dof_armature[model.jnt_dofadr[target]] += servo
+            joints[model.jnt_dofadr[target]] += servo
+    model.dof_armature += joints
     if hasattr(model, "tendon_armature"):  # MuJoCo 3.3.0 has none
         model.tendon_armature += tendons
+    return bool(joints.any() or tendons.any())

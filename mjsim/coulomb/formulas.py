@@ -158,7 +158,7 @@ class Simulation:
         self._hold()
         enough = numbers.share * _gravity(model)
         residual = acceleration - self._reference
-        if self._foresee(model, data, residual, enough):
+        if self._foresee(model, data, residual, enough) or not known:
             self._solve(model, data, enough)
         elif numbers.rigid:
             self._slide_on(model, data, residual, acceleration)
@@ -168,8 +168,9 @@ class Simulation:
         """Solve the step until slip is as foreseen, to `enough`, m s-2."""
         mujoco.mj_fwdActuation(model, data)
         mujoco.mj_fwdAcceleration(model, data)
-        last, self._kept[law.GUESS] = math.inf, -1.0  # what a blow does says nothing of the next step
+        last, slides = math.inf, self._law.rigid
         for _ in range(self._law.most):
+            self._kept[law.GUESS] = -1.0  # what a blow does says nothing of the next step
             self._refer(data)
             mujoco.mj_fwdConstraint(model, data)
             data.qacc_warmstart[:] = data.qacc
@@ -177,7 +178,10 @@ class Simulation:
             self._take_over()
             worst = self._kept[law.ERROR].max(initial=0.0)
             if worst <= 1e-6 * enough or (worst <= enough and (not self._law.rigid or worst > 0.1 * last)):
-                break
+                acceleration = self._multiply(data.qacc)
+                if not slides or not self._slide_on(model, data, acceleration - self._reference, acceleration):
+                    break
+                slides, worst = False, math.inf
             last = worst
 
     # -- contacts and their rows ---------------------------------------------------------------------------------------
@@ -471,8 +475,9 @@ class Simulation:
             doubt = bool(((most > _gravity(model)) & (state > law.OPEN)).any())
         return doubt
 
-    def _slide_on(self, model: Any, data: Any, residual: Array, acceleration: Array) -> None:
-        """Friction of what slides on opposes its slip in the middle of the step, see `Law.fast`."""
+    def _slide_on(self, model: Any, data: Any, residual: Array, acceleration: Array) -> bool:
+        """Friction of what slides on opposes its slip in the middle of the step, see `Law.fast`; whether anything
+        does."""
         kept, h, velocity = self._kept, model.opt.timestep, data.efc_vel[self._rows]
         speed, change = (self._sizes(values) for values in (velocity, acceleration))
         fast = (kept[law.STATE] == law.SLIDES) & (kept[law.SLIP] > 0) & (speed > self._law.fast * h * change)
@@ -484,6 +489,7 @@ class Simulation:
             self._reference = self._reference - more
             kept[law.GUESS, fast] = self._slip(residual + more)[fast]
             kept[law.SLIP, fast] = np.maximum(kept[law.GUESS, fast] + kept[law.MISS, fast], 0.0)
+        return bool(fast.any())
 
     def _sizes(self, values: Array) -> Array:
         """Of each contact, what its rows have along all directions of friction, times its coefficients."""
