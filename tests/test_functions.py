@@ -34,9 +34,9 @@ EXCEPTIONS = {
     *("mjsim/engine.py:__init__", "mjsim/engine.py:simulate", "mjsim/engine.py:simulate_many"),
     *("compare/validation.py:validate", "compare/view/render.py:write"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
-    *("analytic/simulation/charts.py:_motion", "analytic/simulation/equations.py:_forces"),
-    *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "explicit")),
-    *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "implicit")),
+    *("analytic/simulation/equations.py:forces", "analytic/simulation/equations.py:straight"),
+    *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "_explicit")),
+    *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "_implicit", "stretch")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
     *("mjsim/compiled.py:drive", "mjsim/stepping.py:drive", "mjsim/landing.py:through"),
     *("mjsim/coulomb/compiled.py:_holds", "mjsim/coulomb/compiled.py:_put_back", "mjsim/corrections.py:corrections"),

@@ -8,8 +8,20 @@ import pytest
 
 SAME = {
     # what every subject, file format, adapter or page has
-    *("CAPTION", "CLAIMS", "DEFAULTS", "FIGURES", "PROTOCOL", "PROTOCOLS", "SCHEMA", "SCHEMA_VERSION", "SECTIONS"),
+    *(
+        "CAPTION",
+        "CLAIMS",
+        "DEFAULTS",
+        "FIGURES",
+        "PROTOCOL",
+        "PROTOCOLS",
+        "SCHEMA",
+        "SCHEMA_VERSION",
+        "SECTIONS",
+        "TEXT",
+    ),
     *("Scene", "Settings", "best", "defaults", "free"),
+    "TEXT",  # what is compiled
     "Simulation",  # under Coulomb's law, compiled and as formulas
     # the same, with another value: degrees of polynomials, records, random numbers, units and symbols of other names
     *("DEGREES", "EPS", "FEWEST", "G", "LEAST", "LISTED", "PATIENCE", "PUSH", "REFINED", "RTOL", "SEED", "SET"),

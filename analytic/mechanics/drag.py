@@ -3,8 +3,8 @@
 With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|): Stokes' has the first
 term alone, the quadratic one the last. So c never decreases with |w|, and a drag force determines the speed.
 
-The laws take floats or arrays, and complex ones for derivatives by complex steps. `simulation.stepping` compiles
-`rate`.
+The laws take floats or arrays, and complex ones for derivatives by complex steps. `simulation` compiles `rate` and
+the fall.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 """Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
 SPEED_STEPS = 8
 """Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner of `Law`."""
+FALL_STEPS = 100
+"""Most steps of it to the end of a fall, far more than it takes."""
 
 
 class Law(NamedTuple):
@@ -117,32 +119,41 @@ def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity:
     return heavier / (6 * math.pi * rho_f * nu_f * r)
 
 
-def fall(t: Any, y: float, v_y: float, p: Parameters) -> tuple[Any, Any]:
-    """Height (m) and vertical velocity (m s-1) after a time t (s, float or array) of flight with Stokes' drag."""
+def fall(t: Any, y: float, v_y: float, p: Any) -> tuple[Any, Any]:
+    """Height (m) and vertical velocity (m s-1) after a time t (s, float or array) of flight with Stokes' drag.
+
+    p : anything with c and g
+    """
     return y + v_y * t - (p.c * v_y + p.g) * t**2 * ramp_lag(p.c * t), fall_speed(t, v_y, p)
 
 
-def fall_speed(t: Any, v_y: float, p: Parameters) -> Any:
+def fall_speed(t: Any, v_y: float, p: Any) -> Any:
     """The vertical velocity of `fall` alone."""
-    decay = (math.expm1(-p.c * t) if isinstance(t, float) else np.expm1(-p.c * t)) / -p.c if p.c else t
+    decay = (math.expm1(-p.c * t) if isinstance(t, float) else np.expm1(-p.c * t)) / -p.c if p.c > 0 else t
     return v_y - (p.c * v_y + p.g) * decay
 
 
-def fall_time(y: float, v_y: float, p: Parameters) -> float:
-    """Time until a flight with Stokes' drag ends on the floor, s; y >= 0, and v_y > 0 if y = 0."""
-    from scipy.optimize import brentq  # here, because the closed forms don't wait for it to load
+def fall_time(y: float, v_y: float, p: Any) -> float:
+    """Time until a flight with Stokes' drag ends on the floor, s; y >= 0, and v_y > 0 if y = 0.
 
-    free = (v_y + math.sqrt(v_y**2 + 2 * p.g * y)) / p.g
-    if free == 0:
+    By Newton's method, which comes from where the path bends to: from below the floor, or from the start of a ball that
+    falls faster than it sinks.
+    """
+    time: float = (v_y + math.sqrt(v_y**2 + 2 * p.g * y)) / p.g
+    bends_down: bool = p.c * v_y + p.g > 0
+    if time == 0:
         return 0.0
-
-    low, high = 0.0, free
-    if v_y > 0:  # from the top on
-        low = math.log1p(p.c * v_y / p.g) / p.c if p.c > 0 else v_y / p.g
-    while fall(high, y, v_y, p)[0] > 0:
-        low, high = high, 2 * high
-    eps = math.ulp(1.0)
-    return float(brentq(lambda t: float(fall(t, y, v_y, p)[0]), low, high, xtol=4 * eps * high, rtol=4 * eps))
+    if not bends_down:
+        time = 0.0
+    while bends_down and fall(time, y, v_y, p)[0] > 0:
+        time *= 2
+    for _ in range(FALL_STEPS):
+        height, speed = fall(time, y, v_y, p)
+        after = time - height / speed
+        if (after >= time) if bends_down else (after <= time):  # round-off is left
+            break
+        time = after
+    return time
 
 
 def ramp_lag(s: Any) -> Any:
@@ -153,3 +164,7 @@ def ramp_lag(s: Any) -> Any:
     small = np.abs(s) < 1e-2
     safe = np.where(small, 1.0, s)
     return np.where(small, series, (safe + np.expm1(-safe)) / safe**2)
+
+
+TEXT = (rate, ramp_lag, fall_speed, fall, fall_time)
+"""What `simulation` compiles where numba is installed."""

@@ -60,22 +60,18 @@ def slip_margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | 
     """How far RR is from the onset of a slip that lasts, in units of m g: >= 0 where slip dies out.
 
     Two slacks: of the wall's friction that must drive the spin (66), and of the floor's cone once the wall carries
-    `last_share` of the weight. Continuous; never beyond the zero of `margin`. docs/theory.md derives it.
+    `_last_share` of the weight. Continuous; never beyond the zero of `margin`. docs/theory.md derives it.
     """
     u, z = _loads(omega_c, p, omega_0)
     share = _last_share(u, z, p)
     return np.asarray(np.minimum(p.eta * (1 + p.j) * u - z, p.mu * (1 - share) - np.hypot(p.j * u - share, z)))
 
 
-def last_share(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+def _last_share(u: Array, z: Array, p: Parameters) -> Array:
     """B_y in units of m g at which RR ends: the most that the wall's cone allows, up to j u, which turns the spin axis.
 
     0 where the cone has nothing left, beyond (66).
     """
-    return _last_share(*_loads(omega_c, p, omega_0), p)
-
-
-def _last_share(u: Array, z: Array, p: Parameters) -> Array:
     k = (1 + p.j) * u
     return np.asarray(np.minimum(np.maximum(k - _normal_forces(k, z, p.eta)[0], 0.0), p.j * u))
 

@@ -289,7 +289,7 @@ def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Ar
     One thread; p.c must be positive.
     """
     lasts, quiet = DURATION / p.c, QUIET / p.c
-    settings = Settings(timestep=fitting_step(STEPS, p, Flow.steady(p.omega_0), lasts))
+    settings = Settings(method="time-stepping", timestep=fitting_step(STEPS, p, Flow.steady(p.omega_0), lasts))
     runs = simulate_many(p, x0s, lasts, settings=settings, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
     failed = np.array([bool(each) for each in runs.failure])
     hops = np.any(runs.landings[:, -LOOKS:] > 0, axis=1) & ~failed

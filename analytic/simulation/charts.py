@@ -1,4 +1,4 @@
-"""Coordinates in which the motion of each case is regular, its equations in them, and what can end it.
+"""Coordinates in which the motion of each case is regular, and what can end it; `equations` has their rates.
 
 At the wall these are the active variables of the case (Table 4), except that each slip is given by its speed q and its
 direction (alpha at A, beta at B): friction depends on the direction alone, so that the rates have limits as the slip
@@ -10,133 +10,256 @@ Away from the wall (RN, SN, NN) the frame rests, so that the vessel's axis is no
 is kept in complex numbers: position Z = rho e^(i theta), and (a, b) along the paper's i, k becomes
 e^(i theta)(-a + i b); coordinates are their real and imaginary parts. The spin about the vertical never changes.
 
-The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J. `equations` has their rates.
+The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J. Compiled where numba is
+installed, like `equations`.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from analytic.mechanics import drag
-from analytic.mechanics.rigid_body import Velocities, state, velocities
-from analytic.simulation.equations import FEASIBILITY, STABILITY, Motion
-from analytic.simulation.motion import Chart, Fluid, Moment, Path, natural_units
-from model import Case, Contact, Parameters, State
+from analytic.mechanics import drag, rigid_body
+from analytic.simulation import equations
+from analytic.simulation.equations import (
+    A_LANDS,
+    A_LIFTS,
+    A_SLIPS,
+    A_STICKS,
+    AWAY,
+    B_LANDS,
+    B_OPENS,
+    B_SLIPS,
+    B_STICKS,
+    FINER,
+    NN,
+    NO_FALL,
+    NS,
+    RN,
+    RR_ENDS,
+    RS,
+    SLIPS,
+    SN,
+    SR,
+    SS,
+    Fall,
+    Motion,
+)  # fmt: skip
+from analytic.simulation.motion import Moment, Path
+from model import State
 from model.arrays import Array
-from model.drag import STOKES
-from model.kinematics import SLIP_XYZ
 
-ENDS = {
-    Case.RR: ("RR ends",),
-    Case.RS: ("B sticks", "A slips"),
-    Case.SR: ("A sticks", "B slips", "A lifts"),
-    Case.SS: ("A sticks", "B sticks", "A lifts", "B opens"),
-    Case.NR: ("A lands", "B slips"),
-    Case.NS: ("A lands", "B sticks"),
-    Case.RN: ("A slips", "B lands"),
-    Case.SN: ("A sticks", "B lands"),
-    Case.NN: ("B lands", "A lands"),
-}
-"""What can end each case; at the wall what the coordinates show first, then what forces do."""
-LEAVES = {"slip-stability": STABILITY, "infeasible": FEASIBILITY}
-
-
-def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float, leave_rolling: str) -> Chart:
-    """The chart of a case that starts at a moment; when RR ends is for `leave_rolling` to say, as in `Settings`.
-
-    `floor` is the slip in natural units below which the turning rate of its direction is capped: the rate is inverse to
-    the slip, and directions settle before the slip vanishes.
-    """
-    if case.B is Contact.N:
-        return _away_from_wall(case, at, p, omega_0, floor)
-    return _at_wall(case, at, p, omega_0, floor, leave_rolling)
+MOST = 8
+"""Most coordinates of a case."""
+NONE = -1
+ENDS = (
+    (RR_ENDS, NONE, NONE, NONE),
+    (B_STICKS, A_SLIPS, NONE, NONE),
+    (A_SLIPS, B_LANDS, NONE, NONE),
+    (A_STICKS, B_SLIPS, A_LIFTS, NONE),
+    (A_STICKS, B_STICKS, A_LIFTS, B_OPENS),
+    (A_STICKS, B_LANDS, NONE, NONE),
+    (A_LANDS, B_SLIPS, NONE, NONE),
+    (A_LANDS, B_STICKS, NONE, NONE),
+    (B_LANDS, A_LANDS, NONE, NONE),
+)
+"""What can end each case, by its number; at the wall what the coordinates show first, then what forces do."""
+TURNING = ((0, 0), (0, 0), (0, 0), (0, 0), (2, 6), (4, 6), (0, 0), (5, 7), (0, 0))
+"""Of each case where among the coordinates slips begin and end that turn; each is followed by its direction."""
 
 
-def _motion(
-    case: Case, p: Parameters, omega_0: Fluid, floor: float, *, side: float = 0.0, leaves: str = "slip-stability",
-    falls: bool = False, since: float = 0.0, v_y: float = 0.0,
-) -> Motion:  # fmt: skip
-    """What the rates depend on, as plain numbers."""
-    ball = {name: float(getattr(p, name)) for name in ("m", "r", "R", "j", "mu", "eta", "g")}
-    line = {name: float(getattr(omega_0, name)) for name in ("start", "value", "slope")}
-    unit, _, spin, _ = natural_units(p)
-    return Motion(
-        int(case), **ball, law=drag.Law(*map(float, drag.law(p))), **line, waves=omega_0.waves, floor=floor, side=side,
-        leaves=LEAVES[leaves], falls=falls, since=since, v_y=v_y, unit=unit, spin=spin,
-    )  # fmt: skip
+def count_ends(k: Motion) -> int:
+    """How many guards the motion has; the landing of a fall that is known needs none."""
+    if k.case == NN:
+        return 1 if k.fall.landing < math.inf else 2
+    count = 0
+    for end in ENDS[k.case]:
+        if end != NONE:
+            count += 1
+    return count
 
 
-def _at_wall(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float, leave_rolling: str) -> Chart:
+def begin(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+    """The motion in a case from a moment on; its coordinates then and their natural sizes are written; their number."""
+    if case % 3 == AWAY:
+        return _away_from_wall(case, at, k, z, scale)
+    return _at_wall(case, at, k, z, scale)
+
+
+def _at_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
     """(theta; omega_c, off the floor y, v_y, omega_c, slip_x; speed and direction of each slip; work)."""
-    T, v, w, E = natural_units(p)
-    turns, free = case in (Case.SS, Case.NS), slice(0, 4) if case.A is Contact.N else slice(2, 3)
-    start, scale = [at.theta, *at.x[free]], [1.0, *[p.R, v, 1 / T, w][free]]
-    first = len(start)
-    points = (case.A, SLIP_XYZ.start, at.alpha), (case.B, SLIP_XYZ.start + 1, at.beta)
-    slips = [(k, angle) for contact, k, angle in points if contact is Contact.S]
-    for k, angle in slips:
-        start += [math.hypot(at.x[k], at.x.slip_z)] + [angle] * turns
-        scale += [w] + [1.0] * turns
-    side = math.copysign(1.0, math.sin(slips[0][1])) if slips and not turns else 0.0
-
-    def path(t: Array, z: Array) -> Path:
-        x = [np.zeros_like(t)] * len(State._fields)
-        x[free], speeds = list(z[1:first]), z[first:-1]
-        angles = [np.full_like(t, angle) for _, angle in slips]
+    x, turns, side, n = at.x, case in (SS, NS), 0.0, 2
+    z[0], scale[0] = at.theta, 1.0
+    if case // 3 == AWAY:
+        z[1], z[2], z[3], z[4], n = x.y, x.v_y, x.omega_c, x.slip_x, 5
+        scale[1], scale[2], scale[3], scale[4] = k.R, k.R / k.unit, 1 / k.unit, k.spin
+    else:
+        z[1], scale[1] = x.omega_c, 1 / k.unit
+    if case // 3 == SLIPS:
+        z[n], scale[n], side = math.hypot(x.slip_x, x.slip_z), k.spin, math.copysign(1.0, math.sin(at.alpha))
+        n += 1
         if turns:
-            speeds, angles = speeds[::2], list(z[first + 1 : -1 : 2])
-            x[SLIP_XYZ.stop - 1] = speeds[0] * np.cos(angles[0])
-        for (k, _), q, angle in zip(slips, speeds, angles, strict=True):
-            x[k] = q * (np.sin(angle) if turns else side)
-        own = {k: angle for (k, _), angle in zip(slips, angles, strict=True)}
-        alpha, beta = (own.get(k, np.full_like(t, math.nan)) for _, k, _ in points)
-        return Path(t, z[0], State(*x).stacked(), alpha, beta, z[-1])
+            z[n], scale[n] = at.alpha, 1.0
+            n += 1
+    if case % 3 == SLIPS:
+        z[n], scale[n], side = math.hypot(x.slip_y, x.slip_z), k.spin, math.copysign(1.0, math.sin(at.beta))
+        n += 1
+        if turns:
+            z[n], scale[n] = at.beta, 1.0
+            n += 1
+    z[n], scale[n] = at.work, k.m * k.g * k.R
+    return equations.changed(k, case, side, k.line, NO_FALL), n + 1
 
-    own = tuple(range(first, len(start), 2)) if turns else ()
-    motion = _motion(case, p, omega_0, floor, side=side, leaves=leave_rolling)
-    return Chart([*start, at.work], [*scale, E], motion, ENDS[case], path, slips=own)
 
-
-def _away_from_wall(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
+def _away_from_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
     """(Z, dZ/dt; in SN speed of the lowest point and its direction in the resting frame; in NN y, v_y; work).
 
     In RN the spin follows; in NN all of it rests, and with Stokes' drag the fall is known (`drag.fall`). With another
     law c depends on all components of the velocity.
     """
-    _, v, _, E = natural_units(p)
-    turn, u = cmath.exp(1j * at.theta), velocities(at.x, p)
-    Z_0, V_0, spin = (p.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k), turn * complex(-u.o_x, u.o_z)
-    start, scale = [Z_0.real, Z_0.imag, V_0.real, V_0.imag], [p.R, p.R, v, v]
-    falls, ends, landing = case is Case.NN and p.drag == STOKES, ENDS[case], math.inf
-    if case is Case.SN:  # at the onset the speed is zero and only alpha tells its direction
-        phase = cmath.phase(turn * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
-        start, scale = [*start, abs(V_0 + 1j * p.r * spin), phase], [*scale, v, 1.0]
-    elif falls:
-        ends, landing = ends[:1], at.time + drag.fall_time(at.x.y, at.x.v_y, p)
-    elif case is Case.NN:
-        start, scale = [*start, at.x.y, at.x.v_y], [*scale, p.R, v]
+    turn, u, speed, n, fall = cmath.exp(1j * at.theta), rigid_body.velocities(at.x, k), k.R / k.unit, 4, NO_FALL
+    place, moves = (k.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k)
+    z[0], z[1], z[2], z[3] = place.real, place.imag, moves.real, moves.imag
+    scale[0], scale[1], scale[2], scale[3] = k.R, k.R, speed, speed
+    if case == SN:  # at the onset the speed is zero and only alpha tells its direction
+        z[4] = abs(moves + 1j * k.r * (turn * complex(-u.o_x, u.o_z)))
+        z[5] = cmath.phase(turn * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
+        scale[4], scale[5], n = speed, 1.0, 6
+    elif case == NN and k.stokes:
+        fall = Fall(at.time, at.x.v_y, at.time + drag.fall_time(at.x.y, at.x.v_y, k))
+    elif case == NN:
+        z[4], z[5], scale[4], scale[5], n = at.x.y, at.x.v_y, k.R, speed, 6
+    z[n], scale[n] = at.work, k.m * k.g * k.R
+    return equations.changed(k, case, 0.0, k.line, fall), n + 1
 
-    def path(t: Array, z: Array) -> Path:
-        Z, V, more = z[0] + 1j * z[1], z[2] + 1j * z[3], z[4:-1]
-        rho, back, none = np.abs(Z), np.conj(Z) / np.abs(Z), np.full_like(t, math.nan)
-        y, v_y = more if case is Case.NN and not falls else np.zeros((2, len(t)))
-        if falls:
-            y, v_y = drag.fall(t - at.time, at.x.y, at.x.v_y, p)
-        slide = more[0] * np.exp(1j * more[1]) if case is Case.SN else 0.0
-        turned = np.full(len(t), spin) if case is Case.NN else (slide - V) / (1j * p.r)
-        V, turned = V * back, turned * back
-        u_t = Velocities(-V.real, v_y, V.imag, -turned.real, u.o_y, turned.imag)
-        x = state(y, p.R - rho, u_t, p)._replace(omega_c=V.imag / rho)  # rho = R - h to the last digit
-        if case is Case.RN:  # slip_x = 0 and v_h + r slip_z = 0 hold exactly
-            x = x._replace(slip_x=0.0, slip_z=-x.v_h / p.r)
-        # e^(i theta)(-a + i b) with a, b along the cosine and minus the sine of alpha (6), (8).
-        alpha = np.arctan2(-(slide * back).imag, -(slide * back).real) if case is Case.SN else none
-        theta = np.unwrap(np.append(at.theta, np.angle(Z)))[1:]
-        return Path(t, theta, x.stacked(), alpha, none, z[-1])
 
-    own = (4,) if case is Case.SN else ()
-    motion = _motion(case, p, omega_0, floor, falls=falls, since=at.time, v_y=float(at.x.v_y))
-    return Chart([*start, at.work], [*scale, E], motion, ends, path, landing, own)
+def moment(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
+    """The moment at a time with coordinates z in a case that began `at` another; or moments, from times (m,) and z
+    (n, m), as a `Moment` of arrays and of numbers that stay. An azimuth off the wall is one of many."""
+    if k.case % 3 == AWAY:
+        return _off_the_wall(t, z, at, k)
+    y, v_y, omega_c, w_x, w_y, w_z, alpha, beta = 0.0, 0.0, z[1], 0.0, 0.0, 0.0, math.nan, math.nan
+    if k.case // 3 == AWAY:
+        y, v_y, omega_c, w_x = z[1], z[2], z[3], z[4]
+    if k.case == SR:
+        w_x, alpha = k.side * z[2], at.alpha
+    elif k.case == RS:
+        w_y, beta = k.side * z[2], at.beta
+    elif k.case == SS:
+        alpha, beta = z[3], z[5]
+        w_x, w_y, w_z = z[2] * np.sin(alpha), z[4] * np.sin(beta), z[2] * np.cos(alpha)
+    elif k.case == NS:
+        beta = z[6]
+        w_y, w_z = z[5] * np.sin(beta), z[5] * np.cos(beta)
+    return Moment(t, z[0], State(y, v_y, omega_c, w_x, w_y, w_z, 0.0, 0.0), alpha, beta, z[-1])
+
+
+def _off_the_wall(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
+    turn, u = cmath.exp(1j * at.theta), rigid_body.velocities(at.x, k)
+    place, moves, y, v_y, alpha, slide = z[0] + 1j * z[1], z[2] + 1j * z[3], 0.0, 0.0, math.nan, 0j
+    rho = np.abs(place)
+    back = np.conj(place) / rho
+    if k.case == NN:
+        turned = turn * complex(-u.o_x, u.o_z) * back
+        if k.fall.landing < math.inf:
+            y, v_y = drag.fall(t - at.time, at.x.y, at.x.v_y, k)
+        else:
+            y, v_y = z[4], z[5]
+    else:
+        if k.case == SN:
+            slide = z[4] * np.exp(1j * z[5])
+            # e^(i theta)(-a + i b) with a, b along the cosine and minus the sine of alpha (6), (8).
+            alpha = np.arctan2(-(slide * back).imag, -(slide * back).real)
+        turned = (slide - moves) / (1j * k.r) * back
+    v = moves * back
+    v_h, v_k, o_x, o_z = -v.real, v.imag, -turned.real, turned.imag
+    w_x, w_z = o_x - v_k / k.r, o_z - v_y / k.r
+    if k.case == RN:  # slip_x = 0 and v_h + r slip_z = 0 hold exactly
+        w_x, w_z = 0.0, -v_h / k.r
+    # rho = R - h to the last digit
+    x = State(y, v_y, v_k / rho, w_x, u.o_y + v_k / k.r, w_z, k.R - rho, v_h)
+    return Moment(t, np.arctan2(place.imag, place.real), x, alpha, math.nan, z[-1])
+
+
+def least_slip(z: Any, scale: Any, case: int) -> float:
+    """The smallest slip that turns, in natural units; inf if there is none."""
+    least = math.inf
+    for i in range(TURNING[case][0], TURNING[case][1], 2):
+        least = min(least, z[i] / scale[i])
+    return least
+
+
+def hop(at: Moment, z: Any, k: Motion, rate: Any) -> float:
+    """How long a rebound that begins at a moment will last by the accelerations then, s; inf if none begins."""
+    x, lasts = at.x, math.inf
+    equations.rates(at.time, z, k, rate)
+    if x.y == 0 < x.v_y and k.fall.landing == math.inf:
+        rise = rate[5] if k.case == NN else rate[2]
+        lasts = 2 * x.v_y / -rise if rise < 0 else lasts
+    if x.h == 0 < x.v_h:
+        out = -(z[0] * rate[2] + z[1] * rate[3]) / k.R - k.R * x.omega_c**2
+        lasts = min(lasts, 2 * x.v_h / -out) if out < 0 else lasts
+    return lasts
+
+
+def levels(values: Any, k: Motion, arm: Any, level: Any) -> bool:
+    """Above which values guards are armed, and at which they fire, from their values at first; whether a gap is zero.
+
+    A guard that starts at zero, where round-off mustn't end the case, has to rise above the absolute tolerance first,
+    or to fall below -`rtol`; a gap is armed by any height.
+    """
+    opens = False
+    for guard in range(len(level)):
+        gap = ENDS[k.case][guard] == A_LANDS or ENDS[k.case][guard] == B_LANDS
+        arm[guard] = 0.0 if gap else k.rtol / FINER
+        level[guard] = 0.0 if values[guard] > arm[guard] else -k.rtol
+        opens = opens or (gap and values[guard] == 0)
+    return opens
+
+
+TEXT = (count_ends, begin, _at_wall, _away_from_wall, moment, _off_the_wall, least_slip, hop, levels)
+"""What is compiled where numba is installed."""
+
+
+class Chart(NamedTuple):
+    """The motion of one case from a moment on, for what isn't compiled."""
+
+    at: Moment
+    k: Motion
+    start: list[float]
+    """Coordinates then."""
+    scale: list[float]
+    """Natural size of each, for absolute tolerances."""
+    ends: tuple[int, ...]
+    """What can end the case."""
+
+    @classmethod
+    def of(cls, case: int, at: Moment, k: Motion) -> Self:
+        """That of a case."""
+        z, scale = [0.0] * MOST, [0.0] * MOST
+        k, n = begin(case, at, k, z, scale)
+        return cls(at, k, z[:n], scale[:n], ENDS[case][: count_ends(k)])
+
+    def rates(self, t: float, z: Sequence[float]) -> list[float]:
+        """Rates of the coordinates."""
+        out = [0.0] * len(z)
+        equations.rates(t, z, self.k, out)
+        return out
+
+    def guards(self, t: float, z: Sequence[float]) -> list[float]:
+        """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
+        out = [0.0] * len(self.ends)
+        equations.guards(t, z, self.k, out)
+        return out
+
+    def path(self, t: Array, z: Array) -> Path:
+        """States from times (n,) and coordinates (k, n)."""
+        m = moment(t, z, self.at, self.k)
+        theta, alpha, beta, work = (np.broadcast_to(each, t.shape) for each in (m.theta, m.alpha, m.beta, m.work))
+        if self.k.case % 3 == AWAY:
+            theta = np.unwrap(np.append(self.at.theta, theta))[1:]
+        return Path(t, theta, m.x.stacked(), alpha, beta, work)

@@ -1,4 +1,4 @@
-"""Many runs at once, by time stepping: states at a few times, for many parameter sets and starts."""
+"""Many runs at once: states at a few times, for many parameter sets and starts."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from types import ModuleType
 
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
-from model import Flow, InputError, Parameters, State
+from analytic.simulation.settings import LANDED, Settings, check_duration, sample_times, start_state
+from analytic.simulation.simulator import simulate
+from model import Flow, InputError, Parameters, SimulationError, State
 from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import TURNING, VARIABLES, full_state
@@ -32,7 +36,8 @@ class Ensemble:
     case: npt.NDArray[np.int8]
     """Codes of the cases, shape (runs, samples)."""
     landings: npt.NDArray[np.int64]
-    """Landings on floor or wall since the sample before, faster than sqrt(g R)/1000, shape (runs, samples)."""
+    """Landings on floor or wall since the sample before, faster than sqrt(g R)/1000, shape (runs, samples); in
+    event-driven runs by the normal impulse that it takes."""
     end: Array
     """When each run ended, shape (runs,), s: it was quiet, failed, or reached the last time."""
     failure: tuple[str, ...]
@@ -50,22 +55,20 @@ def simulate_many(
     quiet: float | None = None,
     threads: int | None = None,
 ) -> Ensemble:
-    """Time stepping (`time_stepping`) of many runs, on all cores if numba is installed.
+    """Many runs as by `simulate`, on all cores if numba is installed: each is one compiled call.
 
     Parameters
     ----------
     parameters, flow : one for all, or one for each run; without flow each has its own omega_0
     x0s : starts, shape (runs, 6 or 8), or one for all
     t_end, sample_interval : s; a thousandth of t_end if None
-    settings : timestep and restitution count; one step for all where it is given
+    settings : `Settings` if None; one timestep for all where it is given
     quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
     threads : number of threads, that of the cores if None
 
     Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't start.
     """
-    from analytic.simulation import stepping, time_stepping  # here, since numba takes a while to load
-
-    settings = settings or Settings(method="time-stepping")
+    settings = settings or Settings()
     sets = list(parameters) if isinstance(parameters, Sequence) else [parameters]
     starts = np.atleast_2d(full_state(x0s))
     flows = list(flow) if isinstance(flow, Sequence) else [flow]
@@ -90,29 +93,107 @@ def simulate_many(
         threads = os.cpu_count() or 1
     workers = int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True)))
 
-    shape = (count, len(times))
+    over, shape, t_end = np.zeros(1, bool), (count, len(times)), float(times[-1])
     x, case, landings = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
     x[:, 0], end, failure = states, np.zeros(count), [""] * count
-    over = np.zeros(1, bool)
+    carry_out = _stepped if settings.method == "time-stepping" else _event_driven
 
-    def carry_out(k: int) -> None:
-        fluid = flows[k] or Flow.steady(sets[k].omega_0)
-        check_duration(sets[k], fluid, t_end)
-        ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
-        rows = stepping.Rows(x[k], case[k], landings[k], over)
-        end[k] = stepping.follow(ball, stretches, still, omega_0, given, rows)
-        if end[k] < 0:
-            end[k] *= -1
-            failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
+    @lru_cache
+    def checked(p: Parameters, flow: Flow | None) -> Flow:
+        flow = flow or Flow.steady(p.omega_0)
+        check_duration(p, flow, t_end)
+        return flow
+
+    def carried_out(n: int) -> None:
+        flow = checked(sets[n], flows[n])
+        run = _Run(sets[n], states[n], flow, settings, times, still, x[n], case[n], landings[n], over)
+        end[n], failure[n] = carry_out(run)
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            list(pool.map(carry_out, range(count)))
+            list(pool.map(carried_out, range(count)))
         except BaseException:  # nobody wants the others any more
             over[0] = True
             pool.shutdown(cancel_futures=True)
             raise
     return Ensemble(times, x, case, landings, end, tuple(failure))
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A run of many, and its rows."""
+
+    p: Parameters
+    x0: State
+    flow: Flow
+    settings: Settings
+    times: Array
+    quiet: float
+    x: Array
+    case: npt.NDArray[np.int8]
+    landings: npt.NDArray[np.int64]
+    over: npt.NDArray[np.bool_]
+    """Whether nobody wants it any more."""
+
+    def rests(self, row: int) -> tuple[float, str]:
+        """It is quiet from a row on, or that is its last; what `_stepped` returns."""
+        self.x[row:], self.case[row:] = self.x[row], self.case[row]
+        return float(self.times[row]), ""
+
+
+def _stepped(run: _Run) -> tuple[float, str]:
+    """A run by time stepping, into its rows; when it ended, and why it failed, if it did."""
+    from analytic.simulation import stepping, time_stepping  # here, since numba takes a while to load
+
+    given = time_stepping.prepared(run.x0, 0.0, run.p, run.flow, run.settings, run.times)
+    ball, stretches, omega_0, constants = given
+    rows = stepping.Rows(run.x, run.case, run.landings, run.over)
+    end = stepping.follow(ball, stretches, run.quiet, omega_0, constants, rows)
+    if end >= 0:
+        return end, ""
+    return -end, f"stopped at t = {-end:g} s: the velocities don't settle; a shorter step may help"
+
+
+def _event_driven(run: _Run) -> tuple[float, str]:
+    """The same by event-driven simulation; by that of a single run where compiled steps become too short."""
+    blow = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
+    if whole := whole_runs():
+        stop, taken = np.array([whole.stop(0.0, run.times, run.quiet)]), np.zeros(1, np.int64)
+        rows = whole.Course(run.times, run.x, run.case, run.landings, blow, run.quiet, stop, taken, run.over)
+        if whole.carried_out(run.x0, run.p, run.flow, run.settings, rows):
+            return run.rests(int(taken[0]) - 1)
+        run.landings[:] = 0
+
+    def wanted(done: float) -> None:
+        if run.over[0]:
+            raise InterruptedError
+
+    times, failure = run.times, ""
+    try:
+        last = simulate(run.p, run.x0, times[-1], run.flow, run.settings, sample_interval=times[1], progress=wanted)
+    except SimulationError as error:
+        last, failure = error.trajectory, str(error)
+    count, events = len(last.time), last.events
+    run.x[:count], run.case[:count] = last.x, last.case
+    landed = events.time[np.maximum(events.impulse_A[:, 1], events.impulse_B[:, 0]) > blow]
+    np.add.at(run.landings, np.searchsorted(times, landed), 1)
+    for time, until in pairwise([0.0, *landed, math.inf]):
+        quiet = int(np.searchsorted(times, time + run.quiet, side="right"))
+        if quiet < count and times[quiet] <= until:
+            run.landings[quiet + 1 :] = 0
+            return run.rests(quiet)
+    return (float(last.time[-1]), failure) if failure else run.rests(count - 1)
+
+
+def whole_runs() -> ModuleType | None:
+    """Compiled ones, where numba is installed."""
+    from analytic.simulation import integrator  # here, since scipy and numba take a while to load
+
+    if not integrator.solvers():
+        return None
+    from analytic.simulation import whole_runs
+
+    return whole_runs
 
 
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:

@@ -12,17 +12,53 @@ import math
 from typing import Any, NamedTuple
 
 from analytic.mechanics import drag
+from analytic.mechanics.rigid_body import Velocities
 from model import Case
 
 RR, RS, RN, SR, SS, SN, NR, NS, NN = (int(case) for case in Case)
+A_STICKS, B_STICKS, A_SLIPS, B_SLIPS, A_LIFTS, B_OPENS, A_LANDS, B_LANDS, RR_ENDS = range(9)
+"""What ends a case."""
+ROLLS, SLIPS, AWAY = range(3)
+"""Contacts: that with the floor is a case's number divided by three, that with the wall the remainder."""
+FINER = 1e3
+"""Relative tolerance of an integrator divided by the absolute one in natural units."""
+LOCAL = 0.25
+"""Tolerance of a step relative to that asked for: errors of many steps add up."""
+ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
+"""Slip that has just set in, and below which its direction may be stiff, relative to the spin of rolling at sqrt(g R).
+"""
+PATIENCE = 300
+"""Steps with a small slip after which a stiff method takes over; a slip that dies out takes fewer."""
 STABILITY, FEASIBILITY = range(2)
 """What `leave_rolling` of `Settings` asks of RR: that slip dies out, or only that forces hold it."""
+
+
+class Line(NamedTuple):
+    """The part of a flow that is a line."""
+
+    start: float
+    """Time at which it has its value, s."""
+    value: float
+    slope: float
+
+
+class Fall(NamedTuple):
+    """A flight under Stokes' drag, which is known."""
+
+    since: float
+    """When it began, s;"""
+    v_y: float
+    """its vertical velocity then, m s-1;"""
+    landing: float
+    """and when it ends on the floor, s; inf of any other motion."""
+
+
+NO_FALL = Fall(0.0, 0.0, math.inf)
 
 
 class Motion(NamedTuple):
     """What the motion of one case depends on; in SI units."""
 
-    case: int
     m: float
     r: float
     R: float
@@ -30,35 +66,43 @@ class Motion(NamedTuple):
     mu: float
     eta: float
     g: float
+    c: float
+    """Rate of Stokes' drag, s-1."""
     law: drag.Law
     """Of the drag."""
-    start: float
-    """Time at which the line of the flow has its value, s."""
-    value: float
-    slope: float
-    waves: Any
-    """Rows of amplitude, angular frequency and phase, a tuple of tuples or an array (k, 3)."""
-    floor: float
-    """Slip in natural units below which the turning rate of its direction is capped."""
-    side: float
-    """Sine of the direction of a slip that keeps to one line."""
+    stokes: bool
+    """Whether that is Stokes'."""
+    rtol: float
+    """Tolerance of the integrator; the slip in natural units, too, below which the turning rate of its direction is
+    capped: the rate is inverse to the slip, and directions settle before the slip vanishes."""
+    restitution: float
     leaves: int
     """`STABILITY` or `FEASIBILITY`."""
-    falls: bool
-    """Whether a free flight is known: with Stokes' drag."""
-    since: float
-    """When it began, s;"""
-    v_y: float
-    """and its vertical velocity then, m s-1."""
     unit: float
     """Natural units: of time, s,"""
     spin: float
     """and of the spin of the ball, rad s-1."""
+    waves: Any
+    """Rows of amplitude, angular frequency and phase, a tuple of tuples or an array (k, 3)."""
+    line: Line
+    case: int
+    side: float
+    """Sine of the direction of a slip that keeps to one line."""
+    fall: Fall
+
+
+def changed(k: Motion, case: int, side: float, line: Line, fall: Fall) -> Motion:
+    """The motion in another case or flow."""
+    return Motion(
+        k.m, k.r, k.R, k.j, k.mu, k.eta, k.g, k.c, k.law, k.stokes, k.rtol, k.restitution, k.leaves, k.unit, k.spin,
+        k.waves, line, case, side, fall,
+    )  # fmt: skip
 
 
 def fluid(t: float, k: Motion) -> float:
     """omega_0 at a time, rad s-1: a line and waves."""
-    omega_0 = k.value + k.slope * (t - k.start)
+    start, value, slope = k.line
+    omega_0 = value + slope * (t - start)
     for n in range(len(k.waves)):
         wave = k.waves[n]
         omega_0 = omega_0 + wave[0] * math.sin(wave[1] * t + wave[2])
@@ -67,9 +111,9 @@ def fluid(t: float, k: Motion) -> float:
 
 def resistance(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
     """c(|w|) of a velocity relative to the fluid, s-1."""
+    if k.stokes:
+        return k.c
     linear, wake, blunt = k.law
-    if wake == 0 and blunt == 0:
-        return linear
     speed = math.sqrt(w_h * w_h + w_y * w_y + w_k * w_k)
     slow: float = linear + wake * speed**drag.EXPONENT
     return max(slow, blunt * speed)
@@ -91,30 +135,30 @@ def guards(t: float, z: Any, k: Motion, out: Any) -> None:
         _guards_at_wall(t, z, k, out)
 
 
-def _forces(omega_c: float, v_y: float, w_x: float, c: float, lag: float, s_A: float, c_A: float, s_B: float,
+def forces(case: int, omega_c: float, v_y: float, w_x: float, c: float, lag: float, s_A: float, c_A: float, s_B: float,
             c_B: float, k: Motion) -> tuple[float, float, float, float, float, float]:  # fmt: skip
     """Forces of floor and wall along i, j, k in the cases at the wall, N; in RR with B_y = 0.
 
     `lag` is omega_c - omega_0; s and c are sine and cosine of the directions of slip.
     """
     u, G, drive, j = k.m * k.R * omega_c * omega_c, k.m * k.g, k.m * k.R * c * lag, k.j
-    if k.case == RR:
+    if case == RR:
         z = j * drive / (1 + 2 * j)
         return -j * u, G, z, (1 + j) * u, 0.0, z
-    if k.case == RS:
+    if case == RS:
         B_x = (1 + j) * u
         B_z = -k.eta * B_x * s_B
         return -j * u, G, j * (drive - B_z) / (1 + j), B_x, 0.0, B_z
-    if k.case == SR:
+    if case == SR:
         B_y = j * k.m * (k.R * omega_c * omega_c + k.r * omega_c * w_x)
         A_y = G - B_y
         A_z = k.mu * A_y * s_A
         return 0.0, A_y, A_z, u, B_y, j * (drive - A_z) / (1 + j)
-    if k.case == SS:
+    if case == SS:
         determinant = 1 + k.mu * k.eta * c_A * c_B
         A_y, B_x = (G - k.eta * c_B * u) / determinant, (u + k.mu * c_A * G) / determinant
         return -k.mu * A_y * c_A, A_y, k.mu * A_y * s_A, B_x, k.eta * B_x * c_B, -k.eta * B_x * s_B
-    if k.case == NR:
+    if case == NR:
         B_y = j * k.m * (k.g + c * v_y + k.R * omega_c * omega_c + k.r * omega_c * w_x) / (1 + j)
         return 0.0, 0.0, 0.0, u, B_y, j * drive / (1 + j)
     return 0.0, 0.0, 0.0, u, k.eta * u * c_B, -k.eta * u * s_B
@@ -146,7 +190,7 @@ def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
     omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, _ = _at_wall(z, k)
     lag = omega_c - omega_0
     c = resistance(0.0, v_y, k.R * lag, k)
-    A_x, A_y, A_z, B_x, B_y, B_z = _forces(omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
+    A_x, A_y, A_z, B_x, B_y, B_z = forces(k.case, omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
     jmr = k.j * k.m * k.r
     push = (A_z + B_z) / k.m - c * k.R * lag
     roll = push / k.r
@@ -166,7 +210,7 @@ def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
         out[first] = dw_x * s_A + dw_z * c_A - bond * c_A
         power -= k.r * q_A * k.mu * A_y
         if k.case == SS:
-            out[first + 1] = (dw_x * c_A - dw_z * s_A) / max(q_A, k.floor * k.spin)
+            out[first + 1] = (dw_x * c_A - dw_z * s_A) / max(q_A, k.rtol * k.spin)
             first += 1
         first += 1
     if k.case == RS or k.case == SS or k.case == NS:
@@ -175,7 +219,7 @@ def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
         out[first] = dw_y * s_B + dw_z * c_B - bond * c_B
         power -= k.r * q_B * k.eta * B_x
         if k.case != RS:
-            out[first + 1] = (dw_y * c_B - dw_z * s_B) / max(q_B, k.floor * k.spin)
+            out[first + 1] = (dw_y * c_B - dw_z * s_B) / max(q_B, k.rtol * k.spin)
             first += 1
         first += 1
     out[first] = power
@@ -186,9 +230,9 @@ def _guards_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
     lag = omega_c - fluid(t, k)
     c = resistance(0.0, v_y, k.R * lag, k)
     if k.case == RR:
-        out[0] = _rolls_on(k.R / k.g * omega_c * omega_c, abs(k.j * c * k.R / k.g * lag / (1 + 2 * k.j)), k)
+        out[0] = rolls_on(omega_c, t, k)
         return
-    A_x, A_y, A_z, B_x, B_y, B_z = _forces(omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
+    A_x, A_y, A_z, B_x, B_y, B_z = forces(k.case, omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
     G = k.m * k.g
     if k.case == RS:
         out[0], out[1] = q_B / k.spin, (k.mu * A_y - math.sqrt(A_x * A_x + A_z * A_z)) / G
@@ -201,14 +245,32 @@ def _guards_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
         out[0], out[1] = z[1] / k.R, slips
 
 
-def _rolls_on(u: float, z: float, k: Motion) -> float:
-    """`rolling_forces.slip_margin` or `margin` of a centrifugal load u and friction z in units of the weight."""
-    at_A, at_B = 1 - k.j * u, (1 + k.j) * u
-    low_B, high_B = _normal_forces(at_B, z, k.eta)
+def loads(omega_c: float, t: float, k: Motion) -> tuple[float, float]:
+    """As `rolling_forces._loads`: centrifugal load and friction of RR, in units of the weight."""
+    lag = abs(omega_c - fluid(t, k))
+    friction = k.j * resistance(0.0, 0.0, k.R * lag, k) * k.R / k.g * lag / (1 + 2 * k.j)
+    return k.R / k.g * omega_c * omega_c, friction
+
+
+def last_share(u: float, z: float, k: Motion) -> float:
+    """As `rolling_forces._last_share`."""
+    at_B = (1 + k.j) * u
+    return min(max(at_B - _normal_forces(at_B, z, k.eta)[0], 0.0), k.j * u)
+
+
+def slip_margin(u: float, z: float, k: Motion) -> float:
+    """As `rolling_forces.slip_margin`, of loads."""
+    share = last_share(u, z, k)
+    return min(k.eta * (1 + k.j) * u - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z))
+
+
+def rolls_on(omega_c: float, t: float, k: Motion) -> float:
+    """How far RR is from where it is left, >= 0 while it lasts: `slip_margin`, or `rolling_forces.margin`."""
+    u, z = loads(omega_c, t, k)
     if k.leaves == STABILITY:
-        share = min(max(at_B - low_B, 0.0), k.j * u)
-        return min(k.eta * at_B - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z))
-    low_A, high_A = _normal_forces(at_A, z, k.mu)
+        return slip_margin(u, z, k)
+    at_A, at_B = 1 - k.j * u, (1 + k.j) * u
+    (low_A, high_A), (low_B, high_B) = _normal_forces(at_A, z, k.mu), _normal_forces(at_B, z, k.eta)
     least, greatest = max(1 - high_A, at_B - high_B), min(1 - low_A, at_B - low_B)
     overlap = -math.inf if greatest == -math.inf else greatest - least
     size_A, size_B = math.sqrt(at_A * at_A + z * z), math.sqrt(at_B * at_B + z * z)
@@ -234,7 +296,7 @@ def _pull(t: float, z: Any, rise: float, k: Motion) -> tuple[complex, complex, f
 def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
     rise = 0.0
     if k.case == NN:
-        rise = _fall_speed(t - k.since, k) if k.falls else z[5]
+        rise = fall_speed(t, k) if k.fall.landing < math.inf else z[5]
     V, lag, c = _pull(t, z, rise, k)
     power, push, last = -k.m * c * ((lag * V.conjugate()).real + rise * rise), -c * lag, 4
     if k.case == RN:
@@ -245,8 +307,8 @@ def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
         friction = -k.mu * k.g * along
         turning = (push + (1 + 1 / k.j) * friction) / along
         push += friction
-        out[4], out[5], last = turning.real, turning.imag / max(z[4], k.floor * math.sqrt(k.R * k.g)), 6
-    elif not k.falls:
+        out[4], out[5], last = turning.real, turning.imag / max(z[4], k.rtol * math.sqrt(k.R * k.g)), 6
+    elif k.fall.landing == math.inf:
         out[4], out[5], last = rise, -k.g - c * rise, 6
     out[0], out[1], out[2], out[3], out[last] = V.real, V.imag, push.real, push.imag, power
 
@@ -260,18 +322,53 @@ def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
         out[0], out[1] = z[4] / math.sqrt(k.R * k.g), gap
     else:
         out[0] = gap
-        if not k.falls:
+        if k.fall.landing == math.inf:
             out[1] = z[4] / k.R
 
 
-def _fall_speed(t: float, k: Motion) -> float:
+def fall_speed(t: float, k: Motion) -> float:
     """As `drag.fall_speed`."""
-    c = k.law[0]
-    return k.v_y - (c * k.v_y + k.g) * (math.expm1(-c * t) / -c if c > 0 else t)
+    since, v_y, _ = k.fall
+    return v_y - (k.c * v_y + k.g) * (math.expm1(-k.c * (t - since)) / -k.c if k.c > 0 else t - since)
+
+
+def smooth_rates(u: Velocities, h: float, t: float, k: Motion) -> Velocities:
+    """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the gap at B."""
+    turn, w_k = u.v_k / (k.R - h), u.v_k - fluid(t, k) * (k.R - h)
+    c = resistance(u.v_h, u.v_y, w_k, k)
+    return Velocities(
+        -turn * u.v_k - c * u.v_h, -k.g - c * u.v_y, turn * u.v_h - c * w_k, -turn * u.o_z, 0.0, turn * u.o_x
+    )
+
+
+def straight(
+    t: float, until: float, z: Any, scale: Any, k: Motion, rate: Any, guards_now: Any, there: Any, other: Any
+) -> bool:
+    """Whether a straight line with the rates that this writes solves the equations up to a time, and no guard fires.
+
+    What moves by less than the tolerance is taken to rest. The last three lists are for what it computes.
+    """
+    left = until - t
+    rates(t, z, k, rate)
+    for i in range(len(z)):
+        if left * abs(rate[i]) < k.rtol * scale[i]:
+            rate[i] = 0.0
+    for ahead in (left / 2, left):
+        for i in range(len(z)):
+            there[i] = z[i] + ahead * rate[i]
+        rates(t + ahead, there, k, other)
+        for i in range(len(z)):
+            if left * abs(other[i] - rate[i]) > k.rtol * scale[i]:
+                return False
+        guards(t + ahead, there, k, guards_now)
+        for value in guards_now:
+            if value < 0:
+                return False
+    return True
 
 
 TEXT = (
-    fluid, resistance, _forces, _at_wall, _rates_at_wall, _guards_at_wall, _rolls_on, _normal_forces, _pull,
-    _rates_away, _guards_away, _fall_speed, rates, guards,
+    changed, fluid, resistance, forces, _at_wall, _rates_at_wall, _guards_at_wall, loads, last_share, slip_margin,
+    rolls_on, _normal_forces, _pull, _rates_away, _guards_away, fall_speed, smooth_rates, rates, guards, straight,
 )  # fmt: skip
-"""What `solver` compiles, each after those that it calls."""
+"""What is compiled where numba is installed."""

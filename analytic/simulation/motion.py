@@ -1,27 +1,25 @@
-"""Data of simulations: the fluid, a moment, a path of one case, its coordinates (chart), and the record of a run."""
+"""Data of simulations: the fluid, a moment, a path of one case, and the record of a run."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from analytic.mechanics import rigid_body
+from analytic.mechanics import drag, rigid_body
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import equations
-from analytic.simulation.equations import Motion
+from analytic.simulation.equations import Line, Motion
+from analytic.simulation.settings import Settings
 from model import Case, Events, Flow, Header, Parameters, State, Trajectory
 from model.arrays import Array, Real
+from model.drag import STOKES
 from model.trajectory import samples
 
-GAPS = ("A lands", "B lands")
-"""Names of the guards that are distances."""
-FINER = 1e3
-"""Relative tolerance of an integrator divided by the absolute one in natural units."""
 REPORT_EVERY = 1000
 """Steps after which a simulator notes how far it is, even if there is no sample to take."""
 
@@ -42,6 +40,10 @@ class Fluid:
         for amplitude, omega, phase in self.waves:
             omega_0 = omega_0 + amplitude * sin(omega * t + phase)
         return omega_0
+
+    def line(self) -> Line:
+        """Without the waves."""
+        return Line(float(self.start), float(self.value), float(self.slope))
 
     @classmethod
     def of(cls, flow: Flow, start: float) -> Self:
@@ -78,45 +80,21 @@ class Path(NamedTuple):
     work: Array
 
 
-@dataclass(frozen=True)
-class Chart:
-    """The motion of one case in its coordinates z."""
-
-    start: list[float]
-    scale: list[float]
-    """Natural size of each coordinate, for absolute tolerances."""
-    motion: Motion
-    """What the rates depend on."""
-    ends: tuple[str, ...]
-    """What can end the case."""
-    path: Callable[[Array, Array], Path]
-    """States from times (n,) and coordinates (k, n)."""
-    landing: float = math.inf
-    """When the ball will touch the floor, where that is known in advance, s."""
-    slips: tuple[int, ...] = ()
-    """Which coordinates are slips with a direction of their own."""
-
-    def rates(self, t: float, z: Sequence[float]) -> list[float]:
-        """Rates of the coordinates."""
-        out = [0.0] * len(z)
-        equations.rates(t, z, self.motion, out)
-        return out
-
-    def guards(self, t: float, z: Sequence[float]) -> list[float]:
-        """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
-        out = [0.0] * len(self.ends)
-        equations.guards(t, z, self.motion, out)
-        return out
-
-    def least_slip(self, z: Sequence[float]) -> float:
-        """The smallest slip that has a direction, in natural units; inf if there is none."""
-        return min((z[k] / self.scale[k] for k in self.slips), default=math.inf)
-
-
 def natural_units(p: Parameters) -> tuple[float, float, float, float]:
     """Units: of time, of velocity, of the spin of the ball, of energy."""
     time = math.sqrt(p.R / p.g)
     return time, p.R / time, p.R / (time * p.r), p.m * p.g * p.R
+
+
+def of_ball(p: Parameters, omega_0: Fluid, settings: Settings) -> Motion:
+    """What the motion of a ball depends on, as plain numbers; in whatever case."""
+    m, r, R, j, mu, eta, g, c = map(float, (p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, p.c))
+    law, (unit, _, spin, _) = drag.Law(*map(float, drag.law(p))), natural_units(p)
+    leaves = {"slip-stability": equations.STABILITY, "infeasible": equations.FEASIBILITY}[settings.leave_rolling]
+    return Motion(
+        m, r, R, j, mu, eta, g, c, law, p.drag == STOKES, float(settings.rtol), float(settings.restitution), leaves,
+        unit, spin, omega_0.waves, omega_0.line(), int(Case.NN), 0.0, equations.NO_FALL,
+    )  # fmt: skip
 
 
 class Event(NamedTuple):

@@ -15,6 +15,8 @@ from model.arrays import Array
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
 
 MAX_SAMPLES = 5e7
+LANDED = 1e-3
+"""Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
 HUGE, MAX_RADIANS = 1e3, 1e5
 """Speed of a flow in units of sqrt(g/R), beyond which so many radians of it are simulated at most."""
 
@@ -76,6 +78,11 @@ def check_duration(p: Parameters, flow: Flow, t_end: float) -> None:
 
 def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
     """The state at the start, or `InputError` if the ball can't be in it."""
+    if settings.method == "event" and p.fluid_torque:
+        raise InputError(
+            f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque out; "
+            "method = 'time-stepping' takes it"
+        )
     x = State.one(x0)
     check_number("y", x.y, "m", NOT_NEGATIVE, "to be above the floor it")
     check_number("h", x.h, "m", Range(0.0, p.R, below=True), "to be between wall and axis it")

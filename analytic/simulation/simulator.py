@@ -14,7 +14,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation.motion import Recorder
 from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
 from analytic.stationary import solutions as stationary
-from model import Case, Flow, Header, InputError, Parameters, SimulationError, Trajectory
+from model import Case, Flow, Header, Parameters, SimulationError, Trajectory
 from model.errors import check_type
 from model.parameters import check_names, check_number
 
@@ -64,11 +64,6 @@ def simulate(
     check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     settings = dataclasses.replace(settings or Settings(), **changes)
     if settings.method == "event":
-        if p.fluid_torque:
-            raise InputError(
-                f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque out; "
-                "method = 'time-stepping' takes it"
-            )
         from analytic.simulation.hybrid import run  # here, because the integrators of scipy take half a second to load
     else:
         from analytic.simulation.time_stepping import run

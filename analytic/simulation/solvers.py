@@ -1,35 +1,32 @@
 """Steps through one case, compiled by numba, and the moments at which it ends.
 
-`explicit` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
-`scipy.integrate.DOP853`; guards are looked at four times in each step. `implicit` is for a slip that has just set in,
+`_explicit` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
+`scipy.integrate.DOP853`; guards are looked at four times in each step. `_implicit` is for a slip that has just set in,
 whose direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer &
 Wanner, Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
-from pathlib import Path
-from typing import Any
+import sys
 
-import numba
 import numpy as np
 import numpy.typing as npt
-from numba.extending import register_jitable
 from scipy.integrate import DOP853
 
-from analytic.mechanics import drag
-from analytic.simulation import equations
-from analytic.simulation.equations import Motion
+from analytic.mechanics import drag, rigid_body
+from analytic.simulation import charts, compiling, equations
+from analytic.simulation.equations import FINER, LOCAL, ONSET_SLIP, PATIENCE, SMALL_SLIP, Motion
 from model.arrays import Array
 
-for _function in equations.TEXT:
-    setattr(equations, _function.__name__, register_jitable(error_model="numpy")(_function))
-_DIGEST = hashlib.sha256(b"".join(Path(str(m.__file__)).read_bytes() for m in (drag, equations))).hexdigest()[:16]
 A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
 A_MORE, C_MORE = np.ascontiguousarray(DOP853.A_EXTRA), np.ascontiguousarray(DOP853.C_EXTRA)
 STAGES, ALL = len(B), len(B) + 1 + len(C_MORE)
+GROWN_SLIP = 1e-4
+"""Slip from which on steps that are short cost less than stiff ones."""
+FINEST, FINEST_STIFF = 1e-13, 1e-11
+"""Least relative tolerances: what round-off leaves of explicit steps, and of those of a small slip."""
 DONE, FIRED, OTHER, STUCK, PAUSED = range(5)
 """Why they return: at the end, at a guard, as the other one should go on, with steps too short, for a breath."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
@@ -47,16 +44,11 @@ COLUMNS, USUAL = 12, 9
 EPS = math.ulp(1.0)
 
 
-def _compiled(function: Any) -> Any:
-    """Numba's cache knows a function by its name, and not when another file has changed."""
-    function.__qualname__ += f"_{_DIGEST}"
-    try:
-        return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    except RuntimeError:  # no place for a cache
-        return numba.njit(nogil=True, error_model="numpy")(function)
+def _copy(given: Array, out: Array) -> None:
+    for i in range(len(out)):
+        out[i] = given[i]
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _between(x: float, z: Array, F: Array, out: Array) -> None:
     """Coordinates at a share x of a step that began at z."""
     for i in range(len(z)):
@@ -66,7 +58,6 @@ def _between(x: float, z: Array, F: Array, out: Array) -> None:
         out[i] = z[i] + value
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _root(
     guard: int, level: float, low: float, high: float, t: float, h: float, k: Motion, z: Array, F: Array, now: Array,
     values: Array,
@@ -106,7 +97,6 @@ def _root(
     return high
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _pass(guard_values: Array, arm: Array, level: Array) -> int:
     """Arm guards that have risen; the first that has fallen through its level, or -1."""
     for guard in range(len(arm)):
@@ -117,16 +107,15 @@ def _pass(guard_values: Array, arm: Array, level: Array) -> int:
     return -1
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _combined(weights: Array, count: int, K: Array, out: Array) -> None:
     """The sum of so many rows of K (s, n) by their weights."""
-    out[:] = 0.0
+    for i in range(len(out)):
+        out[i] = 0.0
     for j in range(count):
         for i in range(len(out)):
             out[i] += weights[j] * K[j, i]
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _dense(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: Array, F: Array) -> None:
     """Coefficients of `_between` for a step from z to `new` with its stages K, three more of which it fills in."""
     for s in range(len(C_MORE)):
@@ -144,7 +133,6 @@ def _dense(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: A
             F[3 + j, i] *= h
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _first_fall(
     t: float, h: float, k: Motion, z: Array, F: Array, arm: Array, level: Array, seen: Array, now: Array, values: Array
 ) -> tuple[int, float]:
@@ -182,12 +170,11 @@ def _first_fall(
     return fired, end
 
 
-@register_jitable  # type: ignore[untyped-decorator]
-def _left(z: Array, rate: Array, slips: npt.NDArray[np.int64], unit: float, rtol: float) -> float:
+def _left(z: Array, rate: Array, slips: range, scale: Array, rtol: float) -> float:
     """The time that a slip which dies has left, along a straight line; inf if a direction turns too much for it."""
     left = math.inf
     for i in slips:
-        if z[i] < DYING * unit and rate[i] < 0:
+        if z[i] < DYING * scale[i] and rate[i] < 0:
             left = min(left, -z[i] / rate[i])
     for i in slips:
         if left < math.inf and (rate[i + 1] * left) ** 2 > rtol:
@@ -195,24 +182,19 @@ def _left(z: Array, rate: Array, slips: npt.NDArray[np.int64], unit: float, rtol
     return left
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _passed(time: float, start: float, tau: float) -> bool:
     """Whether start + tau is at a time or later, however that is rounded: a stretch that ends there reaches it."""
     return time <= start + tau or time - start <= tau
 
 
-@_compiled
-def explicit(
+def _explicit(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
-    rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, small: float,
-    patience: int, most: int,
+    rtol: float, scale: Array, arm: Array, level: Array, slips: range, most: int,
 ) -> tuple[int, float, float, int, int]:  # fmt: skip
     """At most so many steps from the time start + tau towards start + span: why they end, tau, h, guard, `taken`.
 
-    z, level and samples are written to: z (n,); level of each guard, as `integrator.Stretch` says; samples, (m, n), at
-    those of `times` that are passed, from the number `taken` on. A slip (coordinates `slips`) below `small` times
-    `unit` for more than `patience` steps is for a stiff method. A step is interpolated where a sample is due, or a
-    guard not `CLEAR`.
+    A slip (coordinates `slips`) below `SMALL_SLIP` for more than `PATIENCE` steps is for the other method.
+    A step is interpolated where a sample is due, or a guard not `CLEAR`.
     """
     n, slow, rejected = len(z), 0, False
     K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
@@ -223,7 +205,7 @@ def explicit(
     if h <= 0:  # by the size of the rates
         rate = 0.0
         for i in range(n):
-            rate = max(rate, abs(K[0, i]) / (atol[i] / rtol + abs(z[i])))
+            rate = max(rate, abs(K[0, i]) / (scale[i] / FINER + abs(z[i])))
         h = min(span - tau, 0.01 / rate if rate > 0 else span)
     for _ in range(most):
         if tau >= span:
@@ -249,7 +231,7 @@ def explicit(
         _combined(E3, STAGES + 1, K, three)
         fifth = third = 0.0
         for i in range(n):
-            size = atol[i] + rtol * max(abs(z[i]), abs(new[i]))
+            size = rtol * (scale[i] / FINER + max(abs(z[i]), abs(new[i])))
             fifth += (five[i] / size) ** 2
             third += (three[i] / size) ** 2
         bound = fifth + 0.01 * third
@@ -276,31 +258,36 @@ def explicit(
                 taken += 1
             if fired >= 0:
                 _between(share, z, F, now)
-                z[:] = now
+                _copy(now, z)
                 return FIRED, until, h, fired, taken
-        z[:] = new
-        K[0] = K[STAGES]
-        seen[0] = seen[LOOKS_A_STEP]
+        _copy(new, z)
+        _copy(K[STAGES], K[0])
+        _copy(seen[LOOKS_A_STEP], seen[0])
         tau = after
         grow = GROW if error == 0 else min(GROW, SAFETY * error**-0.125)
         h *= min(grow, 1.0) if rejected else grow
         rejected = False
-        least = math.inf
-        for i in slips:
-            least = min(least, z[i] / unit)
-        slow = slow + 1 if least <= small else 0
-        left = _left(z, K[0], slips, unit, rtol) if least < DYING else math.inf
+        least = charts.least_slip(z, scale, k.case)
+        slow = slow + 1 if least <= SMALL_SLIP else 0
+        left = _left(z, K[0], slips, scale, rtol) if least < DYING else math.inf
         if tau + left <= span and (taken == len(times) or not _passed(times[taken], start, tau + left)):
             for i in range(n):
                 z[i] += left * K[0, i]
             equations.guards(start + tau + left, z, k, values)
-            return FIRED, tau + left, h, int(np.argmin(values)), taken
-        if slow > patience:
+            return FIRED, tau + left, h, _lowest(values), taken
+        if slow > PATIENCE:
             return OTHER, tau, h, -1, taken
     return PAUSED, tau, h, -1, taken
 
 
-@register_jitable  # type: ignore[untyped-decorator]
+def _lowest(values: Array) -> int:
+    lowest = 0
+    for i in range(1, len(values)):
+        if values[i] < values[lowest]:
+            lowest = i
+    return lowest
+
+
 def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
     """A matrix as its triangles, rows exchanged."""
     n = len(M)
@@ -318,7 +305,6 @@ def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
                 M[r, c] -= M[r, i] * M[i, c]
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
     """What such a matrix makes b of, in its place."""
     n = len(M)
@@ -333,9 +319,8 @@ def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
         b[i] /= M[i, i]
 
 
-@register_jitable  # type: ignore[untyped-decorator]
 def _extrapolated(
-    t: float, h: float, k: Motion, z: Array, J: Array, rtol: float, atol: Array, table: Array, M: Array,
+    t: float, h: float, k: Motion, z: Array, J: Array, rtol: float, scale: Array, table: Array, M: Array,
     order: npt.NDArray[np.int64], rate: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """A step by 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error, and how many columns that took."""
@@ -347,7 +332,7 @@ def _extrapolated(
             for c in range(n):
                 M[i, c] = (i == c) - part * J[i, c]
         _factored(M, order)
-        y[:] = z
+        _copy(z, y)
         for s in range(steps):
             equations.rates(t + (s + 1) * part, y, k, rate)
             for i in range(n):
@@ -361,30 +346,31 @@ def _extrapolated(
             for i in range(n):
                 more = (table[q + 1, i] - table[q, i]) / (steps / (q + 1) - 1)
                 table[q, i] = table[q + 1, i] + more
-                square += (more / (atol[i] + rtol * max(abs(z[i]), abs(table[q, i])))) ** 2
+                square += (more / (rtol * (scale[i] / FINER + max(abs(z[i]), abs(table[q, i]))))) ** 2
         error = math.sqrt(square / n) if column > 0 else math.inf
         if error <= 1 or (not error < 1e10 and column > 0):
             return error, steps
     return error, COLUMNS
 
 
-@_compiled
-def implicit(
+def _implicit(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
-    rtol: float, atol: Array, arm: Array, level: Array, slips: npt.NDArray[np.int64], unit: float, large: float,
-    floor: Array, most: int,
+    rtol: float, scale: Array, arm: Array, level: Array, slips: range,
 ) -> tuple[int, float, float, int, int]:  # fmt: skip
-    """As `explicit`, until all slips are `large` times `unit`; a Jacobian shifts z by a share of it or `floor` (n,)."""
+    """As `_explicit`, for `PATIENCE` steps, until all slips are `GROWN_SLIP`.
+
+    A Jacobian shifts z by a share of it, or at least of its natural size, or of `rtol` of that for a slip.
+    """
     n = len(z)
     table, J, M, order = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n, np.int64)
     here, rate, values, now = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty(n)
-    for _ in range(most):
+    for _ in range(PATIENCE):
         if tau >= span:
             return DONE, tau, h, -1, taken
         equations.rates(start + tau, z, k, here)
         for c in range(n):
-            shift = math.sqrt(EPS) * max(abs(z[c]), floor[c])
-            now[:] = z
+            shift = math.sqrt(EPS) * max(abs(z[c]), scale[c] * (k.rtol if c in slips else 1.0))
+            _copy(z, now)
             now[c] += shift
             equations.rates(start + tau, now, k, rate)
             for i in range(n):
@@ -392,26 +378,26 @@ def implicit(
         if h <= 0:
             size = 0.0
             for i in range(n):
-                size = max(size, abs(here[i]) / (atol[i] / rtol + abs(z[i])))
+                size = max(size, abs(here[i]) / (scale[i] / FINER + abs(z[i])))
             h = min(span - tau, 1e-3 / size if size > 0 else span)
         stop = min(span, times[taken] - start) if taken < len(times) else span
         while True:
             length = min(h, stop - tau)
             if length <= 4 * EPS * tau or length < 1e-300:
                 return STUCK, tau, h, -1, taken
-            error, columns = _extrapolated(start + tau, length, k, z, J, rtol, atol, table, M, order, rate)
+            error, columns = _extrapolated(start + tau, length, k, z, J, rtol, scale, table, M, order, rate)
             if error <= 1:
                 break
             h = length / 4
         after = stop if length == stop - tau else tau + length
-        now[:] = table[0]
+        _copy(table[0], now)
         equations.guards(start + after, now, k, values)
         guard = _pass(values, arm, level)
         if guard >= 0:  # halve the step until it ends at the guard
             low, high = 0.0, length
             while high - low > 4 * EPS * max(tau, length):
                 middle = (low + high) / 2
-                _extrapolated(start + tau, middle, k, z, J, rtol, atol, table, M, order, rate)
+                _extrapolated(start + tau, middle, k, z, J, rtol, scale, table, M, order, rate)
                 equations.guards(start + (tau + middle), table[0], k, values)
                 fell = -1
                 for each in range(len(arm)):
@@ -419,21 +405,84 @@ def implicit(
                         fell = each
                 if fell >= 0:
                     high, guard = middle, fell
-                    now[:] = table[0]
+                    _copy(table[0], now)
                 else:
                     low = middle
-            z[:] = now
+            _copy(now, z)
             return FIRED, tau + high, h, guard, taken
-        z[:] = now
+        _copy(now, z)
         tau = after
         while taken < len(times) and _passed(times[taken], start, tau):
-            samples[taken] = z
+            _copy(z, samples[taken])
             taken += 1
         if length == h or error < 0.01:
             h = length * min(4.0, 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns))
-        least = math.inf
-        for i in slips:
-            least = min(least, z[i] / unit)
-        if least > large:
+        least = charts.least_slip(z, scale, k.case)
+        if least > GROWN_SLIP:
             return OTHER, tau, 0.0, -1, taken
     return PAUSED, tau, h, -1, taken
+
+
+Pace = tuple[float, float, float, bool, int]
+"""How the steps of a stretch go on: a time, s, from which tau counts, since directions settle in less than the
+round-off of the time of the run; tau; length of the next step, 0 if one is to be found; whether a slip is small;
+strides since it was not."""
+
+
+def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float) -> Pace:
+    """That of a stretch; it may be a straight line from the start on if a contact opens there."""
+    small = charts.least_slip(z, scale, case) < ONSET_SLIP
+    return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
+
+
+TEXT = (
+    _copy, _between, _root, _pass, _combined, _dense, _first_fall, _left, _passed, _explicit, _lowest, _factored, _solve,
+    _extrapolated, _implicit, first_pace,
+)  # fmt: skip
+"""What is compiled."""
+
+
+@compiling.compiled(compiling.read(drag, rigid_body, equations, charts, sys.modules[__name__]))
+def stretch(
+    k: Motion, pace: Pace, until: float, z: Array, scale: Array, times: Array, taken: int, samples: Array, arm: Array,
+    level: Array, most: int,
+) -> tuple[int, Pace, int, int]:  # fmt: skip
+    """Go on in a case: why that ended, the pace, guard, `taken`.
+
+    z, level and samples are written to: z (n,); level of each guard, as `charts.levels` says; samples, (m, n), at those
+    of `times` that are passed, from the number `taken` on. It pauses after `most` steps.
+    """
+    n, steady = len(z), len(k.waves) == 0 and k.line.slope == 0
+    slips = range(charts.TURNING[k.case][0], charts.TURNING[k.case][1], 2)
+    rate, values, there, other = np.empty(n), np.empty(len(arm)), np.empty(n), np.empty(n)
+    start, tau, h, small, slow = pace
+    why = OTHER
+    while why == OTHER:
+        now = start + tau
+        if steady and slow % 2 == 1 and equations.straight(now, until, z, scale, k, rate, values, there, other):
+            while taken < len(times) and times[taken] <= until:
+                for i in range(n):
+                    samples[taken, i] = z[i] + (times[taken] - now) * rate[i]
+                taken += 1
+            _copy(there, z)
+            return DONE, (start, tau, h, small, slow), -1, taken
+        span = until - start
+        if small:
+            rtol = max(LOCAL * k.rtol, FINEST_STIFF)
+            why, tau, h, guard, taken = _implicit(
+                k, start, tau, h, span, z, times, taken, samples, rtol, scale, arm, level, slips
+            )
+        else:
+            rtol = max(LOCAL * k.rtol, FINEST)
+            why, tau, h, guard, taken = _explicit(
+                k, start, tau, h, span, z, times, taken, samples, rtol, scale, arm, level, slips, most
+            )
+        total = 0.0
+        for value in z:
+            total += value
+        if not abs(total) < math.inf:
+            why = STUCK
+        slow = 0 if charts.least_slip(z, scale, k.case) > SMALL_SLIP else slow + 1
+        if why == OTHER:
+            start, tau, h, small = start + tau, 0.0, 0.0, not small
+    return why, (start, tau, h, small, slow), guard, taken

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +11,10 @@ import numpy.typing as npt
 from analytic.mechanics import contact_problem, drag, rigid_body
 from analytic.mechanics.contact_problem import Friction, Impulse, both, project
 from analytic.mechanics.rigid_body import Forces, Velocities, mean
+from analytic.simulation import compiling
+from analytic.simulation.equations import AWAY, ROLLS, SLIPS
+from analytic.simulation.settings import LANDED
 from model.arrays import Array
-
-try:
-    import numba
-except ImportError:
-    numba = None
 
 TOLERANCE, BARELY = 1e-14, 1e-11
 """Change of an impulse per mass at which sweeps stop, relative to sqrt(g R) or the fastest velocity; and where friction
@@ -35,30 +30,9 @@ SLIDES = 4.0
 """A contact slides on through a step if it takes more than this many times the load of the step to stop it."""
 ZERO_SLIP = 1e-9
 """Sliding speed relative to sqrt(g R) up to which a contact is called rolling: above what iterations leave."""
-LANDED = 1e-3
-"""Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
-ROLLS, SLIPS, OPEN = 0, 1, 2
-"""State of a contact; three times that of A plus that of B is the code of the case, see `model.Case`."""
 
 
-F = TypeVar("F", bound=Callable[..., Any])
-_SOURCES = contact_problem, drag, rigid_body
-_DIGEST = hashlib.sha256(b"".join(Path(str(source.__file__)).read_bytes() for source in _SOURCES)).hexdigest()[:16]
-if numba is not None:
-    for each in (drag.rate, mean, rigid_body.state, *contact_problem.COMPILED):
-        numba.extending.register_jitable(error_model="numpy")(each)
-
-
-def compiled(function: F) -> F:
-    """The function, compiled by numba (the extra `fast`) at its first call, so that threads can run it at once.
-
-    Numba keeps what it compiles on disk by name and compiles it again when this file has changed, but not when that of
-    a function has which it calls: the name contains the digest of those. Without numba the function itself, slower.
-    """
-    if numba is None:
-        return function
-    function.__qualname__ += f"_{_DIGEST}"
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+compiled = compiling.compiled(compiling.read(contact_problem, drag, rigid_body))
 
 
 class Constants(NamedTuple):
@@ -367,7 +341,7 @@ def _hit(at: At, dt: float, in_A: bool, in_B: bool, p: Constants) -> Solved:
 @compiled
 def _told(s: Solved, touching: Touching, p: Constants) -> int:
     """The case as a solution tells it: a contact is open if it leaves with a velocity, and rolls if nothing slides."""
-    (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, OPEN, OPEN
+    (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, AWAY, AWAY
     still = ZERO_SLIP * math.sqrt(p.g * p.R)
     if touching.A and (s.P.A_y > 0 or v_y <= 0):
         A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
@@ -423,7 +397,7 @@ def follow(ball: Ball, stretches: Stretches, quiet: float, flow: FlowArrays, p: 
                 landings[row] += ball.landings - known
                 known, landed = ball.landings, now
         if sampled[s]:
-            state = rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p)  # type: ignore[arg-type]  # R and r are all
+            state = rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p)
             for i in range(8):
                 x[row, i] = state[i]
             case[row] = ball.case

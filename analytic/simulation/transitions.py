@@ -4,19 +4,40 @@ Uniqueness. Where Coulomb's law allows the ball to roll on and to slip or lift a
 slip dies out: at two rolling contacts that is `rolling_forces.slip_margin`, at a single one this means that its cone
 holds forces that keep it rolling (docs/theory.md). Case and slip directions are then those of the contact problem of
 the accelerations.
+
+All on plain floats, cases and guards by number, and compiled where numba is installed.
 """
 
 from __future__ import annotations
 
 import math
 
-from analytic.mechanics import contact_problem, dynamics, rigid_body, rolling_forces
-from analytic.mechanics.contact_problem import Closed, NotConvergedError
-from analytic.mechanics.rigid_body import NOTHING, Forces
-from analytic.simulation import two_point_rolling
-from analytic.simulation.motion import FINER, Moment
-from model import Case, Contact, Parameters
-from model.drag import STOKES
+from analytic.mechanics import contact_problem, rigid_body
+from analytic.mechanics.contact_problem import ABSENT, EXACT, RESTS, Closed, NotConvergedError
+from analytic.mechanics.rigid_body import NOTHING, Forces, Velocities
+from analytic.simulation import equations
+from analytic.simulation.equations import (
+    A_LANDS,
+    A_LIFTS,
+    A_SLIPS,
+    A_STICKS,
+    AWAY,
+    B_OPENS,
+    B_SLIPS,
+    B_STICKS,
+    FINER,
+    RN,
+    ROLLS,
+    RR,
+    RR_ENDS,
+    RS,
+    SLIPS,
+    SR,
+    SS,
+    Motion,
+)  # fmt: skip
+from analytic.simulation.motion import Moment
+from model import State
 
 LEAST_ACCELERATION = 1e-9
 """Acceleration in units of g below which a contact point is at rest, well above what the contact problem leaves."""
@@ -26,78 +47,144 @@ AT_ONSET = 1e-7
 EPS = math.ulp(1.0)
 AT_REST = 1e-12
 """Slip after an impact, relative to the speeds before it, that counts as none: the contact problem leaves less."""
+UNSETTLED = "the contact problem doesn't settle"
 
 
-def choose(at: Moment, p: Parameters, omega_0: float, leave_rolling: str = "slip-stability") -> tuple[Case, Moment]:
+def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
+    """The case after a guard has fired, the moment in it, and the impulses of an impact."""
+    x, A, B = at.x, case // 3, case % 3
+    still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
+    if guard in (A_SLIPS, B_SLIPS):
+        alpha, beta = _held(case, at, k)
+        if guard == A_SLIPS:
+            return 3 * SLIPS + B, aimed(at, x, alpha, at.beta), NOTHING
+        return 3 * A + SLIPS, aimed(at, x, at.alpha, beta), NOTHING
+    if guard == A_LIFTS:
+        return 3 * AWAY + B, aimed(at, x, math.nan, at.beta), NOTHING
+    if guard == B_OPENS:
+        return 3 * A + AWAY, aimed(at, x, at.alpha, math.nan), NOTHING
+    if guard == RR_ENDS:
+        after, at = leave(at, k)
+        return after, at, NOTHING
+    y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = x
+    if guard == A_STICKS:
+        slip_x, slip_z = 0.0, -(v_h + v_y) / k.r
+        if B == SLIPS and abs(slip_y) <= still:
+            slip_y = 0.0
+    elif guard == B_STICKS:
+        slip_y = slip_z = 0.0
+        if A == SLIPS and abs(slip_x) <= still:
+            slip_x = 0.0
+    elif guard == A_LANDS:
+        y = 0.0
+    else:
+        h = 0.0
+    return settle(aimed(at, State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h), at.alpha, at.beta), k)
+
+
+def settle(at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
+    """Collide if the ball moves into something it touches, then find the case."""
+    x, impulse = at.x, NOTHING
+    if (x.y == 0 and x.v_y < 0) or (x.h == 0 and x.v_h < 0):
+        at, impulse = collide(at, k)
+    case, at = choose(at, k)
+    return case, at, impulse
+
+
+def aimed(at: Moment, x: State, alpha: float, beta: float) -> Moment:
+    """The moment with another state and directions of slip."""
+    return Moment(at.time, at.theta, x, alpha, beta, at.work)
+
+
+def _held(case: int, at: Moment, k: Motion) -> tuple[float, float]:
+    """Directions in which contacts will slip that roll by the forces of a case: against their friction."""
+    x = at.x
+    lag = x.omega_c - equations.fluid(at.time, k)
+    if case == RN:
+        return math.atan2((k.R - x.h) * lag, -x.v_h), math.nan
+    c = equations.resistance(x.v_h, x.v_y, k.R * lag, k)
+    A_x, _, A_z, _, B_y, B_z = equations.forces(
+        case, x.omega_c, x.v_y, x.slip_x, c, lag, math.sin(at.alpha), math.cos(at.alpha), math.sin(at.beta),
+        math.cos(at.beta), k,
+    )  # fmt: skip
+    return math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
+
+
+def choose(at: Moment, k: Motion) -> tuple[int, Moment]:
     """The case in which a ball goes on, and the moment with the directions of slip filled in.
 
     Contacts are closed where gap and normal speed are exactly zero, and still where the slip is.
     """
     x = at.x
-    slip_x = x.v_h + x.v_y + p.r * x.slip_z
+    slip_x = x.v_h + x.v_y + k.r * x.slip_z
     if abs(slip_x) <= 4 * EPS * abs(x.v_h):  # round-off of a ball that rolls on the floor away from the wall
         slip_x = 0.0
-    A = _closed((slip_x, -p.r * x.slip_x)) if x.y == 0 == x.v_y else None
-    B = _closed((-p.r * x.slip_z, p.r * x.slip_y)) if x.h == 0 == x.v_h else None
-    if not (A == B == Closed()):
-        return _by_accelerations(at, A, B, p, omega_0)
-    if two_point_rolling.MARGINS[leave_rolling](x.omega_c, p, omega_0) >= 0:
-        return Case.RR, at._replace(alpha=math.nan, beta=math.nan)
-    return leave(at, p, omega_0)
+    A = _contact(x.y == 0 and x.v_y == 0, slip_x, -k.r * x.slip_x)
+    B = _contact(x.h == 0 and x.v_h == 0, -k.r * x.slip_z, k.r * x.slip_y)
+    slips = A.s != 0 or A.t != 0 or B.s != 0 or B.t != 0
+    if slips or not (A.closed and B.closed):
+        return _by_accelerations(at, A, B, NOTHING, k)
+    if equations.rolls_on(x.omega_c, at.time, k) >= 0:
+        return RR, aimed(at, x, math.nan, math.nan)
+    return leave(at, k)
 
 
-def leave(at: Moment, p: Parameters, omega_0: float) -> tuple[Case, Moment]:
+def leave(at: Moment, k: Motion) -> tuple[int, Moment]:
     """The case that follows RR where slip or lift lasts, and the moment with its slip directions.
 
     Friction is full where slip sets in and opposes it: forces and rates pass continuously from rolling to slipping.
     Beyond the onset the contact problem may have a solution that rolls, too: one that moves is reached from the forces
     at which rolling gives way.
     """
-    share = float(rolling_forces.last_share(at.x.omega_c, p, omega_0))
-    last = dynamics.rolling_family(at.x.omega_c, p, omega_0, share * p.m * p.g)
-    if rolling_forces.slip_margin(at.x.omega_c, p, omega_0) <= -AT_ONSET:
-        return _by_accelerations(at, Closed(), Closed(), p, omega_0, last)
-    A_x, A_y, A_z, B_x, B_y, B_z = last
+    omega_c, lag = at.x.omega_c, at.x.omega_c - equations.fluid(at.time, k)
+    u, z = equations.loads(omega_c, at.time, k)
+    B_y, c = equations.last_share(u, z, k) * k.m * k.g, equations.resistance(0.0, 0.0, k.R * lag, k)
+    A_x, A_y, A_z, B_x, _, B_z = equations.forces(RR, omega_c, 0.0, 0.0, c, lag, 0.0, 0.0, 0.0, 0.0, k)
+    A_x, A_y, B_x = A_x + B_y, A_y - B_y, B_x - B_y
+    if equations.slip_margin(u, z, k) <= -AT_ONSET:
+        return _by_accelerations(at, RESTS, RESTS, Forces(A_x, A_y, A_z, B_x, B_y, B_z), k)
     alpha, beta = math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
-    wall_alone = p.eta * (B_x + B_y) - abs(B_z)  # what its cone has left where it carries no weight
-    if wall_alone < p.mu * A_y - math.hypot(A_x, A_z):
-        return Case.RS, at._replace(alpha=math.nan, beta=beta)
+    wall_alone = k.eta * (B_x + B_y) - abs(B_z)  # what its cone has left where it carries no weight
+    if wall_alone < k.mu * A_y - math.hypot(A_x, A_z):
+        return RS, aimed(at, at.x, math.nan, beta)
     if abs(A_x) <= 16 * EPS * B_y:
-        return Case.SR, at._replace(alpha=alpha, beta=math.nan)
-    return Case.SS, at._replace(alpha=alpha, beta=beta)
+        return SR, aimed(at, at.x, alpha, math.nan)
+    return SS, aimed(at, at.x, alpha, beta)
 
 
-def _closed(slip: tuple[float, float]) -> Closed:
-    speed = math.hypot(*slip)
-    return Closed(0.0, (slip[0] / speed, slip[1] / speed) if speed else None)
+def _contact(closed: bool, s: float, t: float) -> Closed:
+    """A contact with its slip, m s-1."""
+    speed = math.hypot(s, t)
+    if not closed:
+        return ABSENT
+    return Closed(0.0, s / speed, t / speed, True) if speed > 0 else RESTS
 
 
-def _by_accelerations(
-    at: Moment, A: Closed | None, B: Closed | None, p: Parameters, omega_0: float, start: Forces = NOTHING
-) -> tuple[Case, Moment]:
+def _by_accelerations(at: Moment, A: Closed, B: Closed, start: Forces, k: Motion) -> tuple[int, Moment]:
     """Case and slip directions by the contact problem of the accelerations, solved from the forces `start`."""
-    free = rigid_body.smooth_rates(rigid_body.velocities(at.x, p), at.x.h, omega_0, p)
-    rates, force = contact_problem.solve(free, A, B, p, start, tolerance=LEAST_ACCELERATION / 1e4)
-    contact_A, along_A = _contact(A, force.A_y, rates.v_y, rigid_body.slip_at_A(rates, p), p)
-    contact_B, along_B = _contact(B, force.B_x, rates.v_h, rigid_body.slip_at_B(rates, p), p)
-    alpha = math.atan2(-along_A[1], along_A[0]) if contact_A is Contact.S else math.nan
-    beta = math.atan2(along_B[1], -along_B[0]) if contact_B is Contact.S else math.nan
-    return Case.of(contact_A, contact_B), at._replace(alpha=alpha, beta=beta)
+    free = equations.smooth_rates(rigid_body.velocities(at.x, k), at.x.h, at.time, k)
+    rates, force, settled = contact_problem.solve(free, A, B, k, start, LEAST_ACCELERATION / 1e4)
+    if not settled:
+        raise NotConvergedError(UNSETTLED)
+    (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(rates, k), rigid_body.slip_at_B(rates, k)
+    contact_A, s_A, t_A = _goes_on(A, force.A_y, rates.v_y, s_A, t_A, k)
+    contact_B, s_B, t_B = _goes_on(B, force.B_x, rates.v_h, s_B, t_B, k)
+    alpha = math.atan2(-t_A, s_A) if contact_A == SLIPS else math.nan
+    beta = math.atan2(t_B, -s_B) if contact_B == SLIPS else math.nan
+    return 3 * contact_A + contact_B, aimed(at, at.x, alpha, beta)
 
 
-def _contact(
-    contact: Closed | None, load: float, rise: float, slip_rate: tuple[float, float], p: Parameters
-) -> tuple[Contact, tuple[float, float]]:
+def _goes_on(contact: Closed, load: float, rise: float, s: float, t: float, k: Motion) -> tuple[int, float, float]:
     """State of a contact from its force and accelerations, and the direction in which it slips if it does."""
-    still = LEAST_ACCELERATION * p.g
-    if contact is None or (load <= 0 and rise > still):
-        return Contact.N, (0.0, 0.0)
-    if contact.slip:
-        return Contact.S, contact.slip
-    return (Contact.S, slip_rate) if math.hypot(*slip_rate) > still else (Contact.R, (0.0, 0.0))
+    still = LEAST_ACCELERATION * k.g
+    if not contact.closed or (load <= 0 and rise > still):
+        return AWAY, 0.0, 0.0
+    if contact.s != 0 or contact.t != 0:
+        return SLIPS, contact.s, contact.t
+    return (SLIPS, s, t) if math.hypot(s, t) > still else (ROLLS, 0.0, 0.0)
 
 
-def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, rtol: float) -> tuple[Moment, Forces]:
+def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
     """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's restitution.
 
     Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n| and
@@ -106,32 +193,48 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, rtol:
     geometric series 2 v_n/a/(1 - e)) within rtol sqrt(R/g) where they are known, of a ball that touches the floor only,
     and elsewhere as soon as the tolerance `rtol` of the integrator resolves their height, stays in contact.
     """
-    x, before = at.x, rigid_body.velocities(at.x, p)
-    A = Closed(max(0.0, -restitution * x.v_y)) if x.y == 0 else None
-    B = Closed(max(0.0, -restitution * x.v_h)) if x.h == 0 else None
-    try:
-        u, P = contact_problem.solve(before, A, B, p)
-    except NotConvergedError:
-        if p.mu < 1 or p.eta < 1:
-            raise
-        A = B = Closed()  # friction locks the ball in the corner: no rebound
-        u, P = contact_problem.solve(before, A, B, p)
-    work = at.work + rigid_body.contact_work(rigid_body.mean(before, u), P, p)
-    v_h, v_y = B.target if B and P.B_x > 0 else u.v_h, A.target if A and P.A_y > 0 else u.v_y
+    x, before, e = at.x, rigid_body.velocities(at.x, k), k.restitution
+    A = Closed(max(0.0, -e * x.v_y), 0.0, 0.0, x.y == 0)
+    B = Closed(max(0.0, -e * x.v_h), 0.0, 0.0, x.h == 0)
+    u, P, settled = contact_problem.solve(before, A, B, k, NOTHING, EXACT)
+    if not settled and k.mu >= 1 and k.eta >= 1:
+        A = B = RESTS  # friction locks the ball in the corner: no rebound
+        u, P, settled = contact_problem.solve(before, A, B, k, NOTHING, EXACT)
+    if not settled:
+        raise NotConvergedError(UNSETTLED)
+    work = at.work + rigid_body.contact_work(rigid_body.mean(before, u), P, k)
+    v_h = B.target if B.closed and P.B_x > 0 else u.v_h
+    v_y = A.target if A.closed and P.A_y > 0 else u.v_y
     # Accelerations that bring it back to floor and wall if it leaves them, each while it stays on the other.
-    free = rigid_body.smooth_rates(u, x.h, omega_0, p)
-    on_B, _ = contact_problem.solve(free, None, Closed() if B and u.v_h <= 0 else None, p)
-    on_A, _ = contact_problem.solve(free, Closed() if A and u.v_y <= 0 else None, None, p)
+    free = equations.smooth_rates(u, x.h, at.time, k)
+    on_B, _, _ = contact_problem.solve(free, ABSENT, RESTS if B.closed and u.v_h <= 0 else ABSENT, k, NOTHING, EXACT)
+    on_A, _, _ = contact_problem.solve(free, RESTS if A.closed and u.v_y <= 0 else ABSENT, ABSENT, k, NOTHING, EXACT)
     # A hop that lasts T rises by g T^2/8, well above the tolerance of lengths.
-    unit, integrated = math.sqrt(p.R / p.g), math.sqrt(8 * rtol / FINER * p.R / p.g)
-    if A and 2 * v_y <= (integrated if B or p.drag != STOKES else rtol * unit) * -on_B.v_y * (1 - restitution):
+    integrated = math.sqrt(8 * k.rtol / FINER * k.R / k.g)
+    known = integrated if B.closed or not k.stokes else k.rtol * k.unit
+    if A.closed and 2 * v_y <= known * -on_B.v_y * (1 - e):
         v_y = 0.0
-    if B and 2 * v_h <= integrated * -on_A.v_h * (1 - restitution):
+    if B.closed and 2 * v_h <= integrated * -on_A.v_h * (1 - e):
         v_h = 0.0
-    y = rigid_body.state(x.y, x.h, u._replace(v_h=v_h, v_y=v_y), p)
-    still = AT_REST * math.hypot(*before[:3], *(p.r * o for o in before[3:]))
-    if A and P.A_y > 0 and math.hypot(*rigid_body.slip_at_A(u, p)) <= still:
-        y = y._replace(slip_x=0.0, slip_z=-(v_h + v_y) / p.r)
-    if B and P.B_x > 0 and math.hypot(*rigid_body.slip_at_B(u, p)) <= still:
-        y = y._replace(slip_y=0.0, slip_z=0.0)
-    return at._replace(x=y, alpha=math.nan, beta=math.nan, work=work), P
+    left = Velocities(v_h, v_y, u.v_k, u.o_x, u.o_y, u.o_z)
+    y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = rigid_body.state(x.y, x.h, left, k)
+    still = AT_REST * _size(before, k)
+    (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(u, k), rigid_body.slip_at_B(u, k)
+    if A.closed and P.A_y > 0 and math.hypot(s_A, t_A) <= still:
+        slip_x, slip_z = 0.0, -(v_h + v_y) / k.r
+    if B.closed and P.B_x > 0 and math.hypot(s_B, t_B) <= still:
+        slip_y = slip_z = 0.0
+    after = State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h)
+    return Moment(at.time, at.theta, after, math.nan, math.nan, work), P
+
+
+def _size(u: Velocities, k: Motion) -> float:
+    """Root of the sum of squares of velocities, those of spin times r, m s-1."""
+    spin = k.r * k.r * (u.o_x * u.o_x + u.o_y * u.o_y + u.o_z * u.o_z)
+    return math.sqrt(u.v_h * u.v_h + u.v_y * u.v_y + u.v_k * u.v_k + spin)
+
+
+TEXT = (
+    react, settle, aimed, _held, choose, leave, _contact, _by_accelerations, _goes_on, collide, _size,
+)  # fmt: skip
+"""What is compiled where numba is installed."""

@@ -24,8 +24,9 @@ from scipy.integrate import solve_ivp
 
 from analytic import simulate
 from analytic.simulation import hybrid, integrator
+from analytic.simulation.charts import NONE, Chart
+from analytic.simulation.equations import FINER
 from analytic.simulation.integrator import StalledError, Step
-from analytic.simulation.motion import FINER, Chart
 from analytic.stationary.solutions import solution
 from compare.kit.pages import Rows
 from docs.studies.tables import write
@@ -81,7 +82,7 @@ def run(motion: Motion, rtol: float = 1e-9) -> Any:
 
 def plainly(motion: Motion, rtol: float = 1e-9) -> Any:
     """By the study where numba isn't installed."""
-    with mock.patch.object(integrator, "_solvers", return_value=None):
+    with mock.patch.object(integrator, "solvers", return_value=None):
         return run(motion, rtol)
 
 
@@ -90,17 +91,17 @@ class _Stretch:
 
     method = ""
 
-    def __init__(self, chart: Chart, start: float, until: float, times: Array, relative: float, steady: bool) -> None:
-        self.chart, self.start, self.span, self.relative = chart, start, until - start, relative
+    def __init__(self, chart: Chart, start: float, until: float, times: Array) -> None:
+        self.chart, self.start, self.span = chart, start, until - start
         self.due = times[slice(*np.searchsorted(times, [start, until], side="right"))]
 
     def steps(self, first_step: float | None) -> Iterator[Step]:
         """All as one step; the time of the solver runs from zero, since a direction of slip settles very soon."""
         chart, start = self.chart, self.start
 
-        def guard(k: int) -> Callable[[float, Any], float]:
+        def falling(k: int) -> Callable[[float, Any], float]:
             def value(t: float, z: Any) -> float:
-                return chart.guards(start + t, z)[k]
+                return float(chart.guards(start + t, z)[k])
 
             value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
             return value
@@ -111,20 +112,20 @@ class _Stretch:
             chart.start,
             method=self.method,
             t_eval=np.union1d(self.due - start, [self.span]).clip(0.0, self.span),
-            events=[guard(k) for k in range(len(chart.ends))],
+            events=[falling(k) for k in range(len(chart.ends))],
             first_step=first_step,
-            rtol=self.relative,
-            atol=self.relative / FINER * np.array(chart.scale),
+            rtol=chart.k.rtol,
+            atol=chart.k.rtol / FINER * np.array(chart.scale),
         )
         if found.status < 0:
             raise StalledError(found.message)
         fired = [k for k, times in enumerate(found.t_events) if len(times)]
-        end, z, name = self.span, found.y[:, -1] if found.y.size else np.array(chart.start), None
+        end, z, guard = self.span, found.y[:, -1] if found.y.size else np.array(chart.start), NONE
         if fired:
-            end, z, name = float(found.t_events[fired[0]][0]), found.y_events[fired[0]][0], chart.ends[fired[0]]
+            end, z, guard = float(found.t_events[fired[0]][0]), found.y_events[fired[0]][0], chart.ends[fired[0]]
         count = int(np.searchsorted(self.due - start, end, side="right"))
-        samples = found.y.T[:count] if count else integrator.NONE
-        yield Step(start + end, z.tolist(), self.due[:count], samples, name)
+        samples = found.y.T[:count] if count else integrator.NO_SAMPLES
+        yield Step(start + end, z.tolist(), self.due[:count], samples, guard)
 
 
 def by_scipy(motion: Motion, method: str, rtol: float) -> Any:

@@ -8,6 +8,7 @@ import pytest
 from analytic import contact_forces, vector_field
 from analytic.mechanics.rigid_body import energy, velocities
 from analytic.simulation import charts, motion
+from analytic.simulation.settings import Settings
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS
@@ -16,9 +17,6 @@ from tests.directions import slip_directions
 from tests.drag_laws import resistance
 
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
-FLOOR = 1e-9
-
-
 RAMP = motion.Fluid(0.0, P.omega_0, 3.0)
 
 
@@ -46,7 +44,7 @@ def test_rates_are_those_of_the_vector_field(case, law):
     p = P.replace(drag=law, nu_f=1e-5)
     for seed in range(20):
         at = moment(case, seed)
-        chart = charts.chart(case, at, p, RAMP, FLOOR, "infeasible")
+        chart = charts.Chart.of(case, at, motion.of_ball(p, RAMP, Settings()))
         rate = np.array(chart.rates(at.time, chart.start))
         step = 1e-7
         t, z = at.time + step * np.array([-1.0, 0, 1]), np.array(chart.start)[:, None]
@@ -80,8 +78,8 @@ def test_vanishing_slip_has_a_direction(case):
     if case.B is Contact.S:
         x = x._replace(slip_y=0.0, slip_z=0.0)
     at = motion.Moment(at.time, at.theta, x, at.alpha, at.beta)
-    chart = charts.chart(case, at, P, RAMP, FLOOR, "infeasible")
-    assert chart.least_slip(chart.start) == pytest.approx(0.0, abs=1e-15)
+    chart = charts.Chart.of(case, at, motion.of_ball(P, RAMP, Settings()))
+    assert charts.least_slip(chart.start, chart.scale, case) == pytest.approx(0.0, abs=1e-15)
     path = chart.path(np.array([at.time]), np.array(chart.start)[:, None])
     for given, kept in ((at.alpha, path.alpha[0]), (at.beta, path.beta[0])):
         if not math.isnan(given):

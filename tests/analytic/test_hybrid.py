@@ -197,7 +197,7 @@ def test_a_solver_that_fails_gives_way_to_the_other(name, monkeypatch):
         simulate(*given, sample_interval=0.1),
         {each: getattr(integrator, each) for each in ("BDF", "LSODA")},
     )
-    monkeypatch.setattr(integrator, "_solvers", lambda: None)
+    monkeypatch.setattr(integrator, "solvers", lambda: None)
     with monkeypatch.context() as patch:
         patch.setattr(integrator, name, fails := failing(solvers[name], (10, 30, 31, 60)))
         run = simulate(*given, sample_interval=0.1)

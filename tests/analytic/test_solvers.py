@@ -30,7 +30,7 @@ def both(monkeypatch, *given, **settings):
     """Runs with compiled steps and without."""
     compiled = simulate(*given, **settings)
     with monkeypatch.context() as patch:
-        patch.setattr(integrator, "_solvers", lambda: None)
+        patch.setattr(integrator, "solvers", lambda: None)
         return compiled, simulate(*given, **settings)
 
 

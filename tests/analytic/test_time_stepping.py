@@ -79,7 +79,7 @@ def test_no_convergence_keeps_the_samples():
     assert len(kept.time) > 1
     assert np.all(np.isfinite(kept.x))
     # Among many at once it leaves the others alone.
-    x0, settings = State(y=1.0, h=P.R / 2), Settings(timestep=dt)
+    x0, settings = State(y=1.0, h=P.R / 2), Settings(method="time-stepping", timestep=dt)
     many = simulate_many([P, p], x0, 0.2, settings=settings, sample_interval=0.1)
     assert many.failure[0] == ""
     assert "a shorter step" in many.failure[1]
@@ -170,7 +170,8 @@ from model import Parameters
 p = Parameters.named("reference")
 sets = [p.replace(omega_0=12.0), p.replace(omega_0=25.0, eta=0.6), p.replace(mu=1.5, omega_0=40.0)]
 x0 = [0.005, 0, 20, 10, 20, 30, 0.001, 0]
-np.save(sys.argv[1], simulate_many(sets, x0, 0.05, settings=Settings(timestep=2e-4), sample_interval=0.05).x)
+settings = Settings(method="time-stepping", timestep=2e-4)
+np.save(sys.argv[1], simulate_many(sets, x0, 0.05, settings=settings, sample_interval=0.05).x)
 """
 
 

@@ -15,6 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from analytic.mechanics.drag import Law
+from analytic.simulation import ensemble
+from analytic.simulation.equations import Motion
 from compare.kit.levels import Level
 from model import Case, Parameters
 
@@ -44,12 +47,14 @@ class WrongTheory:
 def believed(wrong: WrongTheory) -> Iterator[None]:
     """Believe a wrong theory: every name and table entry of the right function stands for the wrong one."""
     right = getattr(importlib.import_module(wrong.module), wrong.function)
-    put = wrong.wrong(right)
+    put, compiled = wrong.wrong(right), ensemble.whole_runs
     _exchange(right, put)
+    ensemble.whole_runs = lambda: None  # whole runs are compiled, and would believe what they believed then
     try:
         yield
     finally:
         _exchange(put, right)
+        ensemble.whole_runs = compiled
 
 
 def _exchange(old: Function, new: Function) -> None:
@@ -72,12 +77,16 @@ def scaled(factor: float, *entries: int) -> Fault:
     return answer(times(factor, *entries))
 
 
-def given(change: Callable[[Parameters], Parameters]) -> Fault:
+Ball = Parameters | Motion
+"""The parameters of a ball, as they are given or as plain numbers."""
+
+
+def given(change: Callable[[Any], Any]) -> Fault:
     """It takes other parameters for those of the ball."""
-    change = functools.cache(change)
+    change = functools.lru_cache(change)
 
     def taking(right: Function) -> Function:
-        return lambda *args, **named: right(*(change(a) if isinstance(a, Parameters) else a for a in args), **named)
+        return lambda *args, **named: right(*(change(a) if isinstance(a, Ball) else a for a in args), **named)
 
     return taking
 
@@ -94,17 +103,25 @@ def where(test: Callable[[Any], bool], fault: Fault) -> Fault:
 
 def in_case(case: Case, fault: Fault) -> Fault:
     """The fault shows only where the first argument is this case."""
-    return where(lambda first: first is case, fault)
+    return where(lambda first: first == case, fault)
 
 
-def other(**factors: float) -> Callable[[Parameters], Parameters]:
+def replaced(p: Ball, **values: Any) -> Ball:
+    """The parameters with some of them changed."""
+    if isinstance(p, Parameters):
+        return p.replace(**values)
+    law = Law(*(term * (values.get("c", p.c) / p.c if p.c else 1.0) for term in p.law))
+    return p._replace(law=law, **values)
+
+
+def other(**factors: float) -> Callable[[Ball], Ball]:
     """The parameters with some of them multiplied."""
-    return lambda p: p.replace(**{name: getattr(p, name) * factor for name, factor in factors.items()})
+    return lambda p: replaced(p, **{name: getattr(p, name) * factor for name, factor in factors.items()})
 
 
-def swapped(p: Parameters) -> Parameters:
+def swapped(p: Ball) -> Ball:
     """The parameters with the friction coefficients of floor and wall exchanged."""
-    return p.replace(mu=p.eta, eta=p.mu)
+    return replaced(p, mu=p.eta, eta=p.mu)
 
 
 def fields(**changes: Change) -> Change:

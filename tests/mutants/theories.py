@@ -388,10 +388,10 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "flowmeter.pulsation.first_harmonic": {"rolling is ahead of a pulsation": answer(np.conj)},
     # Motions
     "simulation.transitions.collide": {
-        "landings rebound by a tenth": lambda right: lambda at, p, w, e, *rest: right(at, p, w, 0.1, *rest),
+        "landings rebound by a tenth": lambda right: lambda at, k: right(at, k._replace(restitution=0.1)),
         "landings with 5 % more floor friction": given(other(mu=1.05)),
         "rebounds with nine tenths of the restitution": lambda right: (
-            lambda at, p, w, e, *rest: right(at, p, w, 0.9 * e, *rest)
+            lambda at, k: right(at, k._replace(restitution=0.9 * k.restitution))
         ),
         "landings on the wall with 5 % more friction": where(lambda at: at.x.h == 0, given(other(eta=1.05))),
     },

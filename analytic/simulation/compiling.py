@@ -1,0 +1,57 @@
+"""Compiling by numba, which the extra `fast` installs."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any, TypeVar
+
+try:
+    import numba
+    from numba.extending import overload, register_jitable
+except ImportError:
+    numba = None
+
+F = TypeVar("F", bound=Callable[..., Any])
+_CALLED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_registered = set[Callable[..., Any]]()
+
+
+def read(*modules: ModuleType) -> str:
+    """Have the `TEXT` of modules compiled wherever compiled functions call it; a digest of their sources."""
+    for function in (each for module in modules for each in module.TEXT):
+        if numba is not None and function not in _registered:
+            _registered.add(register_jitable(**_CALLED)(function))
+    return hashlib.sha256(b"".join(Path(str(module.__file__)).read_bytes() for module in modules)).hexdigest()[:16]
+
+
+def compiled(digest: str) -> Callable[[F], F]:
+    """A function compiled at its first call, so that threads can run it at once; the function itself without numba.
+
+    Numba keeps what it compiles on disk by name and compiles it again when its own file has changed, but not when that
+    of a function has which it calls: the name contains the digest of those.
+    """
+
+    def compile_(function: F) -> F:
+        if numba is None:
+            return function
+        own: Any = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
+        own.__qualname__, own.__doc__ = f"{function.__qualname__}_{digest}", function.__doc__
+        try:
+            return numba.njit(cache=True, nogil=True, error_model="numpy")(own)  # type: ignore[no-any-return]
+        except RuntimeError:  # no place for a cache
+            return numba.njit(nogil=True, error_model="numpy")(own)  # type: ignore[no-any-return]
+
+    return compile_
+
+
+def in_place_of(function: Callable[..., Any]) -> Callable[[F], F]:
+    """A function that is compiled where compiled functions call another one."""
+
+    def register(other: F) -> F:
+        overload(function, strict=False, jit_options=_CALLED)(lambda *types: other)
+        return other
+
+    return register
