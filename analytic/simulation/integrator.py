@@ -124,7 +124,8 @@ class Stretch:
         chart, times, here, scale = self.chart, self.times, np.array(self.chart.start), np.array(self.chart.scale)
         motion = chart.k._replace(waves=np.array(chart.k.waves, dtype=float).reshape(-1, 3))
         taken = int(np.searchsorted(times, self.start, side="right"))
-        samples = np.empty((int(np.searchsorted(times, self.until, side="right")), len(here)))
+        room = int(np.searchsorted(times, self.until, side="right")) + 1  # `_passed` may be a last digit ahead
+        samples = np.empty((room, len(here)))
         arm, level, why = np.array(self._arm), np.array(self._level), solvers.PAUSED
         pace = solvers.first_pace(self.start, here, scale, chart.k.case, self._opens, first_step or 0.0)
         while why == solvers.PAUSED:

@@ -436,8 +436,8 @@ def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, fir
 
 
 TEXT = (
-    _copy, _between, _root, _pass, _combined, _dense, _first_fall, _left, _passed, _explicit, _lowest, _factored, _solve,
-    _extrapolated, _implicit, first_pace,
+    _copy, _between, _root, _pass, _combined, _dense, _first_fall, _left, _passed, _explicit, _lowest, _factored,
+    _solve, _extrapolated, _implicit, first_pace,
 )  # fmt: skip
 """What is compiled."""
 

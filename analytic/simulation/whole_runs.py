@@ -64,7 +64,7 @@ def _follow(case: int, at: Moment, until: float, k: Motion, run: Course) -> tupl
     pace = solvers.first_pace(at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0)
     if run.taken[0] == 0:
         _sample(case, at, run)
-    samples = np.empty((np.searchsorted(run.times, until, side="right"), n))
+    samples = np.empty((np.searchsorted(run.times, until, side="right") + 1, n))
     why, guard, now = solvers.PAUSED, NONE, at.time
     most = int(np.int64(REPORT_EVERY))  # a constant would be compiled for itself
     while why == solvers.PAUSED:
