@@ -18,6 +18,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mjsim import corrections as source
 from mjsim.corrections import Ball, Velocity
+from mjsim.coulomb.compiled import alone
 from model.arrays import Array
 
 for name in ("slip", "resistance", "lands", "hovering", "near_axis", "unbearable"):  # the others call them
@@ -77,5 +78,6 @@ def drive(
 
 
 _FLAGS = types.Array(types.boolean, 1, "C")
-drive.compile((types.float64[::1], _ROWS, _FLAGS, _FLAGS, *[_GIVEN] * 2, *[_ROWS] * 9))
+with alone(drive):
+    drive.compile((types.float64[::1], _ROWS, _FLAGS, _FLAGS, *[_GIVEN] * 2, *[_ROWS] * 9))
 drive.disable_compile()

@@ -22,8 +22,18 @@ def _under_law(served: Any, duration: Any, anew: Any) -> Any:
     return lambda served, duration, anew: kernels.step_of(served[0], served[1], served[2], duration, anew)
 
 
-_named = compiled.named_after(corrections, world_axes, free, landing, kernels)
-steps, through = (
-    numba.njit(cache=True, nogil=True, error_model="numpy")(_named(function))
-    for function in (free.steps, landing.through)
-)
+def _compiled(function: Any) -> Any:
+    """A loop that is compiled when it is called first, by one process at a time."""
+    named = compiled.named_after(corrections, world_axes, free, landing, kernels)(function)
+    loop = numba.njit(cache=True, nogil=True, error_model="numpy")(named)
+
+    def call(*given: Any) -> Any:
+        if loop.signatures:
+            return loop(*given)
+        with kernels.alone(loop):
+            return loop(*given)
+
+    return call
+
+
+steps, through = _compiled(free.steps), _compiled(landing.through)

@@ -116,6 +116,9 @@ class Run:
             for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
+        corner = (1 / math.cos(math.pi / settings.facets) - 1) * (settings.wall == "prism")
+        self._deepest = np.array([(p.r + (p.R + p.r) * corner, p.r) for p in parameters])
+        """How far h and y may be negative: a ball with its centre beyond wall or floor has come through."""
         lengths = [(p.R, p.r) for p in parameters]
         self._alike = [[i for i, own in enumerate(lengths) if own == each] for each in dict.fromkeys(lengths)]
         """Runs of the same geometry, whose samples are worked out together."""
@@ -187,7 +190,8 @@ class Run:
         """Samples of each run from raw ones (samples, runs, columns), cut where a run breaks down."""
         last = first + len(raw)
         time = np.arange(first, last, dtype=np.float64) * (self._interval * self._settings.timestep)
-        sound = np.logical_and.accumulate((np.abs(raw) < HUGE).all(axis=2)).T
+        inside = (raw[..., 1:3] > -self._deepest).all(axis=2)
+        sound = np.logical_and.accumulate((np.abs(raw) < HUGE).all(axis=2) & inside).T
         sound &= np.array([[not header.failure] for header in self.headers])
         blocks = [np.empty(0, SAMPLE)] * len(self.headers)
         for runs in self._alike:

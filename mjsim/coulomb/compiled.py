@@ -7,12 +7,13 @@ their addresses. What a simulation remembers lies in blocks of memory, whose add
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import dataclasses
 import functools
 import math
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -227,6 +228,18 @@ def compiled(function: Any) -> Any:
     template = dispatcher.get_call_template
     dispatcher.get_call_template = lambda given, named: template(tuple(map(types.unliteral, given)), named)
     return dispatcher
+
+
+@contextlib.contextmanager
+def alone(function: Any) -> Iterator[None]:
+    """Of processes that begin at once one compiles a function, and the others wait for what it keeps on disk."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(ImportError, OSError, TypeError):  # no such locks here, or no place for a cache
+            import fcntl
+
+            file = stack.enter_context((Path(function.stats.cache_path) / "compiling").open("w"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 @compiled
@@ -1233,7 +1246,8 @@ def _put_back(m: int, d: int, head: int) -> bool:
 def link() -> None:
     """Compile the law, and let those that follow call it by its address: once is enough."""
     for function in control, retain:
-        function.compile((types.intp,) * 3)
+        with alone(function):
+            function.compile((types.intp,) * 3)
         (result,) = function.overloads.values()
         address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
         llvmlite.binding.add_symbol(f"coulomb_{function.__name__}", address)

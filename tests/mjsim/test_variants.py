@@ -5,7 +5,7 @@ import pytest
 
 import mjsim
 from mjsim import ContactSettings
-from model import Parameters
+from model import Parameters, SimulationError, State
 
 P = Parameters.named("reference").replace(omega_0=12.0)
 ROLLING = [0, 0, 12.0, 0, 0, 0]
@@ -23,6 +23,14 @@ def test_free_joint_creeps_up_the_wall() -> None:
     predicted = P.R * run.omega_c[-1] ** 2 / settings.b_f
     assert P.r * run.slip_z[-1] == pytest.approx(predicted, rel=0.01)
     assert np.all(np.diff(run.theta) > 0)
+
+
+@pytest.mark.filterwarnings("ignore:the ball slips")
+@pytest.mark.parametrize("settings", [free(servo=0.0), free(wall="prism", servo=0.0), ContactSettings.rigid_at(1e-3)])
+def test_a_free_ball_that_flies_through_the_wall_has_diverged(settings) -> None:
+    for omega_c in (1e6, 1e9):
+        with pytest.raises(SimulationError, match="the simulation diverged by t = "):
+            mjsim.simulate(P, State(omega_c=omega_c), 0.1, settings=settings)
 
 
 def test_prism_judders() -> None:
