@@ -218,7 +218,7 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
             for at in zip(cost, error, strict=True) if len(shown) <= FEW else ():
                 place = at[0], max(at[1], LEAST)
-                axes.annotate(f"{at[1]:.0e}", place, xytext=(6, 3), textcoords="offset points", fontsize=8)
+                axes.annotate(f"{at[1]:.1e}", place, xytext=(6, 3), textcoords="offset points", fontsize=8)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)

@@ -102,7 +102,7 @@ def noticed(powers: Mapping[str, float]) -> str:
     alike: dict[str, list[str]] = {}
     for name, power in powers.items():
         if quantity(name).resolves:
-            alike.setdefault(f"{power:.1g}" if power < 1 else "", []).append(SYMBOLS[name])
+            alike.setdefault(f"{power:.2g}" if power < 1 else "", []).append(SYMBOLS[name])
     blind = ", ".join(alike.pop("", []))
     errors = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
     parts = [f"a relative error of {errors}"] * bool(errors) + [f"none in {blind}, which are too coarse"] * bool(blind)
@@ -119,7 +119,7 @@ def said(witness: Witness) -> str:
     if witness.outcome is not Outcome.CONFIRMED:
         return witness.outcome
     power = coarsest(witness)
-    return f"{witness.outcome} to {power:.0e}" if math.isfinite(power) else f"{witness.outcome} by counts"
+    return f"{witness.outcome} to {power:.1e}" if math.isfinite(power) else f"{witness.outcome} by counts"
 
 
 def heard(witness: Witness) -> str:
@@ -137,8 +137,9 @@ def heard(witness: Witness) -> str:
 
 
 def percent(share: float) -> str:
-    """A relative deviation with one digit."""
-    return f"{float(f'{100 * share:.1g}'):g} %" if share >= 1e-6 else f"{share:.0e}" if share else "0"
+    """A relative deviation with two digits."""
+    shown = f"{100 * share:#.2g}".rstrip(".") if share < 0.995 else f"{100 * share:.0f}"
+    return f"{shown} %" if share >= 1e-6 else size(share)
 
 
 def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
@@ -158,7 +159,7 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
             "asked": str(len(own) - counts[Outcome.NOT_ASKED]),
             "confirmed": f"{counts[Outcome.CONFIRMED]}",
             "counted": str(len(powers) - len(known)),
-            "to": f"{median(known):.0e}, at worst {max(known):.0e}" if known else "–",
+            "to": f"{median(known):.1e}, at worst {max(known):.1e}" if known else "–",
             "refuted": refuted,
             "open": str(counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]),
             "typical": percent(median(each.typical for each in off)) if off else "–",

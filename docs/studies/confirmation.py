@@ -50,7 +50,7 @@ def rows() -> list[Row]:
 def table() -> list[list[str]]:
     """The rows as text, with their head."""
     body = [
-        [r.what, r.unit, f"{r.predicted:.6g}", f"{r.measured:.6g}", f"{r.error:+.0e}", f"{r.tolerance:.0e}"]
+        [r.what, r.unit, f"{r.predicted:.6g}", f"{r.measured:.6g}", f"{r.error:+.1e}", f"{r.tolerance:.1e}"]
         for r in rows()
     ]
     return [["what", "unit", "predicted", "measured", "relative error", "allowed"], *body]

@@ -240,11 +240,11 @@ def holding() -> Rows:
     return [
         ["", *WAYS],
         *(
-            [f"{name} (`{scene}.xml`): creep, m/s", *(f"{creep(scene, way):.0e}" for way in WAYS.values())]
+            [f"{name} (`{scene}.xml`): creep, m/s", *(f"{creep(scene, way):.1e}" for way in WAYS.values())]
             for scene, name in SCENES.items()
         ),
         ["box that is pulled: breaks away at, μN", *(f"{breakaway(way):.4f}" for way in WAYS.values())],
-        ["box shaken on a slope of 10°: drift in 8 s, m", *(f"{shaken(way):.0e}" for way in WAYS.values())],
+        ["box shaken on a slope of 10°: drift in 8 s, m", *(f"{shaken(way):.1e}" for way in WAYS.values())],
     ]
 
 
@@ -291,7 +291,7 @@ def sliding() -> Rows:
             [
                 "box that slides down 20°, μ 0.25: error of its acceleration",
                 f"{1e3 * step:g}",
-                *(f"{x:.0e}" for x, _ in down),
+                *(f"{x:.1e}" for x, _ in down),
             ],
             ["its contact is lost in", f"{1e3 * step:g}", *(f"{lost:.0%}" for _, lost in down)],
             [
@@ -303,7 +303,7 @@ def sliding() -> Rows:
             [
                 "ball that slides, then rolls: 5/7 v",
                 f"{1e3 * step:g}",
-                *(f"{rolling(step, way):+.0e}" for way in ways.values()),
+                *(f"{rolling(step, way):+.1e}" for way in ways.values()),
             ],
         ]
     return [rows[0], *sorted(rows[1:], key=lambda row: [r[0] for r in rows].index(row[0]))]
@@ -324,7 +324,7 @@ def landing() -> Rows:
         lowest = next(k for k, height in enumerate(heights) if height < 0.02 and heights[k + 1] >= height)
         top = max(heights[lowest:])
         rows.append(
-            [f"{name}, {way}", f"{max(-min(heights), 0):.0e}", f"{max(speeds[lowest:]):.0e}", f"{top / 0.2:.4f}"]
+            [f"{name}, {way}", f"{max(-min(heights), 0):.1e}", f"{max(speeds[lowest:]):.1e}", f"{top / 0.2:.4f}"]
         )
     return rows
 
@@ -341,7 +341,7 @@ def choices() -> Rows:
             rest, rise = rest + (drift < STILL and not mixed), max(rise, risen)
             solves, steps = solves + stepper._own.solves, steps + 3000  # type: ignore[attr-defined]
         height = max(pushed_off(4e-3, {"law": law}, mu, speed)[0] for mu, speed in ((0.2, 2.0), (1.2, 2.0), (1.2, 5.0)))
-        return [f"{solves / steps:.2f}", f"{rest} of {CHOSEN}", f"{rise:.0e}", f"{1e6 * height:.2g}"]
+        return [f"{solves / steps:.2f}", f"{rest} of {CHOSEN}", f"{rise:.1e}", f"{1e6 * height:.2g}"]
 
     laws: dict[str, dict[str, Any]] = {
         "**soft**: slip foreseen to a twentieth of gravity": {},
@@ -378,7 +378,7 @@ def servo() -> Rows:
         stepper.step(data, 2500)
         place = data.xpos.copy()
         stepper.step(data, 500)
-        return [f"{np.abs(data.contact.dist).max():.0e}", f"{np.abs(data.xpos - place).max():.0e}"]
+        return [f"{np.abs(data.contact.dist).max():.1e}", f"{np.abs(data.xpos - place).max():.1e}"]
 
     def rolls(servo: float | None) -> list[str]:
         model = one('<geom size=".01" mass=".03"/>', slope=5)
@@ -389,7 +389,7 @@ def servo() -> Rows:
         speed = data.qvel[0]
         stepper.step(data, 500)
         exact = 5 / 7 * G * math.sin(math.radians(5))
-        return [f"{np.abs(data.contact.dist).max():.0e}", f"{(data.qvel[0] - speed) / exact - 1:+.1e}"]
+        return [f"{np.abs(data.contact.dist).max():.1e}", f"{(data.qvel[0] - speed) / exact - 1:+.1e}"]
 
     def dropped(servo: float | None) -> list[str]:
         model = one(BOX.replace("mass", 'euler="10 20 0" mass'))
@@ -459,7 +459,7 @@ def fallen(way: dict[str, Any], mixed: bool, seed: int) -> tuple[float, float]:
 
 def piles() -> Rows:
     """How many piles come to rest, and how energy rises."""
-    rises = [f"energy rises by more than {rise:.0e} J in" for rise in RISES]
+    rises = [f"energy rises by more than {rise:g} J in" for rise in RISES]
     middle = ["by: median, J", "most but ten, J", "most, J"]
     rows = [["piles", "way", "at rest to 1e-9 m", "largest drift in a second: median, m", *rises, *middle]]
     ways: dict[str, dict[str, Any]] = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
@@ -471,8 +471,8 @@ def piles() -> Rows:
                 drift, rise = np.transpose(list(done))
             kind = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}"
             rose = [str((rise > least).sum()) for least in RISES]
-            quantiles = [f"{x:.0e}" for x in np.quantile(rise, (0.5, 1 - 10 / PILES, 1.0))]
-            rows.append([kind, name, str((drift < STILL).sum()), f"{np.median(drift):.0e}", *rose, *quantiles])
+            quantiles = [f"{x:.1e}" for x in np.quantile(rise, (0.5, 1 - 10 / PILES, 1.0))]
+            rows.append([kind, name, str((drift < STILL).sum()), f"{np.median(drift):.1e}", *rose, *quantiles])
     return rows
 
 

@@ -116,7 +116,7 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
         if quantity.resolves and name in powers[-1]:
             cells = [_power([each[0] for each in power.get(name, ())], quantity.resolves) for power in powers]
             where = "{1}, {2}".format(*powers[-1][name][0])
-            rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *itertools.chain(*cells), where])
+            rows.append([quantity.symbol, f"{quantity.resolves:.2g}", *itertools.chain(*cells), where])
     tables = _table("theories", {each.name: each.trials for each in (*levels, *alone)})
     tables += _table("engines", {"quick": measured}) if measured else ""
     names, partly = (
@@ -153,7 +153,7 @@ def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
     if not values:
         return ("not measured",) * 3
     sharp = sum(value <= ceiling / 10 for value in values) / len(values)
-    return f"{max(values):.1g}", f"{statistics.median(values):.1g}", f"{sharp:.0%}"
+    return f"{max(values):.2g}", f"{statistics.median(values):.2g}", f"{sharp:.0%}"
 
 
 def _table(what: str, tried: Mapping[str, Sequence[Trial]]) -> str:

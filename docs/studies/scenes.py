@@ -88,7 +88,7 @@ def figures(kept: Kept) -> Rows:
         ways = kept[name]["ways"] if name in kept else {}
         for quantity in ways.get("plain", {"values": {}})["values"]:
             cells = [
-                ": ".join([f"{ways[way]['values'][quantity]:.0e}", *ways[way]["wrong"]]) if way in ways else "–"
+                ": ".join([f"{ways[way]['values'][quantity]:.1e}", *ways[way]["wrong"]]) if way in ways else "–"
                 for way in WAYS
             ]
             rows.append([f"{scene.title}: {quantity}", *cells])

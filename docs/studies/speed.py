@@ -155,7 +155,7 @@ def event_driven() -> Rows:
         for way in (run, plainly):
             error = deviation(way(motion).x, right)
             worst = max(worst, error)
-            row += [f"{1e3 * seconds(lambda way=way, motion=motion: way(motion)):.2f}", f"{error:.0e}"]  # type: ignore[misc]
+            row += [f"{1e3 * seconds(lambda way=way, motion=motion: way(motion)):.2f}", f"{error:.1e}"]  # type: ignore[misc]
         for method in METHODS:
             row += _no_worse(motion, method, worst, right)
         rows.append(row)
@@ -171,7 +171,7 @@ def _no_worse(motion: Motion, method: str, worst: float, right: Array) -> list[s
             return ["fails", "–"]
         if error <= worst or rtol == TOLERANCES[-1]:
             spent = seconds(lambda rtol=rtol: by_scipy(motion, method, rtol), 2)  # type: ignore[misc]
-            return [f"{1e3 * spent:.1f}", f"{error:.0e}"]
+            return [f"{1e3 * spent:.1f}", f"{error:.1e}"]
     raise AssertionError
 
 

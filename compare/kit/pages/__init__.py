@@ -42,7 +42,7 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
 
 _SYMBOL = re.compile(
     r"((?:(?<![\w.])[A-Za-z]|[Α-ω])\u0303?)(?:_([A-Za-z0-9]{1,3})(?![A-Za-z0-9_(])|([₀-₉]+))"  # with an index
-    r"|((?<![\w.])j(?![\w'’])|[Α-ω](?![a-z]))"  # alone
+    r"|((?<![\w.])j(?![\w'’])|[Α-ω](?![a-z])|[Α-ω]?(?<![A-Za-z_])[mgRrcj]+(?=[Α-ω]))"  # alone, or a product
 )
 _DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 
