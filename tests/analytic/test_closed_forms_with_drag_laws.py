@@ -108,7 +108,7 @@ def test_fold_where_the_drag_bends(nu_f):
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("eta", [0.02, 0.2, 0.39, 0.6])
-@pytest.mark.parametrize("omega_0", [0.5, 1.0, 5.0, 8.0, 13.0, 14.0, 20.0, 22.0, 28.0, 31.0, 31.5, 33.0, 41.0, 60.0])
+@pytest.mark.parametrize("omega_0", [0.5, 5.0, 13.0, 14.0, 22.0, 31.5, 33.0, 60.0])
 def test_solutions_are_zeros_of_the_equations(law, omega_0, eta):
     """To round-off of the largest acceleration.
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from compare.adapters.scene import upright
-from compare.bench import cases, run
+from compare.bench import run
 from model import InputError
 from model.kinematics import rotated
+from tests.exact_cases import CASES
 
-CASES = {case.name: case for case in cases()}
 OWN = "compare.adapters"
 
 

@@ -13,8 +13,8 @@ from compare.bench.case import TOLERANCE, VERSION, read
 from compare.commands import cli
 from model import InputError, StorageError
 from model.kinematics import rotated
+from tests.exact_cases import CASES
 
-CASES = {case.name: case for case in cases()}
 SHARP = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12}
 
 
@@ -224,7 +224,7 @@ def test_another_way_leads_to_the_same_motion_and_not_to_a_wrong_one(name):
 
 
 def test_every_new_case_has_another_way():
-    assert {name for name, case in CASES.items() if case.needs} | {"rocking-block"} == WAYS.keys()
+    assert {case.name for case in cases() if case.needs} | {"rocking-block"} == WAYS.keys()
 
 
 @pytest.mark.parametrize(("name", "switches"), [("rocking-block", 7), ("bounce", 5)])
@@ -261,8 +261,8 @@ def test_an_adapter_of_version_1_takes_what_it_took_and_is_not_asked_for_more(tm
 
 def test_files_of_cases_are_read_whatever_their_version(tmp_path, capsys):
     assert cli.main(["cases", "-o", str(tmp_path)]) == 0
-    for name, case in CASES.items():
-        again = read(tmp_path / f"{name}.json")
+    for case in cases():
+        again = read(tmp_path / f"{case.name}.json")
         assert again.error(case.exact) == 0
         assert (again.bodies, again.surfaces, again.needs) == (case.bodies, case.surfaces, case.needs)
     data = json.loads((tmp_path / "box-stops.json").read_text())

@@ -15,10 +15,7 @@ from compare.bench.case import TIME_STEPS, VERSION
 from compare.bench.runner import run_all
 from compare.commands import cli
 from model import InputError
-
-BY_NAME = {case.name: case for case in cases()}
-STOPS = BY_NAME["box-stops"]
-
+from tests.exact_cases import CASES
 
 BREAKS = {
     "sphere-rolls-down": ("hangs", "took longer than 3 s at a step of 4 ms"),
@@ -68,7 +65,7 @@ EXACT, ROUGH = Exact(), Exact(PRECISION="f32")
 
 def test_what_breaks_loses_the_case_and_not_the_run():
     first, *broken, last = run_all(
-        [BY_NAME[name] for name in ("block-slides", *BREAKS, "turntable")], Exact(breaks=True), limit=3.0
+        [CASES[name] for name in ("block-slides", *BREAKS, "turntable")], Exact(breaks=True), limit=3.0
     )
     assert first.passed
     assert last.passed
@@ -77,17 +74,19 @@ def test_what_breaks_loses_the_case_and_not_the_run():
 
 
 def test_errors_order_creep_and_cost():
-    found = run(STOPS, Exact())
+    found = run(CASES["box-stops"], Exact())
     assert found.passed
     assert found.steps == TIME_STEPS
     assert found.order == pytest.approx(1.0)
-    assert found.errors[-1] == pytest.approx(TIME_STEPS[-1] * STOPS.times[-1] / STOPS.scales[0])
+    assert found.errors[-1] == pytest.approx(
+        TIME_STEPS[-1] * CASES["box-stops"].times[-1] / CASES["box-stops"].scales[0]
+    )
     assert found.creep == 0
     assert found.lost == 0
     assert found.cost >= 0
-    assert run(BY_NAME["growing-pull"], Exact()).skipped == "no forces"
+    assert run(CASES["growing-pull"], Exact()).skipped == "no forces"
     # Steps between which samples lie.
-    assert run(BY_NAME["sphere-rolls-down"], "compare.adapters.mujoco_free:defaults", [3e-3]).passed
+    assert run(CASES["sphere-rolls-down"], "compare.adapters.mujoco_free:defaults", [3e-3]).passed
 
 
 @pytest.mark.parametrize(
@@ -102,7 +101,7 @@ def test_errors_order_creep_and_cost():
 )
 def test_engines_that_are_none(engine, says):
     with pytest.raises(InputError) as refused:
-        run(STOPS, engine)
+        run(CASES["box-stops"], engine)
     assert says in str(refused.value)
 
 
@@ -111,7 +110,7 @@ def test_a_version_that_broke_is_named(tmp_path, monkeypatch):
         "KNOWN = 'numpy 0.1'\ndef build(case, timestep): raise RuntimeError('gone')\nstep = state = print\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    found = run(STOPS, "old")
+    found = run(CASES["box-stops"], "old")
     assert found.failure.startswith("RuntimeError: gone (numpy ")
     assert found.failure.endswith("known to work: 0.1)")
 

@@ -1,0 +1,18 @@
+"""The exact cases by name, simulated when a test first asks for one: to collect tests takes none of them."""
+
+import json
+from importlib import resources
+
+from compare.bench import cases
+from compare.bench.case import Case
+
+LISTED = json.loads((resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8"))
+
+
+class Cases(dict[str, Case]):
+    def __missing__(self, name: str) -> Case:
+        self.update({case.name: case for case in cases()})
+        return dict(self)[name]
+
+
+CASES = Cases()
