@@ -1,6 +1,7 @@
-"""The corrections compiled with numba, which the extra `fast` installs: the same source, run by run.
+"""Loops over steps and what is done between them, compiled with numba, which the extra `fast` installs.
 
-The corrections are in `mjsim.corrections`; this is the loop over the runs.
+Of balls on joints this has a loop of its own over `mjsim.corrections`; of free ones those of `mjsim.free` and
+`mjsim.landing` themselves.
 """
 
 from __future__ import annotations
@@ -13,16 +14,21 @@ from typing import Any
 
 import numba
 from numba import types
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mjsim import corrections as source
+from mjsim import free, landing, world_axes
 from mjsim.corrections import Ball, Velocity
-from mjsim.coulomb.compiled import alone
+from mjsim.coulomb import compiled as kernels
 from model.arrays import Array
 
-for name in ("slip", "resistance", "lands", "hovering", "near_axis", "unbearable"):  # the others call them
-    register_jitable(getattr(source, name))
+for each in (  # the others call them
+    *(source.slip, source.resistance, source.lands, source.hovering, source.near_axis, source.unbearable),
+    *(world_axes.outwards, world_axes.driven, world_axes.spun, world_axes.against, world_axes.slip),
+    *(world_axes.unwrapped, world_axes.joint_velocities, free.step, landing.closes),
+):
+    register_jitable(each)
 _corrections, _eventful, _followed = map(
     numba.njit(cache=True, nogil=True), (source.corrections, source.eventful, source.followed)
 )
@@ -78,6 +84,29 @@ def drive(
 
 
 _FLAGS = types.Array(types.boolean, 1, "C")
-with alone(drive):
+with kernels.alone(drive):
     drive.compile((types.float64[::1], _ROWS, _FLAGS, _FLAGS, *[_GIVEN] * 2, *[_ROWS] * 9))
 drive.disable_compile()
+
+
+@overload(free.under_law, strict=False)  # type: ignore[untyped-decorator]
+def _under_law(served: Any, duration: Any, anew: Any) -> Any:
+    return lambda served, duration, anew: kernels.step_of(served[0], served[1], served[2], duration, anew)
+
+
+def _compiled(function: Any) -> Any:
+    """A loop that is compiled when it is called first, by one process at a time."""
+    loop = numba.njit(cache=True, nogil=True, error_model="numpy")(
+        named_after(source, world_axes, free, landing, kernels)(function)
+    )
+
+    def call(*given: Any) -> Any:
+        if loop.overloads:
+            return loop(*given)
+        with kernels.alone(loop):
+            return loop(*given)
+
+    return call
+
+
+steps, through = _compiled(free.steps), _compiled(landing.through)

@@ -102,12 +102,12 @@ def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:
 
 @functools.cache
 def compiled() -> Any:
-    """`mjsim.compiled_free`, which has loops over `step` compiled, if numba is installed."""
+    """`mjsim.compiled`, which has loops over `step`, if numba is installed."""
     try:
-        from mjsim import compiled_free
+        from mjsim import compiled
     except ImportError:
         return None
-    return compiled_free
+    return compiled
 
 
 class Free:
@@ -186,8 +186,10 @@ class FreeBall:
         if self.law:
             self.law.reset()
         now, x, self.theta = to_world(x, theta, self.p), State.of(x), theta
-        there = x._replace(y=x.y + self.ahead * x.v_y, h=x.h + self.ahead * x.v_h)
-        place = to_world(there, theta + self.ahead * float(x.omega_c), self.p).position
+        place = now.position
+        if self.ahead:
+            there = x._replace(y=x.y + self.ahead * x.v_y, h=x.h + self.ahead * x.v_h)
+            place = to_world(there, theta + self.ahead * float(x.omega_c), self.p).position
         self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:6] = [*now.velocity, *now.spin]
 

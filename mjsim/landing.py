@@ -22,7 +22,9 @@ from model.arrays import Array
 FINE = 1024
 """The step in which a contact closes is that part of one of the settings;"""
 COARSE = 64
-"""the longest is that one, which those after a blow come to by doubling."""
+"""the longest after a blow is that one, which they come to by doubling;"""
+_FIRST = 8
+"""and the longest before one."""
 _SHARE = 5e-3
 """`share` of the law: contact forces must be steady enough for their change in a step to be told."""
 _TOUCHES = 1e-6
@@ -52,12 +54,13 @@ class Fine:
 
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
         self._p, self._whole, self._fall = p, settings.timestep, settings.slowest_fall(p.g)
-        rigid = ContactSettings.rigid_at(settings.timestep / COARSE)
+        rigid = ContactSettings.rigid_at(settings.timestep / _FIRST)
         self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0, _SHARE)
         self._ball.ahead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
 
-    def step(self, x: State, theta: float, rates: Array, omega_0: float) -> Landed:
-        """A whole step from a state, with velocities of the joints that change at such rates."""
+    def step(self, x: State, theta: float, rates: Array, omega_0: float, again: bool = False) -> Landed:
+        """A whole step from a state, with velocities of the joints that change at such rates; `again` if there was a
+        blow a short time ago."""
         ball, seen = self._ball, np.zeros((3, recorder.NSENSOR))
         ball.place(x, theta)
         rho = self._p.R - float(x.h)
@@ -66,7 +69,8 @@ class Fine:
             away, along = -rates[1] - rho * turn * turn, rho * rates[0] - 2 * x.v_h * turn
             ball.body.last[:3] = away * cos - along * sin, away * sin + along * cos, rates[2]
         take = compiled().through if compiled() else through
-        given = ball.body, self._whole, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
+        longest = self._whole / (COARSE if again else _FIRST)
+        given = ball.body, self._whole, longest, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
         place, velocity, before, duration, since = take(*given)
         v = np.array(velocity)
         first, last = recorder.forces(seen[1:], np.array([place[0] - v[0] * since, place[0]]))
@@ -86,8 +90,8 @@ def closes(gap: float, speed: float, rate: float, fall: float) -> float:
 
 
 def through(
-    body: Body, whole: float, fall: float, reach: float, omega_0: float, theta: float, rates: tuple[float, float],
-    seen: Any,
+    body: Body, whole: float, longest: float, fall: float, reach: float, omega_0: float, theta: float,
+    rates: tuple[float, float], seen: Any,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float, float]:  # fmt: skip
     """Take a ball through a whole step, from a place at the time of its velocities.
 
@@ -105,7 +109,7 @@ def through(
     """
     qpos, qvel, last, ball, margins = body.qpos, body.qvel, body.last, body.ball, body.margins
     rate_h, rate_y = rates
-    left, growing, finest, shown, then = whole, whole / COARSE, whole / FINE, False, -1.0
+    left, growing, finest, shown, then = whole, longest, whole / FINE, False, -1.0
     velocity = joint_velocities(qpos, qpos[3:], qvel, 0.0)
     before, duration, blow, anew = velocity, 0.0, False, True
     while left > 1e-9 * whole:
@@ -130,7 +134,7 @@ def through(
         begin, before = whole - left, velocity
         theta = step(body, duration, anew, omega_0, theta, seen[2])
         if blow:
-            growing, then = finest / 2, -1.0
+            longest, growing, then = whole / COARSE, finest / 2, -1.0
             for i in range(6):
                 last[i] = 0.0
         elif not shown and duration >= finest / 2:
@@ -145,7 +149,7 @@ def through(
         if then < 0 and not blow and growing > finest and begin >= 0.499 * whole:
             then = begin + ahead
             seen[1] = seen[2]
-        growing = min(2 * growing, whole / COARSE)
+        growing = min(2 * growing, longest)
     rho = math.hypot(qpos[0], qpos[1])
     place = unwrapped(math.atan2(qpos[1], qpos[0]), theta), ball.R - rho, qpos[2] - ball.r
     return place, velocity, before, duration, (whole - left - ahead - then if then >= 0 and not blow else 0.0)

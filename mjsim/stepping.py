@@ -75,6 +75,8 @@ class Polar:
         which are the engine's, but for"""
         self._held, self._due = np.ones(runs, dtype=bool), np.zeros(runs, dtype=bool)
         """runs whose last step wasn't the engine's; and runs that take the next one in fine ones."""
+        self._again = set[int]()
+        """Those among them that did so in the last one."""
         self._state = self._forces, self._qvel, self._last, self._qpos, self.margins
         self._arguments = (
             np.array([Ball.of(p, settings) for p in parameters]).T, self._due, self._held, array("qfrc_constraint"),
@@ -169,7 +171,9 @@ class Polar:
             if sensors is not None:
                 sensors[k] = self._sensors
             for run, x, theta, rates, gaps in lands:
-                landed = self._finely(self._parameters[run]).step(x, theta, rates, float(fluid[run]))
+                landed = self._finely(self._parameters[run]).step(
+                    x, theta, rates, float(fluid[run]), run in self._again
+                )
                 self._land(run, landed)
                 if sensors is not None:
                     sensors[k, run] = landed.seen
@@ -197,6 +201,7 @@ class Polar:
         pace = max(abs(omega_c), math.sqrt(p.g / p.R))
         most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(landed.forces[[1, 2]]).max())
         self._due[run] = near or landed.change > _CHANGE * self._h * pace * most
+        self._again = self._again | {run} if self._due[run] else self._again - {run}
         self._forces[:, run] = landed.forces
         self._set(run, landed.place, landed.velocity, landed.rates * (not near))
         self._bear(run, landed.place, landed.velocity)
@@ -209,7 +214,7 @@ class Polar:
         """Go on from such a state."""
         for name, values in self._carried().items():
             values[...] = state[name]
-        self._held[:] = True
+        self._held[:], self._again = True, set(np.flatnonzero(self._due).tolist())
 
     def _carried(self) -> dict[str, Array]:
         names = ("forces", "qvel", "last", "qpos", "margins")

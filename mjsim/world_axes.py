@@ -1,6 +1,6 @@
 """A free ball in the vessel's axes: what drives it, its spin and slip, a plane that stands for the wall.
 
-The same lines serve floats and, compiled, the loop of `mjsim.compiled_free`.
+The same lines serve floats and, compiled, the loop of `mjsim.compiled`.
 """
 
 from __future__ import annotations
