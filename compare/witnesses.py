@@ -314,7 +314,7 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
 
     low, high = 0.2, 2.5  # an engine of order 1 or 2 shows others where terms of several orders cancel
     slopes = np.diff(errors) / np.diff(steps**high)
-    if len(slopes) > 2 and np.all(slopes[1:] / slopes[:-1] > 0) and np.all(np.diff(np.abs(slopes)) < 0):
+    if len(slopes) > 2 and np.all(slopes[1:] * slopes[:-1] > 0) and np.all(np.diff(np.abs(slopes)) < 0):
         return Measured(fine, math.hypot(change, float(own[-1]))), math.nan
     order = float(brentq(misfit, low, high)) if misfit(low) * misfit(high) < 0 else math.nan
     first = limit(1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -28,11 +30,12 @@ from analytic.simulation.charts import NONE, Chart
 from analytic.simulation.equations import FINER
 from analytic.simulation.integrator import StalledError, Step
 from analytic.stationary.solutions import solution
+from compare.kit.engines import engine
 from compare.kit.pages import Rows
 from docs.studies.tables import write
 from model import Case, Flow, Parameters, SimulationError, State
 from model.arrays import Array
-from model.kinematics import SLIP_XYZ
+from model.kinematics import SLIP_XYZ, TURNING
 
 REPEATS, BEST = 5, 1e-13
 """Runs of which the quickest counts, and the tolerance of the one that others are held against."""
@@ -175,6 +178,45 @@ def _no_worse(motion: Motion, method: str, worst: float, right: Array) -> list[s
     raise AssertionError
 
 
+STEPPED, ALLOWED = [0.02 / n for n in (2, 4, 5, 8, 10, 20, 40)], 5e-3
+"""Time steps, s, parts of the time between samples, and the error up to which one of them will do."""
+
+
+def stepped() -> Rows:
+    """What the longest time step that errs by no more than `ALLOWED` costs, of the study's Moreau-Jean and of Siconos.
+
+    Siconos runs in a process of its own, which is told the fluid's force and asked for the state at every step.
+    """
+    motion, siconos = MOTIONS["slipping at both points, 20 s"], engine("siconos")
+    given = motion.p, motion.x, motion.t_end, motion.flow
+    turning = np.isin(np.arange(8), np.arange(8)[TURNING])  # gaps and their rates are round-off
+    right = run(motion, BEST).x * turning
+    rows = [["", "time step, ms", "error", "processor time, ms", "of which its own process"]]
+
+    def longest(name: str, work: Callable[[float], Any]) -> None:
+        for step in STEPPED:
+            spent = [time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime]
+            x = work(step).x
+            ours, own = time.process_time() - spent[0], resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - spent[1]
+            if len(x) == len(right) and (error := deviation(x * turning, right)) <= ALLOWED:
+                rows.append(
+                    [name, f"{1e3 * step:.3g}", f"{error:.1e}", f"{1e3 * (ours + own):.0f}", f"{1e3 * own:.0f}"]
+                )
+                return
+
+    spent, error = seconds(lambda: run(motion)), deviation(run(motion).x * turning, right)
+    rows.append(["event-driven, compiled", "–", f"{error:.1e}", f"{1e3 * spent:.1f}", "–"])
+    run_steps = partial(simulate, *given, method="time-stepping")
+    run_steps(timestep=STEPPED[0])  # which compiles it
+    longest("Moreau-Jean, compiled", lambda step: run_steps(timestep=step))
+    if siconos.missing:
+        sys.exit(siconos.missing)
+    assert siconos.simulate
+    take = partial(siconos.simulate, *given)
+    longest("Siconos", lambda step: take(siconos.at(step, motion.p), motion.t_end / 1000, lambda done: None))
+    return rows
+
+
 _TIMED = """
 import sys, time
 sys.path.insert(0, "")
@@ -235,9 +277,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Write the tables on speed.")
     parser.add_argument("page", type=Path, metavar="FILE", help="docs/speed.md")
     parser.add_argument("--before", type=Path, metavar="DIRECTORY", help="the table of a checkout of an earlier commit")
+    parser.add_argument("--siconos", action="store_true", help="the table with Siconos alone")
     args = parser.parse_args()
     if args.before:
         write(args.page, "before", before(args.before))
+    elif args.siconos:
+        write(args.page, "siconos", stepped())
     else:
         write(args.page, "event-driven", event_driven())
     return 0
