@@ -195,9 +195,9 @@ def stepped() -> Rows:
 
     def longest(name: str, work: Callable[[float], Any]) -> None:
         for step in STEPPED:
-            spent = [time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime]
+            begin = [time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime]
             x = work(step).x
-            ours, own = time.process_time() - spent[0], resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - spent[1]
+            ours, own = time.process_time() - begin[0], resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin[1]
             if len(x) == len(right) and (error := deviation(x * turning, right)) <= ALLOWED:
                 rows.append(
                     [name, f"{1e3 * step:.3g}", f"{error:.1e}", f"{1e3 * (ours + own):.0f}", f"{1e3 * own:.0f}"]
