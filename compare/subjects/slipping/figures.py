@@ -14,7 +14,7 @@ from compare.branches import check_thresholds
 from compare.kit import style
 from compare.kit.drawing import Drawing, Evidence, Motion
 from compare.kit.engines import EVENT
-from model import Case, Parameters
+from model import Case, Parameters, Trajectory
 
 BETA = 0.9
 """Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that the path bends."""
@@ -32,9 +32,15 @@ def of_set(p: Parameters, figure: str) -> Motion:
     check_thresholds(p)
     p = p.replace(omega_0=FLOW_OF[figure] * thresholds(p).omega_02)
     lasts = _LASTS * math.sqrt(p.R / p.g) * (20 if figure == "fig-4" else 1)  # till slip has ended
-    return Motion(
-        f"{PUSHED}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, PUSHED, BETA, t_end=lasts)
-    )
+    return Motion(f"{PUSHED}, {BETA}", EVENT.name, p, partial(_pushed, p, lasts))
+
+
+def _pushed(p: Parameters, lasts: float) -> Trajectory:
+    """The run; where slip ends, so short that what is shown has samples enough."""
+    run = simulator.slip_perturbation(p, PUSHED, BETA, t_end=lasts)
+    if len(run.events) and run.cases[-1] is Case.NR:
+        return simulator.slip_perturbation(p, PUSHED, BETA, t_end=1.6 * float(run.events.time[-1]))
+    return run
 
 
 def select(_: Evidence, figure: str) -> Motion:
