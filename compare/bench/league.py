@@ -227,8 +227,7 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
         low, high = np.log10(axis.get_view_interval())
         limit(10 ** np.floor(low), 10 ** np.ceil(high))  # whole decades, each with its number
         axis.set_minor_formatter(NullFormatter())
-    for axes in panels[:, 0]:
-        axes.set_ylabel("error, in units of the case's scales")
+    figure.supylabel("error, in units of the case's scales", size="medium")
     for axes in panels[1]:
         axes.set_xlabel("processor time divided by simulated time")
     style.legend(figure, loc="outside lower center", ncols=4)

@@ -31,7 +31,7 @@ def characteristic(made: Design) -> Figure:
     axes.axvspan(chosen.worst.omega_0, chosen.limit.omega_0, **limit)
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
-    style.legend(axes, loc="upper left")
+    style.legend(axes, loc="lower right")
     return figure
 
 
