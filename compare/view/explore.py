@@ -253,11 +253,12 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
             slider.props(f'aria-label="{name}"').on_value_change(partial(change, name))
             number = ui.number(value=round(value(name), 4), step=step, format="%.4g").classes("w-24")
             number.bind_value(slider)
-    ui.select(list(drag.LAWS), value=tab.p.drag, label="law of drag").on_value_change(partial(change, "drag"))
-    line = ui.label().classes("text-sm said")
+    laws = ui.select(list(drag.LAWS), value=tab.p.drag, label="law of drag").classes("w-40")
+    laws.on_value_change(partial(change, "drag"))
+    line = ui.html("", sanitize=False).classes("text-sm said")
 
     def show() -> None:
-        line.set_text(said(tab.p))
+        line.set_content(typeset(said(tab.p)))
         for name, slider in sliders.items():
             slider.set_value(value(name))
 
@@ -303,7 +304,8 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
 
         plot.on("plotly_click", clicked)
         draw.append(refresh)
-    ui.label("A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η and ω₀.")
+    hint = "A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η and ω₀."
+    ui.html(typeset(hint), sanitize=False)
 
 
 def _motion(ui: Any, tab: Tab) -> Callable[[], None]:

@@ -66,13 +66,13 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
         tab.wait_for_timeout(300)  # plotly looks for the point below when the pointer rests
         tab.mouse.click(*place)
 
-    shows("RR at ω_c = 12")
+    shows("RR at ωc = 12")
     click("[aria-label=omega_0]", 25 / 80, 0.5)
-    shows("SS at ω_c = ")
+    shows("SS at ωc = ")
     click(".map .nsewdrag", 0.5, 0.5)  # eta = 0.6, omega_0 = 40
-    shows("NR at ω_c = 40")
+    shows("NR at ωc = 40")
     click(".curve .nsewdrag", 0.75, 0.25)  # omega_0 = 60, from omega_c = 60
-    shows("NR at ω_c = 60")
+    shows("NR at ωc = 60")
     moving = page.frame_locator(".motion")
     expect(moving.locator("#case")).to_have_text("NR")
     place = moving.locator("#place").input_value()
@@ -85,7 +85,7 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     number.fill("-3")
     number.press("Tab")
     page.wait_for_selector("text=mu = -3 is out of range")
-    assert "RR at ω_c = 12" in other.inner_text(".said")
+    assert "RR at ωc = 12" in other.inner_text(".said")
     click(".curve .nsewdrag", 0.75, 0.25, other)
     other.close()  # in the middle of a run, of which the server says nothing in the end
     page.close()
