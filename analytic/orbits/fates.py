@@ -4,8 +4,8 @@ A run is followed window by window until it repeats what it did; any simulator m
 closed to an orbit by theory (`orbits`). One for which no stable orbit is found is chaotic if neighbours of it part
 exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with its last window.
 
-Whether a ball hops for ever is decided faster: a screen by time stepping (`screen`), confirmed by the event-driven
-simulation (`confirm`).
+Whether a ball hops for ever is decided faster: a screen of many runs (`screen`), of which each that hops on is then
+looked at (`confirm`).
 """
 
 from __future__ import annotations
@@ -22,10 +22,9 @@ from analytic.orbits import periodic as orbits
 from analytic.orbits.periodic import NoOrbitError, Orbit, active_variables, extent, landings
 from analytic.simulation.ensemble import interval, random_starts, simulate_many
 from analytic.simulation.motion import natural_units
-from analytic.simulation.settings import Settings, fitting_step
 from analytic.simulation.simulator import simulate
 from analytic.stationary.solutions import StationarySolution, stable_solutions
-from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
+from model import InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.errors import check_type
@@ -50,8 +49,6 @@ DURATION = 60.0
 """How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but near folds."""
 QUIET, LOOKS = 3.0, 12
 """Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this time."""
-STEPS = 70
-"""Steps of the screen in sqrt(R/g)."""
 SEEN, SEEN_SAMPLES = 25.0, 4000
 """How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for; and samples."""
 CONFIRMING = 12.0
@@ -283,14 +280,12 @@ def lyapunov(
 
 
 def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Array, int]:
-    """Which of the starts (n, 8) still hop after 60/c, by time stepping; their states then (n, 8); how many runs
-    failed.
+    """Which of the starts (n, 8) still hop after 60/c; their states then (n, 8); how many runs failed.
 
     One thread; p.c must be positive.
     """
     lasts, quiet = DURATION / p.c, QUIET / p.c
-    settings = Settings(method="time-stepping", timestep=fitting_step(STEPS, p, Flow.steady(p.omega_0), lasts))
-    runs = simulate_many(p, x0s, lasts, settings=settings, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
+    runs = simulate_many(p, x0s, lasts, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
     failed = np.array([bool(each) for each in runs.failure])
     hops = np.any(runs.landings[:, -LOOKS:] > 0, axis=1) & ~failed
     return hops, runs.x[:, -1], int(failed.sum())

@@ -115,13 +115,13 @@ def threads() -> tuple[float, float]:
     many(2)
     turns = []
     for _ in range(REPEATS):
-        before, one, two = _limit(), many(1), many(2)
-        turns.append((min(before, _limit()), one / two))
+        before, one, two = two_processes(), many(1), many(2)
+        turns.append((min(before, two_processes()), one / two))
     limit, ratio = max(turns)
     return ratio, limit
 
 
-def _limit() -> float:
+def two_processes() -> float:
     """Speed of two processes of bare arithmetic divided by that of one."""
     loop = [sys.executable, "-c", f"for _ in range({COUNT}): pass"]
 

@@ -1,9 +1,9 @@
 """Where in parameter space the ball hops for ever: ``python -m docs.studies.search --save found.json``.
 
 A search screens random starts of sets, the points of a scrambled Sobol sequence over mu, eta, j, r/R, kappa =
-c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g), by time stepping; the event-driven simulation confirms what still hops. A
-chunk of sets is a file, named by the hash of all that determines it: a search goes on where it stopped, and a longer
-one contains the shorter ones. `docs.studies.figures` makes the page of what was found.
+c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g); a ball that still hops after 60/c is looked at until its hopping
+closes, goes on, or ends. A chunk of sets is a file, named by the hash of all that determines it: a search goes on where
+it stopped, and a longer one contains the shorter ones. `docs.studies.figures` makes the page of what was found.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ def summary(record: Searched) -> str:
     return (
         f"The box is {box}. In {count} of {record.sets} sets some of {record.search.starts} random starts lead to "
         "hopping that the event-driven simulation confirms: {:.2f} %, or {:.2f} to {:.2f} % with 95 % confidence. "
-        f"Sets by landings in a period: {', '.join(kinds) or 'none'}. By time stepping {len(record.rows)} sets still "
+        f"Sets by landings in a period: {', '.join(kinds) or 'none'}. By the screen {len(record.rows)} sets still "
         f"hopped after 60/c; in all others every ball stopped landing.{broken}"
     ).format(*share(count, record.sets))
 

@@ -24,14 +24,16 @@ from unittest import mock
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from analytic import simulate
+from analytic import Settings, simulate, simulate_many
 from analytic.simulation import hybrid, integrator
 from analytic.simulation.charts import NONE, Chart
+from analytic.simulation.ensemble import random_starts
 from analytic.simulation.equations import FINER
 from analytic.simulation.integrator import StalledError, Step
 from analytic.stationary.solutions import solution
 from compare.kit.engines import engine
 from compare.kit.pages import Rows
+from docs.studies.benchmarks import two_processes
 from docs.studies.tables import write
 from model import Case, Flow, Parameters, SimulationError, State
 from model.arrays import Array
@@ -39,6 +41,8 @@ from model.kinematics import SLIP_XYZ, TURNING
 
 REPEATS, BEST = 5, 1e-13
 """Runs of which the quickest counts, and the tolerance of the one that others are held against."""
+RUNS = 400
+"""Random runs at once."""
 TOLERANCES = [10.0**-k for k in range(6, 14)]
 METHODS = "LSODA", "Radau"
 P = Parameters.named("reference")
@@ -217,11 +221,46 @@ def stepped() -> Rows:
     return rows
 
 
+def many() -> Rows:
+    """Random runs by `simulate_many` against `simulate`, and threads, of the turn in which the machine allowed most."""
+    starts = random_starts(P, RUNS)
+
+    def apart() -> None:
+        for x in starts:
+            simulate(P, x, 5.0, sample_interval=1.0)
+
+    def at_once(threads: int = 1, method: str = "event") -> None:
+        simulate_many(P, starts, 5.0, settings=Settings(method=method), sample_interval=1.0, threads=threads)
+
+    def passes(threads: int) -> float:
+        begin = time.perf_counter()
+        at_once(threads)
+        return time.perf_counter() - begin
+
+    each = {name: 1e3 * seconds(way) / RUNS for name, way in (
+        ("simulate, one after the other", apart),
+        ("simulate_many, one thread", at_once),
+        ("simulate_many, one thread, time stepping", lambda: at_once(method="time-stepping")),
+    )}  # fmt: skip
+    _, whole, *_ = each.values()
+    turns = []
+    for _ in range(4 * REPEATS):
+        before, one, two = two_processes(), passes(1), passes(2)
+        turns.append((min(before, two_processes()), one / two))
+    limit, ratio = max(turns)
+    return [
+        [f"{RUNS} random runs of 5 s", "a run, ms", "divided by one thread's"],
+        *([name, f"{took:.2f}", f"{took / whole:.1f}"] for name, took in each.items()),
+        ["speed of two threads divided by that of one", "", f"{ratio:.2f}"],
+        ["two processes of bare arithmetic at that time: the machine's limit", "", f"{limit:.2f}"],
+    ]
+
+
 _TIMED = """
 import sys, time
 sys.path.insert(0, "")
 import numpy as np
-from analytic import simulate
+from analytic import Settings, simulate, simulate_many
 from model import Flow, Parameters, State
 for line in sys.stdin:
     p, x, t_end, flow = eval(line)
@@ -278,11 +317,14 @@ def main() -> int:
     parser.add_argument("page", type=Path, metavar="FILE", help="docs/speed.md")
     parser.add_argument("--before", type=Path, metavar="DIRECTORY", help="the table of a checkout of an earlier commit")
     parser.add_argument("--siconos", action="store_true", help="the table with Siconos alone")
+    parser.add_argument("--many", action="store_true", help="the table of many runs alone")
     args = parser.parse_args()
     if args.before:
         write(args.page, "before", before(args.before))
     elif args.siconos:
         write(args.page, "siconos", stepped())
+    elif args.many:
+        write(args.page, "many", many())
     else:
         write(args.page, "event-driven", event_driven())
     return 0
