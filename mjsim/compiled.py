@@ -26,7 +26,7 @@ from model.arrays import Array
 for each in (  # the others call them
     *(source.slip, source.resistance, source.lands, source.hovering, source.near_axis, source.unbearable),
     *(world_axes.outwards, world_axes.driven, world_axes.spun, world_axes.against, world_axes.slip),
-    *(world_axes.unwrapped, world_axes.joint_velocities, free.step, landing.closes),
+    *(world_axes.unwrapped, world_axes.joint_velocities, free.step, landing.closes, landing.average),
 ):
     register_jitable(each)
 _corrections, _eventful, _followed = map(

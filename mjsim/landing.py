@@ -27,6 +27,8 @@ _FIRST = 8
 """and the longest before one."""
 _SHARE = 5e-3
 """`share` of the law: contact forces must be steady enough for their change in a step to be told."""
+_MEAN = 4
+"""Steps over which contact forces are taken: they may go up and down from step to step."""
 _TOUCHES = 1e-6
 """Gap of a contact that touches, in units of R."""
 _LEAST = 16
@@ -61,7 +63,7 @@ class Fine:
     def step(self, x: State, theta: float, rates: Array, omega_0: float, again: bool = False) -> Landed:
         """A whole step from a state, with velocities of the joints that change at such rates; `again` if there was a
         blow a short time ago."""
-        ball, seen = self._ball, np.zeros((3, recorder.NSENSOR))
+        ball, seen = self._ball, np.zeros((4, recorder.NSENSOR))
         ball.place(x, theta)
         rho = self._p.R - float(x.h)
         if rho > self._p.R / 4:  # nearer to the axis it flies
@@ -73,10 +75,10 @@ class Fine:
         given = ball.body, self._whole, longest, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
         place, velocity, before, duration, since = take(*given)
         v = np.array(velocity)
-        first, last = recorder.forces(seen[1:], np.array([place[0] - v[0] * since, place[0]]))
+        first, last = recorder.forces(seen[1:3], np.array([place[0] - v[0] * since, place[0]]))
         (A_x, A_y, A_z), (B_x, B_y, B_z) = last
         forces = np.array([0, A_x + B_x, A_y + B_y, -self._p.r * A_z, self._p.r * B_z, 0, A_y, B_x])
-        change = float(np.abs(last - first).max()) / since * self._whole if since else math.inf
+        change = float(np.abs(last - first).max()) / since * self._whole if since > 0 else math.inf
         return Landed(np.array(place), v, (v - before) / duration, forces, change, seen[0])
 
 
@@ -89,6 +91,15 @@ def closes(gap: float, speed: float, rate: float, fall: float) -> float:
     return 2 * gap / (root - speed) if square > fall * fall and root > speed else math.inf
 
 
+def average(means: Any, sensors: Any, count: int) -> None:
+    """Take the sensors of another step into means over `count`: of forces; axes are those of the last contact."""
+    for contact in range(0, 28, 14):
+        for i in range(contact + 1, contact + 4):
+            means[i] = (count * means[i] + sensors[i]) / (count + 1)
+        for i in range(contact + 5, contact + 11 if sensors[contact] > 0 else 0):
+            means[i] = sensors[i]
+
+
 def through(
     body: Body, whole: float, longest: float, fall: float, reach: float, omega_0: float, theta: float,
     rates: tuple[float, float], seen: Any,
@@ -99,8 +110,8 @@ def through(
     friction, which turns, would have two directions. Until then it isn't seen; others are within `reach`, m. `rates`
     are what a second changes of the speeds of h and y, m s-2.
 
-    `seen` gets the sensors at the beginning (after a landing in the first fine step) and those half a whole step before
-    the end, or after the last blow, and at the end.
+    `seen` gets the sensors at the beginning (after a landing in the first fine step), their means over `_MEAN` steps
+    half a whole one before the end, or after the last blow, and at the end; and has room for a row.
 
     Returns
     -------
@@ -109,9 +120,9 @@ def through(
     """
     qpos, qvel, last, ball, margins = body.qpos, body.qvel, body.last, body.ball, body.margins
     rate_h, rate_y = rates
-    left, growing, finest, shown, then = whole, longest, whole / FINE, False, -1.0
+    left, growing, finest, shown, first, latest = whole, longest, whole / FINE, False, 0, 0
     velocity = joint_velocities(qpos, qpos[3:], qvel, 0.0)
-    before, duration, blow, anew = velocity, 0.0, False, True
+    before, duration, blow, anew, since = velocity, 0.0, False, True, 0.0
     while left > 1e-9 * whole:
         soon_h = closes(ball.R - math.hypot(qpos[0], qpos[1]), velocity[1], rate_h, fall)
         soon_y = closes(qpos[2] - ball.r, velocity[2], rate_y, fall)
@@ -132,24 +143,28 @@ def through(
             if soon_h == soon or abs(ball.R - rho) < least:
                 qpos[0], qpos[1] = qpos[0] * ball.R / rho, qpos[1] * ball.R / rho
         begin, before = whole - left, velocity
-        theta = step(body, duration, anew, omega_0, theta, seen[2])
+        theta = step(body, duration, anew, omega_0, theta, seen[3])
         if blow:
-            longest, growing, then = whole / COARSE, finest / 2, -1.0
+            longest, growing, first, latest, since = whole / COARSE, finest / 2, 0, 0, 0.0
             for i in range(6):
                 last[i] = 0.0
         elif not shown and duration >= finest / 2:
             shown = True
-            seen[0] = seen[2]
+            seen[0] = seen[3]
         for i in range(3):
             qpos[i] -= ahead * (qvel[i] + ahead / 2 * last[i])
         velocity = joint_velocities(qpos, qpos[3:], qvel, 0.0)
         rate_h = 0.0 if blow else (velocity[1] - before[1]) / duration
         rate_y = 0.0 if blow else (velocity[2] - before[2]) / duration
+        late = begin >= 0.499 * whole or longest > whole / COARSE
+        if not blow and growing == longest and late and first < _MEAN:
+            average(seen[1], seen[3], first)
+            first, since = first + 1, since - (begin + ahead) / _MEAN
+        if not blow and left < (_MEAN + 0.5) * duration and latest < _MEAN:
+            average(seen[2], seen[3], latest)
+            latest, since = latest + 1, since + (begin + ahead) / _MEAN
         left, anew = left - duration, blow
-        if then < 0 and not blow and growing > finest and begin >= 0.499 * whole:
-            then = begin + ahead
-            seen[1] = seen[2]
         growing = min(2 * growing, longest)
     rho = math.hypot(qpos[0], qpos[1])
     place = unwrapped(math.atan2(qpos[1], qpos[0]), theta), ball.R - rho, qpos[2] - ball.r
-    return place, velocity, before, duration, (whole - left - ahead - then if then >= 0 and not blow else 0.0)
+    return place, velocity, before, duration, since if first == latest == _MEAN else 0.0
