@@ -87,7 +87,7 @@ _ALL = (
     Quantity("slope", "dω_c/dω₀", "1", 1e-4),
     Quantity("law", "deviation from the law", "1", 1e-6),
     Quantity("law_in_motion", "largest deviation from the law", "1", 6e-3),
-    Quantity("friction_ratio", "friction over normal force", "1", 1e-6),
+    Quantity("friction_ratio", "friction divided by normal force", "1", 1e-6),
     Quantity("time", "t", "s", 1e-2),
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
