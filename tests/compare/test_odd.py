@@ -257,6 +257,7 @@ def tried(words: list[str], here: Path, patience: float) -> tuple[int, list[str]
     return code, wrong
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # Ctrl-C between open() and with
 @pytest.mark.parametrize("count", [8, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_odd_lines(command: str, count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
