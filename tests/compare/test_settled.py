@@ -10,14 +10,14 @@ from compare.judge import judge
 from compare.kit import levels, settling
 from compare.kit.lab import time_unit
 from compare.kit.levels import Level
-from compare.kit.record import Missing, Records
+from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.subjects.flowmeter import claims as flowmeter
 from compare.subjects.flowmeter import measure as characteristic
 from compare.subjects.stationary import claims as stationary
 from compare.subjects.stationary import measure as settled
 from model import Case, Parameters
-from tests.measured import measured
+from tests.measured import measured, thresholds
 
 THICK = Parameters.named("reference").replace(c=10.0)
 
@@ -96,3 +96,10 @@ def test_a_slope_of_a_state_that_theory_does_not_know_is_a_refutation():
 
 def test_no_loop_without_a_change_from_slipping_to_riding(lab):
     assert [type(row) for row in characteristic.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
+
+
+def test_the_jump_is_looked_for_where_slipping_was_seen_to_begin(lab):
+    known = thresholds("thick", THICK, "omega_01")
+    (only,) = characteristic.slope(lab, {"thick": THICK}, known)
+    assert isinstance(only, Measurement)
+    assert _outcomes(Records((only,)))["slope-jump"] is Outcome.CONFIRMED

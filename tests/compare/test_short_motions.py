@@ -1,14 +1,17 @@
-"""Protocols of short motions say what broke down, and what is without friction."""
+"""Protocols of short motions say what broke down, and what is without friction; formal claims are algebra."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from compare.claim import Outcome
+from compare.judge import judge
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
+from compare.subjects.formal import claims as formal
 from compare.subjects.motion.measure import motions
 from compare.subjects.slipping.measure import growth, onset
 from model import Case, Parameters
@@ -57,3 +60,9 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
     forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / p.eta)}
     run = SimpleNamespace(header=SimpleNamespace(parameters=p), time=time, x=x, **forces)
     assert motions.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
+
+
+def test_formal_claims_are_algebra():
+    for verdict in judge(formal.CLAIMS, Records()):
+        assert verdict.outcome is Outcome.CONFIRMED
+        assert {check.measurement.engine for check in verdict.checks} == {"theory"}
