@@ -94,11 +94,12 @@ def _under_law(served: Any, duration: Any, anew: Any) -> Any:
     return lambda served, duration, anew: kernels.step_of(served[0], served[1], served[2], duration, anew)
 
 
+_named = named_after(source, world_axes, free, landing, kernels)
+
+
 def _compiled(function: Any) -> Any:
     """A loop that is compiled when it is called first, by one process at a time."""
-    loop = numba.njit(cache=True, nogil=True, error_model="numpy")(
-        named_after(source, world_axes, free, landing, kernels)(function)
-    )
+    loop = numba.njit(cache=True, nogil=True, error_model="numpy")(_named(function))
 
     def call(*given: Any) -> Any:
         if loop.overloads:

@@ -195,30 +195,28 @@ def stepped() -> Rows:
     given = motion.p, motion.x, motion.t_end, motion.flow
     turning = np.isin(np.arange(8), np.arange(8)[TURNING])  # gaps and their rates are round-off
     right = run(motion, BEST).x * turning
-    rows = [["", "time step, ms", "error", "processor time, ms", "of which its own process"]]
 
-    def longest(name: str, work: Callable[[float], Any]) -> None:
+    def longest(name: str, work: Callable[[float], Any]) -> list[str]:
         for step in STEPPED:
-            begin = [time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime]
+            begin = time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
             x = work(step).x
             ours, own = time.process_time() - begin[0], resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin[1]
             if len(x) == len(right) and (error := deviation(x * turning, right)) <= ALLOWED:
-                rows.append(
-                    [name, f"{1e3 * step:.3g}", f"{error:.1e}", f"{1e3 * (ours + own):.0f}", f"{1e3 * own:.0f}"]
-                )
-                return
+                return [name, f"{1e3 * step:.3g}", f"{error:.1e}", f"{1e3 * (ours + own):.0f}", f"{1e3 * own:.0f}"]
+        return [name, "none", "–", "–", "–"]
 
-    spent, error = seconds(lambda: run(motion)), deviation(run(motion).x * turning, right)
-    rows.append(["event-driven, compiled", "–", f"{error:.1e}", f"{1e3 * spent:.1f}", "–"])
-    run_steps = partial(simulate, *given, method="time-stepping")
-    run_steps(timestep=STEPPED[0])  # which compiles it
-    longest("Moreau-Jean, compiled", lambda step: run_steps(timestep=step))
     if siconos.missing:
         sys.exit(siconos.missing)
     assert siconos.simulate
-    take = partial(siconos.simulate, *given)
-    longest("Siconos", lambda step: take(siconos.at(step, motion.p), motion.t_end / 1000, lambda done: None))
-    return rows
+    step_by_step, take = partial(simulate, *given, method="time-stepping"), partial(siconos.simulate, *given)
+    step_by_step(timestep=STEPPED[0])  # which compiles it
+    error, spent = deviation(run(motion).x * turning, right), seconds(lambda: run(motion))
+    return [
+        ["", "time step, ms", "error", "processor time, ms", "of which its own process"],
+        ["event-driven, compiled", "–", f"{error:.1e}", f"{1e3 * spent:.1f}", "–"],
+        longest("Moreau-Jean, compiled", lambda step: step_by_step(timestep=step)),
+        longest("Siconos", lambda step: take(siconos.at(step, motion.p), motion.t_end / 1000, lambda done: None)),
+    ]
 
 
 def many() -> Rows:

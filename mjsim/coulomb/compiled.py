@@ -26,6 +26,7 @@ from llvmlite import ir
 from mujoco.introspect import ast_nodes, structs
 from numba import types
 from numba.core import cgutils
+from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 
 from . import law
@@ -1248,9 +1249,8 @@ def link() -> None:
     for function in control, retain:
         with alone(function):
             function.compile((types.intp,) * 3)
-        (result,) = function.overloads.values()
-        address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
-        llvmlite.binding.add_symbol(f"coulomb_{function.__name__}", address)
+        (signature,) = function.nopython_signatures
+        llvmlite.binding.add_symbol(f"coulomb_{function.__name__}", _get_wrapper_address(function, signature))
 
 
 control_linked = _function("control", *(types.intp,) * 3)

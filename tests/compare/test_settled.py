@@ -63,6 +63,16 @@ class TestSettled:
         assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 
 
+def test_what_swings_for_ever_settles_by_going_on_from_its_mean(lab, monkeypatch):
+    """A ball that sinks along the wall: also where a round is rounded to another length than the usual one."""
+    monkeypatch.setattr(
+        levels, "AT_QUICK", replace(levels.AT_QUICK, settling_rounds=(0.45, 1.0, 1.0), settling_steps=512)
+    )
+    p = sets(Level.QUICK)["rough-floor"].replace(omega_0=21.74)
+    (state,) = settling.settle(lab, [settling.named_start("rough-floor", p, "on the wall")])
+    assert (state.case, state.failure) == (Case.NS, "")
+
+
 def _outcomes(records):
     claims = (*stationary.CLAIMS, *stationary.DIAGRAMS, *flowmeter.CLAIMS)
     return {verdict.claim.id: verdict.outcome for verdict in judge(claims, records)}

@@ -59,6 +59,17 @@ def test_known_sequences_have_their_limit_and_order(errors, own, order):
     assert order is ... or (math.isnan(found) if order is None else found == pytest.approx(order, abs=0.01))
 
 
+def test_errors_of_fourth_order_have_a_limit_where_four_steps_show_it():
+    """Three may differ so little by chance: then all by which they differ is in doubt."""
+    steps = np.array([1.0, 0.5, 0.25, 0.125]) / 20
+    errors = steps**4
+    limit, order = extrapolated(steps, errors, np.zeros(4))
+    assert math.isnan(order)
+    assert (limit.value, limit.uncertainty) == pytest.approx((errors[3], errors[2] - errors[3]))
+    few, _ = extrapolated(steps[1:], errors[1:], np.zeros(3))
+    assert few.uncertainty >= np.ptp(errors[1:])
+
+
 def test_the_uncertainty_of_a_limit_covers_the_truth():
     """Smooth errors of both orders, with terms that fall as the step in natural units, and noise of known size."""
     rng, covered = np.random.default_rng(1), []
