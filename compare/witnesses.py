@@ -102,8 +102,8 @@ class Yielded:
     @classmethod
     def of(cls, claim: Claim, steps: Mapping[int, Records]) -> Self:
         """What an engine was asked for a claim."""
-        rows = ((n, row) for n, own in sorted(steps.items()) for row in own.rows)
-        return cls(tuple((n, row) for n, row in rows if row.protocol in claim.protocols))
+        wanted = claim.protocols
+        return cls(tuple((n, row) for n, own in sorted(steps.items()) for row in own.rows if row.protocol in wanted))
 
     @property
     def finest(self) -> dict[str, int]:

@@ -107,7 +107,7 @@ def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
         return flows, flows
     t, turn, unit = bifurcation.thresholds(p), slipping_branch.fold(p), np.sqrt(p.g / p.R)
     end, ends_in_fold = (slipping_branch.END, False) if np.isnan(turn) else (float(turn), True)
-    s = roots.bisected(lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end)
+    s = roots.crossing(lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end)
     lagging = np.where(np.isnan(s), flows, slipping_branch.branch(s, p).Omega_c * unit)
     slips = (flows > t.omega_01) & ~(flows > (t.omega_04 if ends_in_fold else t.omega_02))
     return np.where(slips, lagging, flows), np.where(slips & ~(flows > t.omega_02), lagging, flows)

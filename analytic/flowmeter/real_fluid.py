@@ -77,7 +77,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
         held = p.j * torque_rate(spin(omega_c), p, layer) * (2 * p.R * omega_c + p.r * flow)
         return np.asarray(held - drag.coefficient(lag, p) * lag)
 
-    omega_c = float(roots.bisected(excess, -flow * max(1.0, p.r / (2 * p.R)), flow))
+    omega_c = float(roots.crossing(excess, -flow * max(1.0, p.r / (2 * p.R)), flow))
     k, Re = float(torque_rate(spin(omega_c), p, layer)), spin(omega_c) * p.r**2 / p.nu_f if p.nu_f else math.nan
     u, z_A, z_B = p.R * omega_c**2 / p.g, *(p.j * k * (p.R * omega_c + more) / p.g for more in (0.0, p.r * flow))
     # As in `rolling_forces`, with B_y = s m g free, but with forces along the orbit that differ.

@@ -100,7 +100,7 @@ def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> flo
         there = state._replace(omega_c=omega_c, slip_x=slip_x)
         return lift_acceleration(inner, outer, there, p.replace(omega_0=p.omega_0 * omega_c / state.omega_c))
 
-    return float(roots.bisected(np.vectorize(rise), 0.1 * state.omega_c, 10 * state.omega_c))
+    return float(roots.crossing(np.vectorize(rise), 0.1 * state.omega_c, 10 * state.omega_c))
 
 
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
@@ -140,7 +140,7 @@ def neutral_flow(case: Case, p: Parameters) -> float:
     def side(flow: Real) -> int:
         return order.index(stability(case, p.replace(omega_0=float(flow)))) - 1
 
-    return float(roots.bisected(side, 1e-3 * unit, 1e3 * unit))
+    return float(roots.crossing(side, 1e-3 * unit, 1e3 * unit))
 
 
 def _sign(drive: float, hold: float) -> SlipStability:
