@@ -74,8 +74,8 @@ _DATA = (
 _CONTACT = ("dist", "pos", "frame", "friction", "mu", "dim", "geom", "efc_address", "includemargin")
 DIST, POS, FRAME, FRICTION, MU, DIM, GEOM, ADDRESS, INCLUDE = range(len(_DATA), len(_DATA) + len(_CONTACT))
 SIZE = len(_DATA) + len(_CONTACT)
-_MODEL = ("nv", "ngeom", "geom_rbound")
-DOFS, NGEOM, RBOUND = range(SIZE + 1, SIZE + 1 + len(_MODEL))
+_MODEL = ("nv", "ngeom", "geom_rbound", "geom_bodyid")
+DOFS, NGEOM, RBOUND, BODY_OF = range(SIZE + 1, SIZE + 1 + len(_MODEL))
 _OPTION = ("timestep", "gravity", "cone", "solver")
 STEP, GRAVITY, CONE, SOLVER = range(DOFS + len(_MODEL), DOFS + len(_MODEL) + len(_OPTION))
 
@@ -522,14 +522,14 @@ def convert(m: int, head: int, source: int) -> None:
 
 @compiled
 def carry_on(m: int, d: int, head: int) -> None:
-    """The velocity that what sticks has by its last Jacobian and the present speeds, along its last axes."""
+    """The velocity that the last Jacobian gives to the present speeds, along its last axes."""
     counts, edges, ngeom, speeds = _int64(head), not _elliptic(m), _number(m, NGEOM), _array(d, QVEL)
     kept, axes, poses, places = _block(head, KEPT), _block(head, AXES), _block(head, POSES), _int64(counts[PLACES])
     for i in range(counts[COUNT]):
         k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT], 12 * ngeom + 20 * places[4 * i + INDEX] + 3
         for j in range(3):
             kept[k + j] = 0.0
-        for t in range(2 if places[4 * i + LENGTH] > 1 and kept[W * i + law.STATE] == law.STICKS else 0):
+        for t in range(2 if places[4 * i + LENGTH] > 1 else 0):
             speed = _tangential(head, r, t, edges, axes[24 * i + 18 + t], speeds)
             for j in range(3):
                 one, two = (j + 1) % 3, (j + 2) % 3
@@ -549,20 +549,23 @@ def _tangential(head: int, r: int, t: int, edges: bool, friction: float, vector:
 
 @compiled
 def _turn(m: int, d: int, head: int, elapsed: float) -> None:
-    """Add to the reference accelerations of what sticks to bodies that turn what the rows leave out, -dJ/dt v."""
-    counts, edges = _int64(head), not _elliptic(m)
+    """Add to the reference accelerations of what is fixed on bodies that turn what the rows leave out: of soft contacts
+    that stick -dJ/dt v; of rigid ones, which lose the velocity that the turning shows, half of it."""
+    counts, edges, rigid = _int64(head), not _elliptic(m), _real(head)[RIGID] > 0
     kept, axes, places = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES])
     contact, reference, speeds = _int64(d + _at(CONTACT))[0], _array(d, AREF), _array(d, QVEL)
     for i in range(counts[COUNT]):
         k, a, r = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT]
-        if kept[k + law.STATE] != law.STICKS or kept[k + law.SPEED] > 1e300 or places[4 * i + LENGTH] == 1:
+        if kept[k + law.SPEED] > 1e300 or places[4 * i + LENGTH] == 1:
+            continue
+        if not rigid and kept[k + law.STATE] != law.STICKS:
             continue
         frame = _real(contact + places[4 * i + INDEX] * _at(SIZE) + _at(FRAME))
         for t in range(2):
             friction, before = axes[24 * i + 18 + t], 0.0
             for j in range(3):
                 before += frame[3 * t + 3 + j] * kept[k + law.SPEED + j]
-            change = (_tangential(head, r, t, edges, friction, speeds) - before) / elapsed
+            change = (_tangential(head, r, t, edges, friction, speeds) - before) * ((0.5 if rigid else 1.0) / elapsed)
             if edges:
                 reference[a + 2 * t] -= friction * change
                 reference[a + 2 * t + 1] += friction * change
@@ -612,7 +615,7 @@ def _find(m: int, d: int, head: int) -> None:
                     )
         for axis in range(3):
             kept[k + law.NORMAL + axis] = axes[a + 3 * axis]
-        kept[k + law.GAP] = _real(c + at[6])[0]
+        kept[k + law.GAP], kept[k + law.SPEED] = _real(c + at[6])[0], math.inf
         for j in range(5):
             axes[a + 18 + j] = friction[j]
         axes[a + 23] = _real(c + at[7])[0]
@@ -634,6 +637,13 @@ def _apart(one: Any, k: int, other: Any, m: int) -> float:
     for j in range(law.PLACE, law.PLACE + 6):
         square += (one[k + j] - other[m + j]) ** 2
     return square
+
+
+@compiled
+def _smaller(bound: Any, contacts: Any, k: int) -> float:
+    """The smaller radius of a contact's geoms, m; planes have none."""
+    one, other = bound[int(contacts[k])], bound[int(contacts[k + 1])]
+    return float(min(one, other) or max(one, other))
 
 
 @compiled
@@ -673,6 +683,7 @@ def _hand_on(m: int, d: int, head: int) -> float:
     count, kept, before = counts[COUNT], _block(head, KEPT), _block(head, BEFORE)
     axes, places, rows = _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
     numbers, bound, moved, fewer = _real(head), _array(m, RBOUND), 0.0, False
+    bodies, spins = _whole(m, BODY_OF), _array(d, SPIN)
     links = _chain(head)
     chains = _int64(counts[CHAINS])
     for i in range(counts[COUNT_BEFORE]):
@@ -695,8 +706,14 @@ def _hand_on(m: int, d: int, head: int) -> float:
         kept[k + law.ERROR] = max(kept[k + law.ERROR], before[b + law.ERROR])
         kept[k + law.LIFT] = max(kept[k + law.LIFT], before[b + law.LIFT])
         kept[k + law.BORE] = max(kept[k + law.BORE], before[b + law.BORE])
-        reach = numbers[FIXED] * max(bound[int(before[b])], bound[int(before[b + 1])])
-        fixed = alone and least <= 2 * reach**2
+        creep, turning = 0.0, 0.0
+        for j in range(3 if before[b + law.STATE] == law.STICKS else 0):
+            creep += before[b + law.SPEED + j] ** 2
+        for side in range(2):
+            spin = 6 * bodies[int(before[b + side])]
+            turning = max(turning, spins[spin] ** 2 + spins[spin + 1] ** 2 + spins[spin + 2] ** 2)
+        turned = numbers[FIXED] * math.sqrt(turning) * _smaller(bound, before, b)
+        fixed = alone and least <= 2 * (_value(m, STEP) * (turned + math.sqrt(creep))) ** 2
         kept[k + law.MISS] = before[b + law.MISS] if alone else 0.0
         for j in range(3):  # a contact that wanders over its bodies, or is made of several, has none
             kept[k + law.SPEED + j] = before[b + law.SPEED + j] if fixed else math.inf
@@ -840,8 +857,7 @@ def _stiffen(m: int, d: int, head: int) -> None:
         load = rows[held] + rows[held + ROW] if edges else rows[held]
         lasting = min(load, kept[W * i + law.BORE])  # not the force of a blow
         kept[W * i + law.BORE] = load
-        one, other = bound[int(kept[W * i])], bound[int(kept[W * i + 1])]
-        deep = max(-gap - depth * (min(one, other) or max(one, other)), 0.0)  # planes have no radius
+        deep = max(-gap - depth * _smaller(bound, kept, W * i), 0.0)
         goal = -gap / h if gap > 0 else min(numbers[PUSH] * deep / h, max(slow, h * diagonal[a] * lasting))
         r, above = ROW * places[4 * i + AT] + RESIDUAL, max(gap, 0.0)
         fall = h * max(-(rows[r] + rows[r + ROW]) / 2 if edges else -rows[r], 0.0)

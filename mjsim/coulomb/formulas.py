@@ -137,9 +137,9 @@ class Simulation:
         else:
             before = self._turn_in(data, known, over)
             self._find(model, data, poses)
-            if self._hand_on(model, *before) > self._least and self._put_back(model, data, before[0]):
+            if self._hand_on(model, data, *before) > self._least and self._put_back(model, data, before[0]):
                 self._find(model, data, _poses(data))
-                self._hand_on(model, *before)
+                self._hand_on(model, data, *before)
             self._copy_rows(model, data)
         if len(self._free):
             self._gyrate(model, data, known, over)
@@ -224,7 +224,7 @@ class Simulation:
         self._frame, self._tangents = contact.frame[used].reshape(-1, 3, 3)[:, 1:], contact.friction[used, :2].T
         self._turn = (axes @ contact.frame[used].reshape(-1, 1, 3, 3).swapaxes(2, 3)).reshape(-1, 6, 3)
         self._kept = kept = np.zeros((law.WIDTH, len(used)))
-        kept[law.GEOMS : law.PLACE], kept[law.GAP] = geom.T, contact.dist[used]
+        kept[law.GEOMS : law.PLACE], kept[law.GAP], kept[law.SPEED :] = geom.T, contact.dist[used], math.inf
         kept[law.PLACE : law.NORMAL] = (axes @ arm[..., None]).reshape(-1, 6).T
         kept[law.NORMAL : law.GAP] = self._turn[:, :3, 0].T
 
@@ -248,7 +248,7 @@ class Simulation:
             self._other = np.arange(len(self._rows))
             self._other[self._plus], self._other[self._plus + 1] = self._plus + 1, self._plus
 
-    def _hand_on(self, model: Any, before: Array, dry: Array) -> float:
+    def _hand_on(self, model: Any, data: Any, before: Array, dry: Array) -> float:
         """Give what is remembered to the nearest contact of the same geoms; how far those have moved whose pair has
         fewer, m."""
         kept, carried, moved = self._kept, np.zeros((law.SPEED - law.LOAD, len(self._used))), 0.0
@@ -265,13 +265,14 @@ class Simulation:
             strongest = slice(law.LIFT, law.SLIP)
             kept[strongest, to] = np.maximum.reduceat(before[strongest, old], first, axis=1)
             carried[:, to] = np.add.reduceat(before[law.LOAD : law.SPEED, old], first, axis=1)
-            bound = model.geom_rbound[before[law.GEOMS : law.PLACE, old[first]].astype(int)].max(axis=0)
-            fixed = square[best][first] <= 2 * (self._law.fixed * bound) ** 2
-            fixed &= (
-                np.diff(first, append=len(best)) == 1
-            )  # one that wanders over its bodies, or is made of several, isn't
-            kept[law.SPEED :, to] = np.where(fixed, before[law.SPEED :, old[first]], math.inf)
-            kept[law.MISS, to] = np.where(np.diff(first, append=len(best)) == 1, before[law.MISS, old[first]], 0.0)
+            source, alone = before[:, old[first]], np.diff(first, append=len(best)) == 1
+            geoms = source[law.GEOMS : law.PLACE].astype(int)
+            turning = np.linalg.norm(data.cvel[model.geom_bodyid[geoms], :3], axis=2).max(axis=0)
+            creep = np.where(source[law.STATE] == law.STICKS, np.linalg.norm(source[law.SPEED :], axis=0), 0.0)
+            reach = model.opt.timestep * (self._law.fixed * turning * self._smaller(model, geoms) + creep)
+            fixed = alone & (square[best][first] <= 2 * reach**2)
+            kept[law.SPEED :, to] = np.where(fixed, source[law.SPEED :], math.inf)
+            kept[law.MISS, to] = np.where(alone, source[law.MISS], 0.0)
             moved = math.sqrt(max(square[best].max() / 2, 0.0)) if len(to) < len(best) else 0.0
         load, friction = carried[: law.FORCE - law.LOAD].T, carried[law.FORCE - law.LOAD :].T.reshape(-1, 6, 2)
         along = (self._turn.swapaxes(1, 2) @ friction).ravel()[self._place] / 2
@@ -286,6 +287,12 @@ class Simulation:
             pair = np.maximum(load[self._own], abs(lean))
             self._memory[self._plus], self._memory[self._plus + 1] = (pair + lean) / 2, (pair - lean) / 2
         return moved
+
+    def _smaller(self, model: Any, geoms: Any) -> Array:
+        """The smaller radius of the geoms (2, n) of contacts, m."""
+        bound = model.geom_rbound[geoms]  # planes have none
+        smaller: Array = np.where(bound.min(axis=0) > 0, bound.min(axis=0), bound.max(axis=0))
+        return smaller
 
     def _put_back(self, model: Any, data: Any, before: Array) -> bool:
         """Put back points that the collider has dropped, corners of patches that have others, if still overlapping."""
@@ -344,19 +351,21 @@ class Simulation:
         return np.where(self._length > 1, along, 0.0)
 
     def _carry_on(self, data: Any) -> None:
-        """The velocity that the last Jacobian of what sticks gives to the present speeds, along its last axes."""
+        """The velocity that the last Jacobian gives to the present speeds, along its last axes."""
         if len(self._used):
-            along = self._tangential(self._multiply(data.qvel)) * (self._kept[law.STATE] == law.STICKS)
+            along = self._tangential(self._multiply(data.qvel))
             self._kept[law.SPEED :] = np.einsum("tn,ntj->jn", along, self._frame)
 
     def _turn_rows(self, data: Any, elapsed: float) -> None:
-        """Add to the reference accelerations of what sticks to bodies that turn what the rows leave out, -dJ/dt v."""
-        speed = self._kept[law.SPEED :]
-        turns = (self._kept[law.STATE] == law.STICKS) & np.isfinite(speed[0]) & (self._length > 1)
+        """Add to the reference accelerations of what is fixed on bodies that turn what the rows leave out: of soft
+        contacts that stick -dJ/dt v; of rigid ones, which lose the velocity that turning shows, half of it."""
+        speed, share = self._kept[law.SPEED :], 0.5 if self._law.rigid else 1.0
+        turns = np.isfinite(speed[0]) & (self._length > 1)
+        turns &= self._law.rigid | (self._kept[law.STATE] == law.STICKS)
         if not turns.any():
             return
         before = np.einsum("ntj,jn->tn", self._frame, np.where(turns, speed, 0.0))
-        change = np.where(turns, self._tangential(self._multiply(data.qvel)) - before, 0.0) / elapsed
+        change = np.where(turns, self._tangential(self._multiply(data.qvel)) - before, 0.0) * (share / elapsed)
         for t in range(2):
             rows = self._first[turns] + (1 + t if self._elliptic else 2 * t)
             own = change[t, turns] * (1.0 if self._elliptic else self._tangents[t, turns])
@@ -380,8 +389,7 @@ class Simulation:
         estimate, load = getattr(data, _DIAGONAL)[first], self._memory[self._first]
         if not self._elliptic:
             load = load + np.where(self._length > 1, self._memory[self._other[self._first]], 0.0)
-        bound = model.geom_rbound[kept[law.GEOMS : law.PLACE].astype(int)]  # planes have none
-        smaller = np.where(bound.min(axis=0) > 0, bound.min(axis=0), bound.max(axis=0))
+        smaller = self._smaller(model, kept[law.GEOMS : law.PLACE].astype(int))
         deep = np.maximum(-gap - numbers.depth * (h / law.USUAL) ** 2 * smaller, 0.0)
         lasting, kept[law.BORE] = np.minimum(load, kept[law.BORE]), load  # not the force of a blow
         push = np.minimum(numbers.push * deep / h, np.maximum(slow, h * estimate * lasting))

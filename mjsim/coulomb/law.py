@@ -60,8 +60,9 @@ class Law:
     """Acceleration below which the solver starts from none, m s-2 or rad s-2."""
     near: float = 0.01
     """Share of the larger radius up to which two points of contact count as one."""
-    fixed: float = 1e-4
-    """Share of the larger radius up to which a contact that has moved on its bodies is fixed on them."""
+    fixed: float = 0.1
+    """Share of what their turning moves the smaller radius up to which a contact that moves on its bodies, but for its
+    creep, is fixed on them; what rolls isn't."""
     fast: float = 3.0
     """Slip of a rigid contact, in units of its change in a step, above which it slides on: friction opposes its slip in
     the middle of the step, else that at the end, which may be none."""

@@ -149,6 +149,30 @@ def test_a_box_that_turns_stops_in_first_order(cone, rigid):
     assert abs(middle - fine) < 0.7 * abs(coarse - middle)
 
 
+@pytest.mark.parametrize(
+    ("cone", "share"), [("elliptic", 0.95), ("elliptic", 0.5), ("pyramidal", 0.5), ("pyramidal", 0.3)]
+)
+def test_a_turntable_holds_a_rigid_box_alike_in_each_step(cone, share):
+    """Friction is m omega^2 r, such a share of mu m g, and the circle is right to second order in the step."""
+    step, radius, turning, size = 2e-3, 0.2, 5.0, 0.02
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{step}" cone="{cone}" tolerance="1e-12"/><default><geom friction='
+        f'"{turning**2 * radius / G / share} 0 0"/></default><worldbody><body><joint axis="0 0 1"/><geom '
+        f'type="cylinder" size=".5 .05" mass="1e4"/></body><body pos="{radius} 0 {0.05 + size}"><freejoint/>'
+        f'<geom type="box" size="{size} {size} {size}" mass=".1"/></body></worldbody></mujoco>'
+    )
+    data, law, pulls = mujoco.MjData(model), Coulomb(model, rigid=True), []
+    data.qvel[[0, 2, 6]] = turning, turning * radius, turning
+    for _ in range(500):
+        before = data.qvel[1:3].copy()
+        law.step(data)
+        pulls.append(np.hypot(*(data.qvel[1:3] - before)) / (step * turning**2 * radius))
+    # at first what is left of the limit takes half a step's turning away
+    assert pulls[50:] == pytest.approx(450 * [1.0], abs=0.1 * step * turning)
+    half = step * turning * radius / 2
+    assert np.hypot(*data.qpos[1:3]) == pytest.approx(radius, abs=half * step * turning / (1 / share - 1) + 2e-5)
+
+
 @CONES
 @pytest.mark.parametrize("geom", [BOX, CYLINDER, BALL], ids=["box", "cylinder", "ball"])
 @pytest.mark.parametrize("step", [4e-3, 2e-3, 1e-3])

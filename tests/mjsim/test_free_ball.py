@@ -56,6 +56,15 @@ def test_rolling_shows_next_to_no_slip() -> None:
     assert np.abs(run.h[-100:]).max() < 2e-6 > np.abs(run.y[-100:]).max()
 
 
+@pytest.mark.parametrize("step", [6e-5, 4e-5, 1e-5])
+def test_what_rolls_on_the_wall_and_slides_on_the_floor_goes_on_in_short_steps(step) -> None:
+    """However little a contact moves in a step, one that rolls is not fixed on its bodies; else the law chattered."""
+    p = Parameters(m=0.03, r=0.01, R=0.05, j=0.4, mu=0.2, eta=0.6, g=9.81, c=1.0, omega_0=20.5)
+    run = mjsim.simulate(p, State(omega_c=18.77, slip_x=29.37), 20 * step, settings=rigid(step), sample_interval=step)
+    assert set(run.cases) == {Case.SR}
+    assert run.force_A[:, 1] == pytest.approx(run.force_A[-1, 1], rel=1e-2)
+
+
 def test_what_a_step_foresees_of_slip_is_the_number_of_the_law() -> None:
     assert pytest.approx(FORESEEN) == Law.share / 5
 

@@ -23,7 +23,8 @@ def assert_no_worse(plain, soft):
 
 
 STILL = {name: SCENES[name].run for name in ("treadmill", "nut", "tactile", "mocap", "tendon", "sleeping")}
-STILL |= {"castle": small_scenes.castle, "dominos": lambda way: small_scenes.pushed(way, push=3.0)}
+STILL |= {"castle": small_scenes.castle, "dominos": lambda way: small_scenes.pushed(way, push=3.5)}
+"""Of dominos one push: fallen, two rows in three jerk once in some seconds as an edge on a face loses a point."""
 
 
 @pytest.mark.parametrize("name", STILL)
@@ -41,8 +42,10 @@ def test_a_shaken_grip_slips_less():
 
 
 def test_a_carousel_holds_what_stands_on_it():
-    """An integrator of first order leaves h omega^2 r/2."""
-    assert small_scenes.carousel(WAYS["soft"]).values[CREEP] < 1.1 * 0.002 * small_scenes.TURN**2 * 0.2 / 2
+    """An integrator of first order leaves h omega^2 r/2; rigid contacts take half a step's turning into account."""
+    left = 0.002 * small_scenes.TURN**2 * 0.2 / 2
+    assert small_scenes.carousel(WAYS["soft"]).values[CREEP] < 1.1 * left
+    assert small_scenes.carousel(WAYS["rigid"]).values[CREEP] < 0.01 * left
 
 
 def test_nothing_brakes_what_rolls():
