@@ -52,8 +52,9 @@ def going_round(
 
 def ends(p: Parameters) -> tuple[float, float]:
     """The flows up to which RR and from which SR is stable, rad s-1: for eta > j they are one."""
-    t = bifurcation.thresholds(p)
-    return (t.omega_01, t.omega_02) if p.eta < p.j else (t.omega_03, t.omega_03)
+    Omega, unit = bifurcation.curves_without_drag(p.j, p.mu, p.eta), math.sqrt(p.g / p.R)
+    rolls, rides = ("omega_01", "omega_02") if p.eta < p.j else ("omega_03", "omega_03")
+    return float(Omega[rolls] * unit), float(Omega[rides] * unit)
 
 
 def check_thresholds(p: Parameters) -> None:

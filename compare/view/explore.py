@@ -6,6 +6,7 @@ without a network. Each tab has a set and a motion of its own, by the event-driv
 
 from __future__ import annotations
 
+import base64
 import errno
 import json
 import socket
@@ -17,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import distance_transform_edt
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
@@ -31,6 +34,9 @@ from model import Case, InputError, Parameters, SimulationError, State, Trajecto
 HOST = "127.0.0.1"
 LASTS, RATE = 10.0, 60
 """Duration of a motion, s, and its samples a second."""
+REST, PATIENCE = 0.3, 3600.0
+"""How long nothing is moved before the motion is simulated anew, s, and a tab is kept that doesn't answer: a browser
+that is busy for seconds, as with 3-D without a graphics card, would begin with the first set again."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
 SLIDERS: dict[str, tuple[str, float, float, float]] = {
@@ -54,7 +60,7 @@ class Tab:
     start: State = field(default_factory=lambda: State(omega_c=0.0))
     run: Trajectory | None = None
     asked: int = 0
-    """Number of the simulation that was asked for last."""
+    """How often something was asked for."""
     play: Callable[[], None] = lambda: None
     """Shows the run."""
 
@@ -73,13 +79,13 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     lines: list[tuple[str, Case, Any, Any, str]] = []
     if np.isfinite(rolls):
         lines.append(("RR", Case.RR, [0, min(rolls, fastest)], [0, min(rolls, fastest)], "solid"))
-    if folds and p.c > 0 and np.isfinite(t.omega_02):
+    if folds and p.mu > 0 and p.c > 0 and np.isfinite(t.omega_02):
         x, flows, grows = slipping_curve(p, 401)
         for text, part, dash in (("SS", ~grows, "solid"), ("SS, unstable", grows, "dash")):
             lines.append((text, Case.SS, flows, np.where(part, x.omega_c, np.nan), dash))
     if np.isfinite(rides) and rides < fastest:
         for case, dash in ((Case.SR, "solid"), (Case.NR, "12px,12px")):  # on one line their colours take turns
-            lines.append(("SR, NR", case, [rides, fastest], [rides, fastest], dash))
+            lines.append((case.name, case, [rides, fastest], [rides, fastest], dash))
     data = [
         {"type": "scatter", "mode": "lines", "name": text, "x": np.asarray(x).tolist(),
          "y": [None if np.isnan(v) else v for v in np.asarray(y, float).tolist()],
@@ -94,7 +100,7 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     label = {"yref": "paper", "y": 0.98, "xanchor": "left", "showarrow": False, "font": {"size": 11}}
     annotations = [label | {"x": at, "text": str(typeset(SYMBOLS[name]))} for name, at in shown]
     cells = np.linspace(0.0, fastest, 81).tolist()
-    data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": np.zeros((81, 81)).tolist(), "opacity": 0.0,
+    data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": _packed(np.zeros((81, 81))), "opacity": 0.0,
                     "showscale": False, "hoverinfo": "none"})  # fmt: skip
     return _figure(data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, shapes=shapes, annotations=annotations)
 
@@ -104,24 +110,31 @@ def regions(p: Parameters, fastest: float) -> Figure:
     eta, flows = np.linspace(0.0, SLIDERS["eta"][2], 121), np.linspace(0.0, fastest, 161)
     found = bifurcation.case_map(p, p.mu, eta, flows).T
     kinds, index = np.unique(found, return_inverse=True)
+    cells = index.reshape(found.shape)
     names = [
         " ".join(dict.fromkeys(f.name.split("_")[0] for f in Exists if f & int(kind) and f.name)) for kind in kinds
     ]
-    texts = np.array(names)[index.reshape(found.shape)].tolist()
     shades = [TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds]
     colours = [[(k + end) / len(kinds), shade] for k, shade in enumerate(shades) for end in (0, 1)]
     names_at = []
-    for k, name in enumerate(names):
-        y, x = np.argwhere(index.reshape(found.shape) == k).mean(axis=0).round().astype(int)
-        if index.reshape(found.shape)[y, x] == k:
+    for k, name in enumerate(names):  # where its region is widest, unless that is narrow
+        depth = distance_transform_edt(np.pad(cells[::2, ::2] == k, 1))
+        y, x = 2 * (np.array(np.unravel_index(depth.argmax(), depth.shape)) - 1)
+        if depth.max() > 3:
             names_at.append({"x": eta[x], "y": flows[y], "text": name, "showarrow": False})
     heat = {
-        "type": "heatmap", "x": eta.tolist(), "y": flows.tolist(), "z": index.reshape(found.shape).tolist(),
-        "text": texts, "colorscale": colours, "zmin": -0.5, "zmax": len(kinds) - 0.5, "showscale": False,
-        "hovertemplate": "η %{x:.2f}, ω₀ %{y:.1f} rad/s: %{text}<extra></extra>",
+        "type": "heatmap", "x": eta.tolist(), "y": flows.tolist(), "z": _packed(cells),
+        "colorscale": colours, "zmin": -0.5, "zmax": len(kinds) - 0.5, "showscale": False,
+        "hovertemplate": "η %{x:.2f}, ω₀ %{y:.1f} rad/s<extra></extra>",
     }  # fmt: skip
     return _figure([heat, _here(p.eta, p.omega_0)], "friction of the wall η", "ω₀ (rad/s)", eta[-1], fastest,
                    annotations=names_at)  # fmt: skip
+
+
+def _packed(cells: npt.NDArray[Any]) -> dict[str, str]:
+    """Small numbers as plotly unpacks them, a byte each: a page takes a long list of numbers apart one by one."""
+    cells = cells.astype(np.uint8)
+    return {"bdata": base64.b64encode(cells.tobytes()).decode(), "dtype": "u1", "shape": "{}, {}".format(*cells.shape)}
 
 
 def _here(x: float, y: float) -> Figure:
@@ -191,7 +204,14 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
     ui.run(
-        partial(page, p), host=HOST, port=port, title="dualball", show=show, reload=False, show_welcome_message=False
+        partial(page, p),
+        host=HOST,
+        port=port,
+        title="dualball",
+        show=show,
+        reload=False,
+        show_welcome_message=False,
+        reconnect_timeout=PATIENCE,
     )
 
 
@@ -212,12 +232,12 @@ def page(p: Parameters) -> None:
 
 
 def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[], None]:
-    """Sliders, the law of drag and files; what is returned draws all and simulates anew."""
+    """Sliders, the law of drag and files; what is returned draws all and, once nothing moves any more, simulates."""
     from nicegui import run
 
-    async def again() -> None:
-        tab.asked += 1
-        mine = tab.asked
+    async def again(mine: int) -> None:
+        if mine != tab.asked:
+            return
         try:
             found = await run.io_bound(simulated, tab.p, tab.start)
         except InputError as error:
@@ -238,12 +258,22 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
         follow()
 
     def follow() -> None:
-        for each in draw:
-            each()
-        ui.timer(0.0, again, once=True)
+        tab.asked += 1
+        ui.timer(0.0, partial(redraw, tab.asked), once=True)
+        ui.timer(REST, partial(again, tab.asked), once=True)
+
+    def redraw(mine: int) -> None:
+        if mine == tab.asked:  # of all that a slider sent meanwhile the last counts
+            for each in draw:
+                each()
 
     def value(name: str) -> float:
         return float(getattr(tab.p, name))
+
+    def show() -> None:
+        line.set_content(typeset(said(tab.p)))
+        for name, slider in sliders.items():
+            slider.set_value(value(name))
 
     sliders = {}
     for name, (text, low, high, step) in SLIDERS.items():
@@ -252,16 +282,10 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
             sliders[name] = slider = ui.slider(min=low, max=high, step=step, value=value(name))
             slider.props(f'aria-label="{name}"').on_value_change(partial(change, name))
             number = ui.number(value=round(value(name), 4), step=step, format="%.4g").classes("w-24")
-            number.bind_value(slider)
+            number.bind_value(slider).props("debounce=500").on("blur", show)  # not at each digit; what is refused goes
     laws = ui.select(list(drag.LAWS), value=tab.p.drag, label="law of drag").classes("w-40")
     laws.on_value_change(partial(change, "drag"))
     line = ui.html("", sanitize=False).classes("text-sm said")
-
-    def show() -> None:
-        line.set_content(typeset(said(tab.p)))
-        for name, slider in sliders.items():
-            slider.set_value(value(name))
-
     draw.append(show)
     with ui.row():
         ui.button("Set as TOML", on_click=lambda: ui.download.content(_bytes(tab.p.save, "set.toml"), "set.toml"))
