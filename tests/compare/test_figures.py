@@ -22,6 +22,7 @@ from compare.gallery import FIGURES, figures_of
 from compare.kit import drawing, style
 from compare.kit.drawing import Evidence, GapError, Motion
 from compare.kit.record import Check, Measurement, Records
+from compare.subjects.attractors import figures as attractors
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.unsteady import figures as unsteady
 from model import InputError, Parameters, State, StorageError
@@ -76,8 +77,9 @@ def no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def few_points() -> Iterator[None]:
-    """Of the branch of hops a few orbits, and few frequencies of pulsation: theory takes about a second for each."""
+    """A few orbits of the branch of hops, frequencies of pulsation and starts of hops: theory takes long for each."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(attractors, "STARTS", 2)
         patch.setattr(orbit_branch, "follow", functools.partial(orbit_branch.follow, most=2))
         patch.setattr(unsteady, "FREQUENCIES", 3)
         yield

@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import importlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -44,27 +44,40 @@ class WrongTheory:
 
 
 @contextmanager
-def believed(wrong: WrongTheory) -> Iterator[None]:
-    """Believe a wrong theory: every name and table entry of the right function stands for the wrong one."""
-    right = getattr(importlib.import_module(wrong.module), wrong.function)
-    put, compiled = wrong.wrong(right), ensemble.whole_runs
-    _exchange(right, put)
+def believed(*wrongs: WrongTheory) -> Iterator[None]:
+    """Believe wrong theories: every name and table entry of a right function stands for the wrong one."""
+    rights = [getattr(importlib.import_module(each.module), each.function) for each in wrongs]
+    puts, compiled = [each.wrong(right) for each, right in zip(wrongs, rights, strict=True)], ensemble.whole_runs
+    _exchange(dict(zip(map(id, rights), puts, strict=True)))
     ensemble.whole_runs = lambda: None  # whole runs are compiled, and would believe what they believed then
     try:
         yield
     finally:
-        _exchange(put, right)
+        _exchange(dict(zip(map(id, puts), rights, strict=True)))
         ensemble.whole_runs = compiled
 
 
-def _exchange(old: Function, new: Function) -> None:
-    modules = [module for name, module in sys.modules.items() if name.startswith(PACKAGES)]
-    for module in modules:
+def _exchange(new: Mapping[int, Function]) -> None:
+    """Put functions in the place of others, which are named by `id`."""
+    for module in [module for name, module in sys.modules.items() if name.startswith(PACKAGES)]:
         for name, value in list(vars(module).items()):
-            if value is old:
-                setattr(module, name, new)
+            if id(value) in new:
+                setattr(module, name, new[id(value)])
             elif isinstance(value, dict):
-                value.update({key: new for key, entry in value.items() if entry is old})
+                value.update({key: new[id(entry)] for key, entry in value.items() if id(entry) in new})
+
+
+def noting(what: str, seen: set[str]) -> Fault:
+    """No fault: where the function is called that is noted."""
+
+    def noted(right: Function) -> Function:
+        def function(*args: Any, **named: Any) -> Any:
+            seen.add(what)
+            return right(*args, **named)
+
+        return function
+
+    return noted
 
 
 def answer(change: Change) -> Fault:

@@ -24,7 +24,7 @@ from docs.studies import mutants
 from model import Parameters
 from tests.mutants import trial
 from tests.mutants.engines import WRONG_ENGINES
-from tests.mutants.exchange import believed
+from tests.mutants.exchange import believed, noting
 from tests.mutants.theories import FOR_TESTS, THEORIES
 
 P = Parameters.named("reference").replace(omega_0=25.0)
@@ -48,6 +48,15 @@ def test_a_theory_that_raises_is_given_back_too() -> None:
         raise ZeroDivisionError
     assert stationary.stable_solutions is right
     assert claims.analytic.stable_solutions is right
+
+
+def test_a_function_that_is_noted_answers_as_before() -> None:
+    """Wherever it is called: a claim that doesn't call it can't notice its faults, and isn't judged by them."""
+    seen, noted = set(), next(each for each in THEORIES if each.function == "stationary_solutions")
+    with believed(dataclasses.replace(noted, wrong=noting("it", seen)), THEORIES[0]):
+        found = claims.analytic.stationary_solutions(P)
+    assert seen == {"it"}
+    assert [s.case for s in found] == [s.case for s in stationary.stationary_solutions(P)]
 
 
 @pytest.mark.parametrize("wrong", WRONG_ENGINES, ids=lambda wrong: wrong.name)

@@ -10,8 +10,8 @@ import functools
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import TypeVar
@@ -27,7 +27,7 @@ from compare.report import results
 from compare.witnesses import full_verdict
 from tests.mutants import engines
 from tests.mutants.engines import WRONG_ENGINES
-from tests.mutants.exchange import believed
+from tests.mutants.exchange import WrongTheory, believed, noting
 from tests.mutants.theories import THEORIES
 
 Outcomes = dict[str, Outcome]
@@ -91,40 +91,63 @@ def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
 
     By all claims; unless `whole`, by the quickest ones first and only until one notices it.
     """
-    tried = _tried(functools.partial(_theory, directory, whole, ""), len(THEORIES), workers)
-    return Judged(results.load(directory).level.lower(), tried, directory, whole)
+    level = results.load(directory).level.lower()
+    return Judged(level, _theories(directory, "", whole, workers), directory, whole)
 
 
 def heard(directory: Path, by: str, workers: int = 2) -> Judged:
     """Every wrong theory judged on what a witness, alone, says of it, by the quickest claims first."""
-    tried = _tried(functools.partial(_theory, directory, False, by), len(THEORIES), workers)
-    return Judged(f"{results.load(directory).level.lower()}, by {by}", tried, directory, whole=False)
+    name = f"{results.load(directory).level.lower()}, by {by}"
+    return Judged(name, _theories(directory, by, False, workers), directory, whole=False)
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
     """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's apart."""
-    return _tried(functools.partial(_engine, directory), len(WRONG_ENGINES), workers)
-
-
-def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]:
-    """The trials by number, each shown on standard error as soon as it is there."""
-    tried = []
     with processes(workers) as work:
-        for trial in work.map(one, range(count)):
-            print(f"{trial.what}: {trial.by}", file=sys.stderr, flush=True)
-            tried.append(trial)
-    return tried
+        return _shown(work.map(functools.partial(_engine, directory), range(len(WRONG_ENGINES))))
 
 
-@functools.cache
-def _right(directory: Path, by: str = "") -> tuple[Outcomes, Sequence[Claim]]:
-    """The outcomes of the right theory, and the claims, those that are judged quickest first."""
-    outcomes, took = Outcomes(), dict[str, float]()
-    for claim in CLAIMS:
+def _shown(trials: Iterable[Trial]) -> list[Trial]:
+    """The trials, each shown on standard error as soon as it is there."""
+    kept = []
+    for trial in trials:
+        print(f"{trial.what}: {trial.by}", file=sys.stderr, flush=True)
+        kept.append(trial)
+    return kept
+
+
+@dataclass(frozen=True)
+class Right:
+    """What a claim comes to by the right theory."""
+
+    outcome: Outcome
+    took: float
+    """Processor time, s."""
+    calls: frozenset[str]
+    """Functions of `THEORIES` that its predictions call: a fault in any other can't change the outcome."""
+
+
+def _theories(directory: Path, by: str, whole: bool, workers: int) -> list[Trial]:
+    """Every wrong theory, judged by the claims that call its function."""
+    with processes(workers) as work:
+        right = list(work.map(functools.partial(_right, directory, by), range(len(CLAIMS))))
+        return _shown(work.map(functools.partial(_theory, directory, by, whole, right), range(len(THEORIES))))
+
+
+def _right(directory: Path, by: str, number: int) -> Right:
+    """What a claim comes to by itself, with nothing that was computed for others."""
+    functions, calls = {name_of(each): each for each in THEORIES}, set[str]()
+    measured(directory)
+    forget()
+    with believed(*(replace(each, wrong=noting(name, calls)) for name, each in functions.items())):
         begun = time.process_time()
-        outcomes[claim.id] = _outcome(directory, by, claim)
-        took[claim.id] = time.process_time() - begun
-    return outcomes, sorted(CLAIMS, key=lambda claim: took[claim.id])
+        outcome = _outcome(directory, by, CLAIMS[number])
+    return Right(outcome, time.process_time() - begun, frozenset(calls))
+
+
+def name_of(wrong: WrongTheory) -> str:
+    """The function that is wrong."""
+    return f"{wrong.module}.{wrong.function}"
 
 
 class HangError(BaseException):
@@ -139,17 +162,17 @@ def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
     return {each.engine: each.outcome for each in witnesses}[by]
 
 
-def _theory(directory: Path, whole: bool, by: str, number: int) -> Trial:
+def _theory(directory: Path, by: str, whole: bool, right: Sequence[Right], number: int) -> Trial:
     wrong, noticed, hung = THEORIES[number], Outcomes(), list[str]()
     if wrong.level > levels.Level[results.load(directory).level]:
         return Trial(wrong.what, noticed, tried=False)
-    right, quickest_first = _right(directory, by)
+    asked = [pair for pair in zip(CLAIMS, right, strict=True) if name_of(wrong) in pair[1].calls]
     forget()
     with believed(wrong):
-        for claim in CLAIMS if whole else quickest_first:
+        for claim, known in asked if whole else sorted(asked, key=lambda pair: pair[1].took):
             try:
                 outcome = _patiently(functools.partial(_outcome, directory, by, claim))
-                noticed |= {claim.id: outcome} if outcome is not right[claim.id] else {}
+                noticed |= {claim.id: outcome} if outcome is not known.outcome else {}
             except HangError:  # as when a wrong theory never comes to the end of a motion
                 hung.append(claim.id)
             if noticed and not whole:
@@ -178,5 +201,5 @@ def _engine(directory: Path, number: int) -> Trial:
     verdicts = validation.validate(
         apart, level=levels.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False
     )
-    right, _ = _right(directory)
-    return Trial(wrong.name, {v.claim.id: v.outcome for v in verdicts if v.outcome is not right[v.claim.id]})
+    other = {v.claim.id: v.outcome for v in verdicts if v.outcome is not _outcome(directory, "", v.claim)}
+    return Trial(wrong.name, other)
