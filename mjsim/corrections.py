@@ -4,7 +4,7 @@ MuJoCo takes forces at the beginning of a step and lets contact be soft. Each bl
 consequence of that. None knows a solution of the problem: each is built from what the last step gave, and vanishes
 where motion and forces are steady.
 
-Every quantity is a float for one run and an array with an entry for each run of a batch; the same lines serve both.
+`drive` goes through the runs of a batch, one after the other, in floats: plain Python, or compiled (`mjsim.compiled`).
 """
 
 from __future__ import annotations
@@ -15,15 +15,11 @@ from typing import Any, NamedTuple
 
 from mjsim.contact_settings import ContactSettings
 from model import Parameters
+from model.arrays import Array
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
-
-Quantity = Any
-"""A float, or an array with an entry for each run."""
 
 _SLIDES = 9.0
 """A contact slides if its speed squared exceeds this times that of its change in a step; ending slip changes faster."""
-NO_LIMIT = 1e30
-"""Stands for infinity where that would make infinity times zero."""
 _NEAR = 32.0
 """Steps to the axis from which on they are shorter: the azimuth turns by up to 1/32 in one."""
 _FEW = 16.0
@@ -33,44 +29,42 @@ _FEW = 16.0
 class Ball(NamedTuple):
     """What the corrections need of a ball and of the settings."""
 
-    R: Quantity
-    r: Quantity
-    drag: Quantity
+    R: float
+    r: float
+    drag: float
     """m c, kg s-1."""
-    Re: Quantity
+    Re: float
     """2 r/nu_f, Reynolds number per speed, s m-1; 0 with Stokes' drag."""
-    creeping: Quantity
+    creeping: float
     """Three terms of C_D Re/24: 1, or 0 with quadratic drag;"""
-    wake: Quantity
+    wake: float
     """what Re^0.687 is multiplied by, 0.15 by Schiller and Naumann;"""
-    blunt: Quantity
+    blunt: float
     """what Re is multiplied by once that is more, C_D/24."""
-    mass: Quantity
-    inertia: Quantity
+    mass: float
+    inertia: float
     """j m r^2, kg m2."""
-    torque: Quantity
+    torque: float
     """Of the fluid, j m r^2 times its rate, kg m2 s-1; 0 where it is left out."""
-    ahead: Quantity
+    ahead: float
     """Where in a step forces are taken, in steps after its beginning: 1/2, or 0 where the engine's order is kept."""
-    gain: Quantity
+    gain: float
     """Share of a gap that the servo takes off a margin in a step; 0 without servo."""
-    fall: Quantity
+    fall: float
     """Speed from which on a ball that comes down lands, m s-1; inf where landings are left to the contacts."""
-    step: Quantity
+    step: float
     """The time step, s."""
-    memory_A: Quantity
-    memory_B: Quantity
+    memory: float
     """R_t/b_f of the contacts, surface velocity per friction force, m s-1 N-1, 0 without memory."""
-    lag_A: Quantity
-    lag_B: Quantity
+    lag: float
     """How many steps after the middle of a step friction takes its direction by itself."""
-    hover_A: Quantity
-    hover_B: Quantity
+    hover_A: float
+    hover_B: float
     """Load (m s-2) per slip speed below which a contact hovers, s-1."""
-    weight: Quantity
-    """g, m s-2; `NO_LIMIT` where there is none."""
-    hover: Quantity
-    """Largest hover number of a contact, `NO_LIMIT` where it is left as it is."""
+    weight: float
+    """g, m s-2."""
+    hover: float
+    """Largest hover number of a contact, infinite where it is left as it is."""
 
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
@@ -84,51 +78,52 @@ class Ball(NamedTuple):
         inertia = p.j * p.m * p.r**2
         memory = settings.softness / (p.m * settings.impratio * settings.b_f) if settings.memory else 0.0
         gain = settings.timestep / settings.servo if settings.servo else 0.0
-        lag, hover = settings.friction_lag, settings.b_f / settings.softness
+        hover = settings.b_f / settings.softness
         return cls(
             p.R, p.r, p.m * p.c, *laws[p.drag], p.m, inertia, inertia * p.fluid_torque, settings.midpoint,
-            gain, settings.slowest_fall(p.g), settings.timestep, memory, memory, lag, lag,
-            p.mu * hover, p.eta * hover, p.g or NO_LIMIT,
-            (settings.shifts_surfaces and settings.hover) or NO_LIMIT,
+            gain, settings.slowest_fall(p.g), settings.timestep, memory, settings.friction_lag,
+            p.mu * hover, p.eta * hover, p.g, (settings.shifts_surfaces and settings.hover) or math.inf,
         )  # fmt: skip
 
 
 class Velocity(NamedTuple):
     """Velocities of the ball's joints, along the paper's axes; o_y is the spin less omega_c."""
 
-    omega_c: Quantity
-    v_h: Quantity
-    v_y: Quantity
-    o_x: Quantity
-    o_y: Quantity
-    o_z: Quantity
+    omega_c: float
+    v_h: float
+    v_y: float
+    o_x: float
+    o_y: float
+    o_z: float
 
 
-def slip(v: Velocity, rho: Quantity, r: Quantity) -> tuple[Quantity, ...]:
+def slip(v: Velocity, rho: float, r: float) -> tuple[float, ...]:
     """Velocities (5) of the ball's surface, A_x, A_z, B_y, B_z, at the distance rho from the axis; linear in v."""
     omega_c, v_h, v_y, o_x, o_y, o_z = v
     along, roll = rho * omega_c, r * o_z
     return v_h + roll, along - r * o_x, v_y - roll, along + r * (o_y + omega_c)
 
 
-def resistance(w_z: Quantity, w_h: Quantity, w_y: Quantity, ball: Ball) -> Quantity:
+def resistance(w_z: float, w_h: float, w_y: float, ball: Ball) -> float:
     """Drag over the speed of a centre that moves with w relative to the fluid, m c C_D Re/24, kg s-1."""
     Re = ball.Re * (w_z * w_z + w_h * w_h + w_y * w_y) ** 0.5
     flowing, blunt = ball.creeping + ball.wake * Re**0.687, ball.blunt * Re
-    return ball.drag * (flowing + (blunt - flowing) * (blunt > flowing))
+    found: float = ball.drag * (flowing + (blunt - flowing) * (blunt > flowing))  # of arrays, too
+    return found
 
 
 def corrections(
-    v: Velocity, last: Velocity, rho: Quantity, omega_0: Quantity,
-    contact: Sequence[Quantity], normals: Sequence[Quantity], ball: Ball,
-) -> tuple[tuple[Quantity, ...], tuple[Quantity, ...]]:  # fmt: skip
+    v: Velocity, last: Velocity, rho: float, omega_0: float,
+    contact: Sequence[float], normals: Sequence[float], ball: Ball,
+) -> tuple[tuple[float, ...], tuple[float, ...]]:  # fmt: skip
     """What drives a step that begins with the velocities v, a step after `last`.
 
     Positions are half a step ahead, so that rho is already that at mid step.
 
     Parameters
     ----------
-    contact, normals : generalised contact force and normal forces (A_y, B_x) of the last step, N and N m
+    contact, normals : generalised contact forces (inward, upward, moments about x, y) and normal ones (A_y, B_x) of the
+        last step, N and N m
 
     Returns
     -------
@@ -167,33 +162,23 @@ def corrections(
     torque_x, torque_z = -ball.torque * o_x, -ball.torque * o_z
     torque_y = -ball.torque * (v.o_y + ahead * change.o_y + omega_c - omega_0)
 
-    # Direction of sliding friction at mid step. The engine opposes friction to the slip that there would be 1/b_f after
-    # the beginning of the step. A surface velocity equal to the change of slip between the middle and then removes the
-    # difference; only where a contact clearly slides, since a slip that ends must be able to.
+    # The floor bears the weight, the wall the centrifugal force, counted up to the weight.
     v_Ax, v_Az, v_By, v_Bz = slip(v, rho, ball.r)
     A_x, A_z, B_y, B_z = slip(change, rho, ball.r)
-    v2_A, v2_B = v_Ax * v_Ax + v_Az * v_Az, v_By * v_By + v_Bz * v_Bz
-    lag_A = ball.lag_A * (_SLIDES * (A_x * A_x + A_z * A_z) < v2_A)
-    lag_B = ball.lag_B * (_SLIDES * (B_y * B_y + B_z * B_z) < v2_B)
-
-    # Continuous sliding. A contact that slides fast would hover: its surface moves along with the excess, which leaves
-    # the direction of friction as it is, and delays it by as much more as there is less damping. The floor bears the
-    # weight, the wall the centrifugal force, counted up to the weight.
-    weight, thrown = ball.weight, rho * v.omega_c * v.omega_c
-    less_A = unbearable(ball.hover_A * v2_A**0.5, ball.hover * weight)
-    less_B = unbearable(ball.hover_B * v2_B**0.5, ball.hover * (weight - (weight - thrown) * (thrown < weight)))
-    lag_A, lag_B = lag_A + (lag_A > 0) * less_A / 2, lag_B + (lag_B > 0) * less_B / 2
+    floor_x, floor_z = surface((v_Ax, v_Az), (A_x, A_z), ball.hover_A, ball.weight, ball)
+    thrown = min(rho * v.omega_c * v.omega_c, ball.weight)
+    wall_y, wall_z = surface((v_By, v_Bz), (B_y, B_z), ball.hover_B, thrown, ball)
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
     # that speed for the last step's friction f leaves only the change of f to creep: the friction rows then read
     # a + R_t (f - f_last) = -b_f v, with the cone where it was. That is the law of `mjsim.coulomb`;
     # surface velocities carry it into a batch, whose steps have no halves. The friction forces follow from
-    # contact = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, .).
-    (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = contact, normals
-    floor_z = lag_A * A_z + less_A * v_Az - ball.memory_A / ball.r * about_x
-    floor_x = lag_A * A_x + less_A * v_Ax + ball.memory_A * (inward - B_normal)
-    wall_y = lag_B * B_y + less_B * v_By + ball.memory_B * (upward - A_normal)
-    wall_z = lag_B * B_z + less_B * v_Bz + ball.memory_B / ball.r * about_y
+    # contact = (A_x + B_x, A_y + B_y, -r A_z, r B_z).
+    (inward, upward, about_x, about_y), (A_normal, B_normal) = contact, normals
+    floor_z -= ball.memory / ball.r * about_x
+    floor_x += ball.memory * (inward - B_normal)
+    wall_y += ball.memory * (upward - A_normal)
+    wall_z += ball.memory / ball.r * about_y
 
     forces = (
         rho * (drag_z + inertial_z) + torque_y, drag_h + inertial_h, drag_y,
@@ -202,54 +187,108 @@ def corrections(
     return forces, (floor_z, floor_x, wall_y, wall_z)
 
 
-def eventful(
-    place: Sequence[Quantity], v: Velocity, last: Velocity, normals: Sequence[Quantity], ball: Ball
-) -> Quantity:
+def surface(
+    v: tuple[float, float], change: tuple[float, float], hover: float, load: float, ball: Ball
+) -> tuple[float, float]:
+    """How a surface moves, m s-1, on which the ball slips at v, by so much more than a step ago.
+
+    Direction of sliding friction at mid step: the engine opposes friction to the slip that there would be 1/b_f after
+    the beginning of the step. A surface velocity equal to the change of slip between the middle and then removes the
+    difference; only where a contact clearly slides, since a slip that ends must be able to.
+
+    Continuous sliding: a contact that slides fast would `hover` under its load, m s-2. Its surface moves along with
+    the excess, which leaves the direction of friction as it is, and delays it by as much more as there is less damping.
+    """
+    square, changed = v[0] * v[0] + v[1] * v[1], change[0] * change[0] + change[1] * change[1]
+    needed, borne = hover * square**0.5, ball.hover * load
+    less = (needed - borne) / needed if needed > borne else 0.0
+    lag = ball.lag if _SLIDES * changed < square else 0.0
+    lag += less / 2 if lag > 0 else 0.0
+    return lag * change[0] + less * v[0], lag * change[1] + less * v[1]
+
+
+def eventful(h: float, y: float, v: Velocity, last: Velocity, normals: tuple[float, float], ball: Ball) -> bool:
     """Whether a ball that lacks a contact lands in the coming step, or comes near the vessel's axis."""
-    (_, h, y), (A_normal, B_normal) = place, normals
-    hover_A, hover_B = hovering(v, ball.R - h, ball)
-    return (
-        (A_normal == 0) & lands(y, v.v_y, last.v_y, hover_A, ball)
-        | (B_normal == 0) & (lands(h, v.v_h, last.v_h, hover_B, ball) | near_axis(ball.R - h, v, ball))
-    )  # fmt: skip
-
-
-def near_axis(rho: Quantity, v: Velocity, ball: Ball) -> Quantity:
-    """Whether a ball at the distance rho from the axis, less than R/4, is less than `_NEAR` steps away from it."""
-    along = rho * v.omega_c
-    return (rho < ball.R / 4) & (rho * rho <= (_NEAR * ball.step) ** 2 * (v.v_h * v.v_h + along * along))
-
-
-def hovering(v: Velocity, rho: Quantity, ball: Ball) -> tuple[Quantity, Quantity]:
-    """Loads, m s-2, below which slipping contacts hover with the present damping."""
+    rho = ball.R - h
     A_x, A_z, B_y, B_z = slip(v, rho, ball.r)
-    return ball.hover_A * (A_x * A_x + A_z * A_z) ** 0.5, ball.hover_B * (B_y * B_y + B_z * B_z) ** 0.5
+    hover_A, hover_B = ball.hover_A * (A_x * A_x + A_z * A_z) ** 0.5, ball.hover_B * (B_y * B_y + B_z * B_z) ** 0.5
+    floor = normals[0] == 0 and lands(y, v.v_y, last.v_y, hover_A, ball)
+    wall = normals[1] == 0 and (lands(h, v.v_h, last.v_h, hover_B, ball) or near_axis(rho, v, ball))
+    return floor or wall
 
 
-def unbearable(hover: Quantity, most: Quantity) -> Quantity:
-    """The share of a slip speed beyond that up to which the contact is continuous."""
-    excess = hover - most
-    return excess * (excess > 0) / (hover + (hover == 0))
+def near_axis(rho: float, v: Velocity, ball: Ball) -> bool:
+    """Whether a ball at the distance rho from the axis, less than R/4, is less than `_NEAR` steps away from it."""
+    along, reach = rho * v.omega_c, _NEAR * ball.step
+    return rho < ball.R / 4 and rho * rho <= reach * reach * (v.v_h * v.v_h + along * along)
 
 
-def lands(gap: Quantity, speed: Quantity, last: Quantity, hover: Quantity, ball: Ball) -> Quantity:
+def lands(gap: float, speed: float, last: float, hover: float, ball: Ball) -> bool:
     """Whether a gap, known `ahead` of its speed, closes by the end of a step with the acceleration of the last one.
 
     A contact that would hover under half of the weight, or under what presses it now, may open and close all the time:
-    that is no landing, unless it comes down faster than the forces of a few steps can make it.
+    that is no landing, unless it comes down faster than the forces of a few steps can make it. `hover` is the load,
+    m s-2, below which it does so with the present slip and damping.
     """
     change = speed - last
     gap = gap - ball.step * ball.ahead * (speed + ball.ahead / 2 * change)  # at the beginning
     end, closing = gap + ball.step * (speed + change / 2), speed * speed - 2 * change * gap / ball.step
-    presses = (2 * hover < ball.weight) & (ball.step * hover < -change)
-    falls = (closing > ball.fall**2) & (presses | (closing > (_FEW * ball.step * hover) ** 2))
-    return (end < 0) & (speed + change < 0) & falls
+    presses, few = 2 * hover < ball.weight and ball.step * hover < -change, _FEW * ball.step * hover
+    falls = closing > ball.fall * ball.fall and (presses or closing > few * few)
+    return end < 0 and speed + change < 0 and falls
 
 
-def followed(margin: Quantity, gap: Quantity, gain: Quantity) -> Quantity:
+def followed(margin: float, gap: float, gain: float) -> float:
     """Servo of a margin: it takes a share `gain` of the gap, not below 0, until the gap is zero.
 
     The contact point lies midway in the overlap, so that a ball that sinks in rolls on a shorter lever.
     """
     left = margin - gain * gap
-    return left * (left > 0)
+    return left if left > 0 else 0.0
+
+
+def ball_of(balls: Array, run: int) -> Ball:
+    """The ball of a run, a column of the table."""
+    return Ball(*balls[:, run].tolist())
+
+
+def velocity_of(rows: Array, run: int) -> Velocity:
+    """The velocities of a run, a column of six."""
+    return Velocity(
+        float(rows[0, run]), float(rows[1, run]), float(rows[2, run]),
+        float(rows[3, run]), float(rows[4, run]), float(rows[5, run]),
+    )  # fmt: skip
+
+
+def drive(
+    omega_0: Array, balls: Array, due: Any, held: Any, contact: Array, normals: Array, forces: Array, qvel: Array,
+    last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
+) -> bool:  # fmt: skip
+    """Let the margins follow the gaps and set what drives the next step; mark runs that are `due` to land in it, and
+    return whether there are any.
+
+    Forces of contacts (6 and 2, runs) are those of the engine's last step, but for runs where others are `held`.
+    """
+    some = False
+    for k in range(qpos.shape[1]):
+        ball, v, before = ball_of(balls, k), velocity_of(qvel, k), velocity_of(last, k)
+        if not held[k]:
+            for i in range(6):
+                forces[i, k] = contact[i, k]
+            forces[6, k], forces[7, k] = normals[0, k], normals[1, k]
+        given = float(forces[1, k]), float(forces[2, k]), float(forces[3, k]), float(forces[4, k])
+        loads = float(forces[6, k]), float(forces[7, k])
+        theta, h, y = float(qpos[0, k]), float(qpos[1, k]), float(qpos[2, k])
+        if loads[0] * loads[1] == 0 and eventful(h, y, v, before, loads, ball):
+            due[k] = True
+        some |= due[k]
+        if ball.gain > 0:
+            margins[0, k] = followed(float(margins[0, k]), y, ball.gain)
+            margins[1, k] = followed(float(margins[1, k]), h, ball.gain)
+        turn[0, k], turn[3, k] = math.cos(theta / 2), math.sin(theta / 2)
+        qpos[3, k], qpos[4:7, k] = 1.0, 0.0
+        driving, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]) = corrections(
+            v, before, ball.R - h, float(omega_0[k]), given, loads, ball
+        )
+        applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = driving
+    return some

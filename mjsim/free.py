@@ -12,7 +12,6 @@ ball before each step and moves during it as a cylinder does past the ball (`aga
 from __future__ import annotations
 
 import copy
-import functools
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -100,16 +99,6 @@ def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:
     law.step(data)
 
 
-@functools.cache
-def compiled() -> Any:
-    """`mjsim.compiled`, which has loops over `step`, if numba is installed."""
-    try:
-        from mjsim import compiled
-    except ImportError:
-        return None
-    return compiled
-
-
 class Free:
     """Simulations of free balls, one after the other; arguments and methods as of `mjsim.stepping.Polar`."""
 
@@ -158,6 +147,9 @@ class FreeBall:
         self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float,
         share: float = Law.share,
     ) -> None:  # fmt: skip
+        from mjsim import compiled  # here, because it has this module compiled
+
+        self._steps = compiled.steps
         self.model = model = copy.copy(model)  # its wall moves
         self.data = mujoco.MjData(model)
         self.p, self.theta, self._timestep = p, theta_0, settings.timestep
@@ -175,7 +167,7 @@ class FreeBall:
             heavy=float(model.dof_M0[-1]),
             margins=model.pair_margin,
             ball=Ball(*map(float, Ball.of(p, settings))),
-            served=self.law and (self.law.addresses(data) if compiled() else (self.law, data)),
+            served=self.law and compiled.served(self.law, data),
         )
         self._turns = settings.wall == "tangent"
         self.place(x, theta_0)
@@ -210,8 +202,7 @@ class FreeBall:
     def advance(self, fluid: Array, seen: Array) -> None:
         """Take a step for each omega_0; `seen` (steps, `NSENSOR`) takes the sensors and the gaps of A and B, m."""
         if self.law:
-            take = compiled().steps if compiled() else steps
-            self.theta = take(self.body, self._timestep, fluid, self.theta, seen)
+            self.theta = self._steps(self.body, self._timestep, fluid, self.theta, seen)
             return
         for row, omega_0 in zip(seen, fluid.tolist(), strict=False):
             self._soft_step(omega_0, row)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mjsim import recorder, scene
 from mjsim.contact_settings import ContactSettings
-from mjsim.free import Body, FreeBall, compiled, step
+from mjsim.free import Body, FreeBall, step
 from mjsim.world_axes import joint_velocities, unwrapped
 from model import Parameters, State
 from model.arrays import Array
@@ -70,10 +70,11 @@ class Fine:
             turn, (cos, sin) = float(x.omega_c), (math.cos(theta), math.sin(theta))
             away, along = -rates[1] - rho * turn * turn, rho * rates[0] - 2 * x.v_h * turn
             ball.body.last[:3] = away * cos - along * sin, away * sin + along * cos, rates[2]
-        take = compiled().through if compiled() else through
+        from mjsim import compiled  # here, because it has this module compiled
+
         longest = self._whole / (COARSE if again else _FIRST)
         given = ball.body, self._whole, longest, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
-        place, velocity, before, duration, since = take(*given)
+        place, velocity, before, duration, since = compiled.through(*given)
         v = np.array(velocity)
         first, last = recorder.forces(seen[1:3], np.array([place[0] - v[0] * since, place[0]]))
         (A_x, A_y, A_z), (B_x, B_y, B_z) = last

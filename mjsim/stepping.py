@@ -24,7 +24,7 @@ from mujoco.batch import MODEL_FIELDS, Batch
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Velocity, corrections, eventful, followed, near_axis
+from mjsim.corrections import Ball, Velocity, near_axis
 from model import Parameters, State
 from model.arrays import Array
 from model.kinematics import slip_speeds
@@ -60,10 +60,12 @@ class Polar:
         self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
         x0s: Sequence[npt.ArrayLike], theta_0: float, omega_0: Array, batched: bool = True,
     ) -> None:  # fmt: skip
+        from mjsim import compiled  # here, because numba takes long to load
+
         self._parameters, self._settings, runs = parameters, settings, len(models)
         self.model = models[0]
         self.data, array, self._step = _batch(models) if batched else _single(models[0])
-        self._drive, self._h, self._lead = driver(), settings.timestep, settings.timestep * settings.midpoint
+        self._drive, self._h, self._lead = compiled.drive, settings.timestep, settings.timestep * settings.midpoint
         self._qpos, self._qvel, sensors = array("qpos"), array("qvel"), array("sensordata")
         self._gaps = self._qpos[2:0:-1]
         self.margins, self._sensors = array("pair_margin")[:2], sensors.T
@@ -222,47 +224,6 @@ class Polar:
             contact, normals = self._arguments[3:5]
             np.copyto(self._forces, np.concatenate([contact, normals]), where=~self._held)
         return dict(zip(names, self._state, strict=True)) | {"start": self._start, "due": self._due}
-
-
-def drive(
-    omega_0: Array, table: Array, due: Any, held: Any, contact: Array, normals: Array, forces: Array, qvel: Array,
-    last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
-) -> bool:  # fmt: skip
-    """Let the margins follow the gaps and set what drives the next step; mark runs that are `due` to land in it, and
-    return whether there are any.
-
-    Forces of contacts (6 and 2, runs) are those of the engine's last step, but for runs where others are `held`.
-    """
-    one = qpos.shape[1] == 1
-    take: Callable[[Array], Any] = _floats if one else np.copy
-    if not held.all():
-        np.copyto(forces, np.concatenate([contact, normals]), where=~held)
-    ball, (theta, h, y), (*found, A, B), (fluid,) = Ball(*take(table)), *map(take, (qpos[:3], forces, omega_0[None]))
-    v, before = Velocity(*take(qvel)), Velocity(*take(last))
-    if not one or A * B == 0:
-        due |= (A * B == 0) & eventful((theta, h, y), v, before, (A, B), ball)
-    margins[0], margins[1] = followed(margins[0], y, ball.gain), followed(margins[1], h, ball.gain)
-    turn[0], turn[3] = np.cos(theta / 2), np.sin(theta / 2)
-    qpos[3], qpos[4:7] = 1.0, 0.0
-    given, (floor[0], floor[1], wall[0], wall[1]) = corrections(v, before, ball.R - h, fluid, found, (A, B), ball)
-    applied[0], applied[1], applied[2], applied[3], applied[4], applied[5] = given
-    return bool(due.any())
-
-
-def _floats(rows: Array) -> list[float]:
-    """Plain floats of one run, which beat arrays of one sixfold."""
-    numbers: list[float] = rows[:, 0].tolist()
-    return numbers
-
-
-@functools.cache
-def driver() -> Callable[..., bool]:
-    """`drive`, compiled if numba is installed."""
-    try:
-        from mjsim import compiled
-    except ImportError:
-        return drive
-    return compiled.drive  # type: ignore[no-any-return]
 
 
 def _single(model: Any) -> tuple[Any, Callable[[str], Array], Callable[[], Any]]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, scene, stepping
+from mjsim import ContactSettings, compiled, corrections, scene
 from model import Case, Flow, InputError, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
 from model.trajectory import columns
@@ -175,6 +175,6 @@ def test_compiled_gives_the_same_run(monkeypatch: pytest.MonkeyPatch, changes: d
         return [run.x for run in (*together, *alone)]
 
     fast = runs()
-    monkeypatch.setattr(stepping, "driver", lambda: stepping.drive)
+    monkeypatch.setattr(compiled, "drive", corrections.drive)
     for x, exact in zip(fast, runs(), strict=True):
         np.testing.assert_allclose(x, exact, rtol=0, atol=1e-9)

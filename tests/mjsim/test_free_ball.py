@@ -8,7 +8,7 @@ import pytest
 import analytic
 import mjsim
 from compare.kit.engines import COULOMB, rigid
-from mjsim import free
+from mjsim import compiled, free
 from mjsim.contact_settings import FORESEEN
 from mjsim.coulomb.law import Law
 from model import Case, InputError, Parameters, SimulationError, State
@@ -69,11 +69,17 @@ def test_what_a_step_foresees_of_slip_is_the_number_of_the_law() -> None:
     assert pytest.approx(FORESEEN) == Law.share / 5
 
 
-def test_compiled_steps_are_those_in_python(monkeypatch) -> None:
+@pytest.fixture
+def plain_python(monkeypatch):
+    monkeypatch.setattr(compiled, "steps", free.steps)
+    monkeypatch.setattr(compiled, "served", lambda *served: served)
+
+
+def test_compiled_steps_are_those_in_python(request) -> None:
     p = P.replace(omega_0=25.0, fluid_torque=0.3, drag="schiller-naumann", nu_f=1e-5)
     x, settings = State(y=0.002, omega_c=9.0, slip_x=20.0), rigid(1e-3)
     fast = mjsim.simulate(p, x, 0.3, settings=settings)
-    monkeypatch.setattr(free, "compiled", lambda: None)
+    request.getfixturevalue("plain_python")
     assert mjsim.simulate(p, x, 0.3, settings=settings).x == pytest.approx(fast.x, rel=1e-7, abs=1e-9)
 
 
@@ -82,8 +88,8 @@ def test_without_the_law_the_state_is_lost() -> None:
     assert abs(omega_c(P.replace(omega_0=12.0), settings)[0] - 1) > 0.05
 
 
+@pytest.mark.usefixtures("plain_python")
 def test_a_ball_flies_through_a_wall_that_is_not_turned(monkeypatch) -> None:
-    monkeypatch.setattr(free, "compiled", lambda: None)
     monkeypatch.setattr(free, "unwrapped", lambda azimuth, last: last)
     with pytest.raises(SimulationError, match="diverged"):
         omega_c(P.replace(omega_0=12.0), rigid(5e-4), 1.0)
