@@ -121,16 +121,6 @@ def test_the_same_runs_as_one_by_one():
         np.testing.assert_array_equal(many.case[k, 1:], one.case[1:])
 
 
-def test_landings_and_quiet():
-    """A ball that falls once has landed once, and a run ends when nothing has landed for the time asked for."""
-    p = P.replace(omega_0=0.0, c=0.0)
-    fall = math.sqrt(2 * 0.01 / p.g)
-    many = simulate_many(p, [0.01, 0, 0, 0, 0, 0, 0.02, 0], 1.0, settings=STEPPING, sample_interval=0.1, quiet=0.25)
-    assert many.landings.tolist() == [[0, 1, *[0] * 9]]
-    assert fall + 0.25 < many.end[0] <= fall + 0.25 + 0.1
-    np.testing.assert_array_equal(many.x[0, -1], many.x[0, 4])
-
-
 @pytest.mark.parametrize(
     ("sets", "x0s", "message"),
     [
@@ -142,12 +132,6 @@ def test_landings_and_quiet():
 def test_bad_input(sets, x0s, message):
     with pytest.raises(InputError, match=message):
         simulate_many(sets, x0s, 0.1)
-
-
-@pytest.mark.parametrize("threads", [0, -1, 1.5, 10**6])
-def test_threads_that_there_cannot_be(threads):
-    with pytest.raises(InputError, match=r"threads = .* is out of range"):
-        simulate_many(P, np.zeros(6), 0.1, threads=threads)
 
 
 def test_settles_on_random_sets():

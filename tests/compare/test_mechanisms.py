@@ -1,7 +1,6 @@
 """The exact cases of version 2 are right by equations of motion in space, integrated, and by balances."""
 
 import dataclasses
-import json
 import math
 
 import numpy as np
@@ -9,9 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from compare.bench import cases, run
-from compare.bench.case import TOLERANCE, VERSION, read
-from compare.commands import cli
-from model import InputError, StorageError
+from compare.bench.case import TOLERANCE
 from model.kinematics import rotated
 from tests.exact_cases import CASES
 
@@ -257,31 +254,3 @@ def test_an_adapter_of_version_1_takes_what_it_took_and_is_not_asked_for_more(tm
     assert asked.skipped == "of_version_1 doesn't say in FEATURES that it can do this: two bodies"
     assert not asked.errors
     assert run(CASES["plank"], "of_version_2").passed
-
-
-def test_files_of_cases_are_read_whatever_their_version(tmp_path, capsys):
-    assert cli.main(["cases", "-o", str(tmp_path)]) == 0
-    for case in cases():
-        again = read(tmp_path / f"{case.name}.json")
-        assert again.error(case.exact) == 0
-        assert (again.bodies, again.surfaces, again.needs) == (case.bodies, case.surfaces, case.needs)
-    data = json.loads((tmp_path / "box-stops.json").read_text())
-    new = ("spring", "joint", "dry", "under", "between")
-    data = {key: value for key, value in data.items() if key not in new} | {"version": 1}
-    data["surfaces"] = [{k: v for k, v in s.items() if k not in ("velocity", "restitution")} for s in data["surfaces"]]
-    (old := tmp_path / "old.json").write_text(json.dumps(data))
-    assert read(old).bodies == CASES["box-stops"].bodies
-    for change, says in (
-        (
-            {"version": VERSION + 1},
-            f"is of version {VERSION + 1} of the exact cases; this program reads 1 to {VERSION}",
-        ),
-        ({"schema": "dualball-trajectory"}, "is no exact case: its schema is 'dualball-trajectory'"),
-    ):
-        (other := tmp_path / "other.json").write_text(json.dumps(data | change))
-        with pytest.raises(InputError, match=says):
-            read(other)
-    for text in ("[]", "{}", "no", '{"schema": "dualball-case", "version": 1}'):
-        other.write_text(text)
-        with pytest.raises(StorageError, match="holds no exact case"):
-            read(other)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from compare.bench import cases, run
-from compare.bench.case import TIME_STEPS, VERSION
+from compare.bench.case import TIME_STEPS, VERSION, read
 from compare.bench.runner import run_all
 from compare.commands import cli
-from model import InputError
+from model import InputError, StorageError
 from tests.exact_cases import CASES
 
 BREAKS = {
@@ -132,19 +132,37 @@ def test_a_league_of_one(tmp_path, capsys):
 
 def test_the_set_as_files(tmp_path, capsys):
     for _ in range(2):  # its own are replaced
-        assert cli.main(["cases", "-o", str(tmp_path / "set")]) == 0
+        assert cli.main(["cases", "-o", str(tmp_path)]) == 0
     assert "block-rests" in capsys.readouterr().out
-    written = list((tmp_path / "set").iterdir())
+    written = list(tmp_path.iterdir())
     assert sum(path.stat().st_size for path in written) < 2e6
     assert len(written) == 2 + 2 * len(cases())
-    readme = (tmp_path / "set" / "README.md").read_text()
-    assert f"version {VERSION}" in readme
-    with h5py.File(tmp_path / "set" / "cases.h5") as file:
+    assert f"version {VERSION}" in (tmp_path / "README.md").read_text()
+    with h5py.File(tmp_path / "cases.h5") as file:
         for case in cases():
-            data = json.loads((tmp_path / "set" / f"{case.name}.json").read_text())
-            assert (data["version"], data["exact"]) == (VERSION, case.exact.tolist())
+            again = read(tmp_path / f"{case.name}.json")
+            assert again.error(case.exact) == 0
+            assert (again.bodies, again.surfaces, again.needs) == (case.bodies, case.surfaces, case.needs)
             assert np.array_equal(file[case.name]["exact"], case.exact)
-            assert file[case.name]["contacts"].asstr()[:].tolist() == list(case.contacts)
+            assert file[case.name]["contacts"].asstr()[:].tolist() == list(case.contacts) == list(again.contacts)
     assert cli.main(["cases", "lands"]) == 0
     assert "a hollow sphere" in capsys.readouterr().out
     assert cli.main(["cases", "land"]) == 2
+
+
+def test_a_file_of_version_1_is_read_and_what_is_none_refused(tmp_path):
+    data = CASES["box-stops"].to_mapping()
+    new = ("spring", "joint", "dry", "under", "between")
+    data = {key: value for key, value in data.items() if key not in new} | {"version": 1}
+    data["surfaces"] = [{k: v for k, v in s.items() if k not in ("velocity", "restitution")} for s in data["surfaces"]]
+    (path := tmp_path / "case.json").write_text(json.dumps(data))
+    assert read(path).bodies == CASES["box-stops"].bodies
+    newer = f"is of version {VERSION + 1} of the exact cases; this program reads 1 to {VERSION}"
+    for text, error, says in (
+        (json.dumps(data | {"version": VERSION + 1}), InputError, newer),
+        (json.dumps(data | {"schema": "other"}), InputError, "is no exact case: its schema is 'other'"),
+        *((text, StorageError, "holds no exact case") for text in ("[]", "{}", "no", '{"schema": "dualball-case"}')),
+    ):
+        path.write_text(text)
+        with pytest.raises(error, match=says):
+            read(path)
