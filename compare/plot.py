@@ -26,9 +26,10 @@ from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.thresholds import figures as thresholds
+from compare.testing import UNITS
 from model import Case, InputError, Parameters, Trajectory
 from model.parameters import check_names
-from model.trajectory import COMPONENTS, columns, component
+from model.trajectory import component
 
 if TYPE_CHECKING:
     import xarray
@@ -78,10 +79,9 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
     """
     if not hasattr(run, "force_A"):
         raise InputError("the run must be as its file is: open it without engine='dualball', which makes a table of it")
-    names, about = names or ("omega_c",), columns(Trajectory)
-    known = [name for name in COMPONENTS if name not in ("time", "case")]
-    check_names(names, known, "quantity of a motion")
-    units = {about[COMPONENTS[name][0]]["units"]: name for name in names}
+    names = names or ("omega_c",)
+    check_names(names, [name for name in UNITS if name not in ("time", "case")], "quantity of a motion")
+    units = {UNITS[name]: name for name in names}
     if len(units) > 1:
         raise InputError(f"{' and '.join(units.values())} have different units: {', '.join(units)}")
     axes, time, case = _or_new(axes), np.asarray(run.time), np.asarray(run.case)

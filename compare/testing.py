@@ -21,14 +21,13 @@ from model.arrays import Array
 from model.errors import suggestion
 from model.hdf5 import dataset, reading
 from model.parameters import POSITIVE, check_number
-from model.trajectory import AXES, columns
+from model.trajectory import COMPONENTS, columns, component
 
 SETTLED_PART = 0.25
 """Last part of a motion, in which it has to have settled."""
 FEWEST, SAMPLES = 10, 10_000_000
 """Samples below which nothing is judged, and most that are read of another program's file."""
-_COLUMNS = {name: (AXES if meta["shape"] else ("",), meta["units"]) for name, meta in columns(Trajectory).items()}
-UNITS = {name + axis: unit for name, (axes, unit) in _COLUMNS.items() for axis in axes}
+UNITS: dict[str, str] = {name: columns(Trajectory)[column]["units"] for name, (column, _) in COMPONENTS.items()}
 """Units of what a motion may have, by name: the columns of a trajectory, of its forces each component."""
 
 
@@ -82,9 +81,8 @@ def read(source: Source, name: str = "") -> Series:
         name, path = name or str(source), Path(source)
         source = _csv(path) if path.suffix.lower() in (".csv", ".txt") else _hdf5(path)
     if isinstance(source, Trajectory):
-        run, given = source, dict[str, npt.ArrayLike]()
-        for column, (axes, _) in _COLUMNS.items():
-            given |= {column + axis: row for axis, row in zip(axes, np.atleast_2d(getattr(run, column).T), strict=True)}
+        run = source
+        given: dict[str, npt.ArrayLike] = {quantity: component(run, quantity) for quantity in COMPONENTS}
     else:
         given = dict(source) if isinstance(source, Mapping) else {}
     name = name or (run.header.engine if run else "the motion")

@@ -198,7 +198,7 @@ def page(made: Design) -> str:
         "bounds": ", ".join(f"{_named(name)} {span}" for name, span in spans.items()),
         "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
-    drawn, letters = embedded({caption: svg(draw(made)) for draw, caption in figures.FIGURES})
+    drawn, letters = embedded({caption: svg(figure) for figure, caption in (draw(made) for draw in figures.FIGURES)})
     texts = {"doubts": doubts(made.model_error), "sentences": sentences(made), "tables": rows(made).items()}
     return pages.render("compare.report", "meter.html", made=made, **texts, asked=asked, figures=drawn, letters=letters)
 

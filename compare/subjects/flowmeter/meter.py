@@ -1,8 +1,7 @@
-"""A designed meter: its characteristic with tolerances, its sensitivities, and the choice of friction."""
+"""Figures of a designed meter, with captions: characteristic with tolerances, sensitivities, choice of friction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ _FINE = 51
 """Points of the plane of friction along each axis."""
 
 
-def characteristic(made: Design) -> Figure:
+def characteristic(made: Design) -> tuple[Figure, str]:
     """Reading over flow, with the band of the tolerances, the flows to measure and the limits."""
     curve, chosen, request = made.curve, made.choice, made.request
     figure, axes = style.panels(7.0, 4.3)
@@ -32,10 +31,13 @@ def characteristic(made: Design) -> Figure:
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
     style.legend(axes, loc="lower right")
-    return figure
+    return figure, (
+        "Angular velocity of the ball's orbit, against that of the fluid. Where the lines part, the reading depends on "
+        "whether the flow rose or fell. Grey: from the lowest to the highest reading within the tolerances."
+    )
 
 
-def sensitivities(made: Design) -> Figure:
+def sensitivities(made: Design) -> tuple[Figure, str]:
     """Bars: by how many per cent each threshold changes if a value does by one."""
     figure, axes = style.panels(7.0, 3.6)
     there = [key for key in THRESHOLDS if np.isfinite(getattr(made.thresholds, key))]
@@ -55,10 +57,10 @@ def sensitivities(made: Design) -> Figure:
     axes.set_ylabel("% of the threshold per %")
     axes.grid(axis="y", alpha=0.25)
     style.legend(figure, loc="outside upper center", ncols=len(there))
-    return figure
+    return figure, "Sensitivities: by how many per cent a threshold changes if a value does by one."
 
 
-def friction(made: Design) -> Figure:
+def friction(made: Design) -> tuple[Figure, str]:
     """The operating limit of the chosen ball and vessel over both frictions."""
     chosen = made.choice
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
@@ -73,21 +75,11 @@ def friction(made: Design) -> Figure:
     xerr, yerr = (made.request.tolerances.get(name, 0.0) * chosen.values[name] for name in ("eta", "mu"))
     axes.errorbar(x, y, yerr, xerr, fmt="o", color="white", mec="black", ms=7, capsize=4)
     axes.set(xlabel="wall friction $\\eta$", ylabel="floor friction $\\mu$")
-    return figure
-
-
-FIGURES: tuple[tuple[Callable[[Design], Figure], str], ...] = (
-    (
-        characteristic,
-        "Angular velocity of the ball's orbit, against that of the fluid. Where the lines part, the reading depends on "
-        "whether the flow rose or fell. Grey: from the lowest to the highest reading within the tolerances.",
-    ),
-    (sensitivities, "Sensitivities: by how many per cent a threshold changes if a value does by one."),
-    (
-        friction,
+    return figure, (
         "How far the operating range reaches over both frictions, with ball, vessel and fluid as chosen. Dot: the "
         "choice, with its tolerances; white line: the fastest flow to measure; dotted: η = j, left of "
-        "which slip limits the range, and right of which unloading does.",
-    ),
-)
-"""What draws each figure of the page, and its caption."""
+        "which slip limits the range, and right of which unloading does."
+    )
+
+
+FIGURES = characteristic, sensitivities, friction
