@@ -4,8 +4,8 @@
 # make test-all   the slow tests, too
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
-# make check      what CI runs: lint, types, import contracts, docs and wheel, two at a time; a quick validation judged by
-#                 wrong theories, a small league, tests
+# make check      what CI runs: wheel, docs, lint, types, import contracts and a small league, two at a time; a quick
+#                 validation judged by wrong theories; tests
 # make league     physics engines on exact contact cases: those that have a wheel, Siconos where the system has it
 # make help       this list
 # make lock       resolve the dependencies anew (needs uv)
@@ -52,8 +52,9 @@ wheel: $(VENV)/installed-dev
 	.ci/wheel $(VENV)
 
 check:
-	$(MAKE) -j 2 lint docs wheel  # a processor each
-	$(MAKE) verdicts league test
+	$(MAKE) $(VENV)/installed-dev $(VENV)/installed-engines
+	$(MAKE) -j 2 wheel docs lint league  # a processor each, what takes longest first
+	$(MAKE) verdicts test
 
 league: $(VENV)/installed-engines
 	$(BIN)/dualball league --quick --quiet -o $(RESULTS)

@@ -21,7 +21,7 @@ def main() -> int:
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
     one = "also judge by what this witness alone says, as mujoco-plain, stored in DIR or the first of all; repeatable"
     parser.add_argument("--witness", action="append", default=[], metavar="NAME[=DIR]", help=one)
-    parser.add_argument("--whole", action="store_true", help="judge by all claims on the first of them: takes an hour")
+    parser.add_argument("--whole", action="store_true", help="judge by all claims on the first of them: takes longer")
     parser.add_argument("--page", type=Path, metavar="FILE", help="page to write")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)")
