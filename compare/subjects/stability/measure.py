@@ -48,7 +48,7 @@ SLOWEST = 0.04
 """Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; more at the others."""
-REST = 0.05
+ZERO_RATE = 0.05
 """Measured rates below this share of the drag coefficient c count as zero."""
 Exponents = npt.NDArray[np.complex128]
 
@@ -281,7 +281,7 @@ def _modes(
             parts.append((name, mode, value, natural_size(value, other, p), float(uncertainty[k])))
     # They come from one propagator: where one is too vague for a check, the others aren't to be trusted more.
     vague = max(COVERAGE * sure / size / quantity(name).resolves for name, *_, size, sure in parts)
-    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > REST * p.c]
+    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > ZERO_RATE * p.c]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
     for name, mode, value, size, sure in parts:
@@ -311,7 +311,7 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     Its own, or that of the exponent if it is none, or else that of free fall.
     """
     for size in (abs(rate), math.hypot(rate, other)):
-        if size > REST * p.c:
+        if size > ZERO_RATE * p.c:
             return size
     return 1 / time_unit(p)
 
