@@ -187,7 +187,7 @@ def described(made: Design) -> dict[str, Any]:
 def page(made: Design) -> str:
     """All of it as a page that needs nothing but itself."""
     from compare.kit.pictures import embedded, svg  # here, because drawing takes a second to load
-    from compare.subjects.flowmeter import meter as figures
+    from compare.subjects.flowmeter.figures import OF_A_METER
 
     r, bounds = made.request, made.request.bounds[made.material]
     response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""
@@ -198,7 +198,7 @@ def page(made: Design) -> str:
         "bounds": ", ".join(f"{_named(name)} {span}" for name, span in spans.items()),
         "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
-    drawn, letters = embedded({caption: svg(figure) for figure, caption in (draw(made) for draw in figures.FIGURES)})
+    drawn, letters = embedded({caption: svg(figure) for figure, caption in (draw(made) for draw in OF_A_METER)})
     texts = {"doubts": doubts(made.model_error), "sentences": sentences(made), "tables": rows(made).items()}
     return pages.render("compare.report", "meter.html", made=made, **texts, asked=asked, figures=drawn, letters=letters)
 
