@@ -21,7 +21,6 @@ from matplotlib.figure import Figure
 from compare import gallery
 from compare.kit import pages, style
 from compare.kit.drawing import GapError
-from compare.kit.quantities import QUANTITIES
 from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
 from compare.subjects.flowmeter import figures as flowmeter
@@ -86,7 +85,7 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
         raise InputError(f"{' and '.join(units.values())} have different units: {', '.join(units)}")
     axes, time, case = _or_new(axes), np.asarray(run.time), np.asarray(run.case)
     for name in names:
-        axes.plot(time, component(run, name), label=style.symbol(name) if name in QUANTITIES else name)
+        axes.plot(time, component(run, name), label=style.symbol(name))
     begins = np.flatnonzero(np.diff(case, prepend=-1))
     for first, last in zip(begins, [*begins[1:], len(case) - 1], strict=True):
         axes.axvspan(time[first], time[last], color=style.COLOURS[Case(case[first])], alpha=0.15, lw=0)

@@ -119,7 +119,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
         limits.append(
-            [symbol, "does not exist" if math.isnan(value) else f"{shown_to(value, 12)}{unit}", _MEANING[name]]
+            [symbol, "does not exist" if math.isnan(value) else f"{shown_to(value, 12)}{unit}", meter.MEANING[name]]
         )
 
     solutions = data["solutions"]
@@ -155,15 +155,6 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         law = f"the law {p.drag!r} is meant for {low:g} to {high:g}{hint}"
         remarks.append(Text(f"Warning: Re = {', '.join(outside)}, but {law}.", "yellow"))
     return [*first, head, groups, pages.table("Thresholds", limits, justify="left"), shown, *remarks]
-
-
-_MEANING = {
-    "omega_01": "two-point rolling becomes two-point slipping (P3)",
-    "omega_02": "the wall begins to carry the ball (P2; NF2 where η < j)",
-    "omega_03": "the floor lets go of the rolling ball (NT1)",
-    "omega_04": "two-point slipping ends in a fold (F)",
-    "eta_cr": "least wall friction for which there is a fold",
-}
 
 
 _ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] = {

@@ -14,6 +14,8 @@ from typing import NoReturn
 from model.files import leave
 
 _BOTH = (signal.SIGINT, signal.SIGTERM)
+_WAITS = 200
+"""How often a signal waits for an import, .01 s at a time: a user's own engine may be one that never ends."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -25,8 +27,8 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def answered(answer: Callable[[int], None]) -> Iterator[Callable[[], None]]:
-    """The first signal calls a function with its number, the next ones do what they did before.
+def answered(answer: Callable[[int, FrameType | None], object]) -> Iterator[Callable[[], None]]:
+    """The first signal calls a function with its number and what it broke into, the next ones do what they did before.
 
     Yields how to listen again. Signals that are ignored stay so, as in what a shell runs in the background; and all in
     a thread, which gets none.
@@ -40,7 +42,7 @@ def answered(answer: Callable[[int], None]) -> Iterator[Callable[[], None]]:
 
     def press(number: int, frame: FrameType | None) -> None:
         restore()
-        answer(number)
+        answer(number, frame)
 
     def listen() -> None:
         for each in before:
@@ -55,24 +57,32 @@ def answered(answer: Callable[[int], None]) -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def raised() -> Iterator[None]:
-    """The first signal raises `Interrupted`, also where another error is made of it, as by an import that it ends.
+    """The first signal raises `Interrupted`, also where a library makes another error of it.
 
-    Python loses what is raised in its callbacks, as when an import or an object ends: then it is raised again.
+    It comes again a little later while something is imported, since half an import would spoil the next ones; and where
+    Python lost what it raised, as when an object ends.
     """
-    heard, usual = list[int](), sys.unraisablehook
+    heard, waits, usual = list[int](), list[int](), sys.unraisablehook
 
-    def interrupt(number: int) -> NoReturn:
-        heard.append(number)
-        raise Interrupted(number)
-
-    def lost(what: sys.UnraisableHookArgs) -> None:
-        if not isinstance(what.exc_value, Interrupted):
-            usual(what)
-            return
+    def later(number: int) -> None:
         listen()
-        again = threading.Timer(0.01, os.kill, (os.getpid(), heard[-1]))
+        again = threading.Timer(0.01, os.kill, (os.getpid(), number))
         again.daemon = True
         again.start()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if _imports(frame) and len(waits) < _WAITS:
+            waits.append(number)
+            later(number)
+        else:
+            heard.append(number)
+            raise Interrupted(number)
+
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if isinstance(what.exc_value, Interrupted):
+            later(heard[-1])
+        else:
+            usual(what)
 
     try:
         with answered(interrupt) as listen:
@@ -86,7 +96,14 @@ def raised() -> Iterator[None]:
         sys.unraisablehook = usual
 
 
-def end(number: int) -> NoReturn:
+def _imports(frame: FrameType | None) -> bool:
+    """Whether what runs is part of an import."""
+    while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        frame = frame.f_back
+    return frame is not None
+
+
+def end(number: int, frame: FrameType | None) -> NoReturn:
     """End the process at once."""
     with suppress(OSError):  # standard error may be closed
         os.write(2, b"dualball: interrupted\n")

@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     args.time = args.time or DURATION
     task = running.task(args, options.parameters(args), flow=running.flow(args))
     heard: list[int] = []  # the first signal ends the run with its samples, the second without
-    with tempfile.TemporaryDirectory() as scratch, signals.answered(heard.append):
+    with tempfile.TemporaryDirectory() as scratch, signals.answered(lambda number, _: heard.append(number)):
         path = args.output or Path(scratch) / "run.h5"
         failure = store(task, path, stop=lambda: bool(heard))
         about = inspection.describe(failed_path(path) if failure else path)

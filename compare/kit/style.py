@@ -80,14 +80,21 @@ def panels(width: float, height: float, rows: int = 1, columns: int = 1, **layou
     return made, made.subplots(rows, columns, **layout)
 
 
+_COLUMNS = {
+    **{"theta": "θ", "h": "h", "v_h": "v_h", "slip_speed_A": "|v_A|", "slip_speed_B": "|v_B|"},
+    **{"gap_A": "gap at the floor", "gap_B": "gap at the wall"},
+}
+
+
 def symbol(name: str) -> str:
-    """A quantity of `compare.kit.quantities`, by its name, in letters of the axes."""
+    """A quantity of `compare.kit.quantities`, or a column of a motion, by its name, in letters of the axes."""
 
     def typeset(match: re.Match[str]) -> str:
         letter, tilde, index, zero = match.groups()
         return "$" + (rf"\tilde{{{letter}}}" if tilde else letter) + f"_{{{index}}}" + ("^0$" if zero else "$")
 
-    return re.sub(r"(\w)(\u0303?)_(\w+?)(⁰?)(?!\w)", typeset, QUANTITIES[name].symbol)
+    text = QUANTITIES[name].symbol if name in QUANTITIES else _COLUMNS[name]
+    return re.sub(r"(\w)(\u0303?)_(\w+?)(⁰?)(?!\w)", typeset, text)
 
 
 OMEGA_0, OMEGA_C, OMEGA_X = (f"{name} (rad/s)" for name in ("$ω_0$", symbol("omega_c"), symbol("wall_spin")))

@@ -21,6 +21,14 @@ from model import Parameters
 SYMBOLS = {"mu": "μ", "eta": "η", "rho_b": "ρ_b", "rho_f": "ρ_f", "nu_f": "ν_f"}
 SYMBOLS |= {key: QUANTITIES[key].symbol for key in THRESHOLDS}
 UNITS = {"r": "m", "R": "m", "rho_b": "kg/m³", "rho_f": "kg/m³", "nu_f": "m²/s", "gravity": "m/s²"}
+MEANING = {
+    "omega_01": "two-point rolling becomes two-point slipping (P3)",
+    "omega_02": "the wall begins to carry the ball (P2; NF2 where η < j)",
+    "omega_03": "the floor lets go of the rolling ball (NT1)",
+    "omega_04": "two-point slipping ends in a fold (F)",
+    "eta_cr": "least wall friction for which there is a fold",
+}
+"""What happens at a threshold."""
 _NONE = "–"
 
 
@@ -40,7 +48,7 @@ def torque(p: Parameters) -> str:
     laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
     stokes_told, layer_told = (
         f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({law.shift:+.0%}), and "
-        f"it would need {law.friction:.2g} times the friction that there is"
+        f"it would need {law.friction:#.2g} times the friction that there is"
         for law in laws
     )
     how = "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
@@ -135,8 +143,8 @@ def rows(made: Design) -> dict[str, pages.Rows]:
     return {
         "The best of each material": [["", *best], *([name, *row] for name, row in (values | limits).items())],
         "Thresholds": [
-            ["threshold", "nominal (rad/s)", "lowest", "highest"],
-            *([SYMBOLS[key], *(rounded(x, off) for x in row)] for key, row in spread.items()),
+            ["threshold", "nominal (rad/s)", "lowest", "highest", "what happens there"],
+            *([SYMBOLS[key], *(rounded(x, off) for x in row), MEANING[key]] for key, row in spread.items()),
         ],
         "Sensitivities": sensitivities,
     }

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from compare.kit import pages, style
-from compare.kit.quantities import QUANTITIES
 from compare.testing import UNITS, Series, common, difference
 from model import InputError, Trajectory
 
@@ -87,7 +86,7 @@ def draw_both(a: Series, b: Series) -> Figure:
     figure, panels = style.panels(9, 1.6 * len(names) + 2.2, len(names) + 1, sharex=True)
     t = common(a, b)
     for axes, name in zip(panels, names, strict=False):
-        symbol = style.symbol(name) if name in QUANTITIES else name
+        symbol = style.symbol(name)
         for each, colour, line in zip((a, b), PAIR_COLOURS, ("-", "--"), strict=True):
             axes.plot(each.time, each[name], line, color=colour, label=each.name)
         axes.set(ylabel=f"{symbol} ({pages.readable(UNITS[name])})", xlim=t[[0, -1]])

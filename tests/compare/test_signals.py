@@ -129,7 +129,16 @@ def test_every_command_ends_at_any_moment(whole, tmp_path, command, after, numbe
     end(command, number, after, shutil.copytree(whole, tmp_path / "here"))
 
 
+@pytest.fixture
+def hears(number):
+    """Also where a shell runs the tests in the background, and has SIGINT ignored."""
+    before = signal.signal(number, signal.SIG_DFL)
+    yield
+    signal.signal(number, before)
+
+
 @BOTH
+@pytest.mark.usefixtures("hears")
 def test_a_signal_that_python_loses_comes_again(number):
     """As in a callback of an object's end, whose errors go nowhere."""
 
@@ -141,3 +150,21 @@ def test_a_signal_that_python_loses_comes_again(number):
     with pytest.raises(signals.Interrupted) as ended, signals.raised():
         time.sleep(60 if Ends() else 0)
     assert ended.value.code == 128 + number
+
+
+@BOTH
+@pytest.mark.usefixtures("hears")
+@pytest.mark.parametrize("lasts", ["0.2", "60"])
+def test_an_import_is_not_cut_short(number, lasts, tmp_path, monkeypatch):
+    """Unless it doesn't end."""
+    text = f"import os, time\nos.kill(os.getpid(), {int(number)})\ntime.sleep({lasts})\nwhole = True\n"
+    (tmp_path / f"slow_{number}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def work():
+        __import__(f"slow_{number}")
+        time.sleep(60)
+
+    with pytest.raises(signals.Interrupted), signals.raised():
+        work()
+    assert hasattr(sys.modules.pop(f"slow_{number}", None), "whole") is (lasts == "0.2")
