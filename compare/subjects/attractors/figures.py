@@ -46,14 +46,18 @@ def of_set(p: Parameters, quantity: str) -> Diagram:
 
 
 @functools.cache
-def _orbit(p: Parameters) -> orbits.Orbit:
-    """By Newton's method, from about a state and the period, or what is found from random starts; else `GapError`."""
+def _hops(p: Parameters) -> orbits.Orbit | None:
+    """By Newton's method, from about a state and the period, or what is found from random starts, if anything is."""
     if p == SET:
         return orbits.refine(p, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
-    for each in analytic.attractors(p, STARTS, seed=0):
-        orbit = each.fate.orbit
-        if orbit and {case.A is Contact.N for case in orbit.cases} == {True, False}:
-            return orbit
+    found = (each.fate.orbit for each in analytic.attractors(p, STARTS, seed=0))
+    return next((o for o in found if o and {case.A is Contact.N for case in o.cases} == {True, False}), None)
+
+
+def _orbit(p: Parameters) -> orbits.Orbit:
+    """The ball that hops for ever; `GapError` if none is found."""
+    if orbit := _hops(p):
+        return orbit
     raise GapError(f"no ball hops for ever that starts in one of {STARTS} random states at ω₀ = {p.omega_0:g} rad/s")
 
 
