@@ -15,10 +15,9 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic.bifurcation import diagram as bifurcation
-from analytic.mechanics import drag
+from analytic.mechanics import drag, rolling_forces
 from analytic.simulation.settings import Settings
 from analytic.simulation.simulator import simulate
-from analytic.simulation.two_point_rolling import MARGINS
 from analytic.slipping import slip_bounds
 from model import Case, Flow, Parameters, SimulationError, State
 from model.arrays import Array
@@ -84,13 +83,17 @@ def _collocation(harmonics: int) -> tuple[Array, npt.NDArray[np.complex128], Arr
     return phase, amplitudes, np.real(waves * (1j * odd) @ amplitudes)
 
 
+_MARGINS = {"slip-stability": rolling_forces.slip_margin, "infeasible": rolling_forces.margin}
+"""How far RR is from where it is left, >= 0 while it lasts, by `Settings.leave_rolling`."""
+
+
 def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stability") -> float:
     """The least amplitude in rad s-1 at which slip begins at some phase of the pulsation, frequency > 0 in Hz.
 
     By the margin of `Settings.leave_rolling` along `swing`; on rough floors and at high frequencies "infeasible" gives
     a larger amplitude. 0 where the mean flow alone ends RR, inf without drag.
     """
-    margin = MARGINS[leave_rolling]
+    margin = _MARGINS[leave_rolling]
     if p.c == 0:
         return math.inf
 

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
 
@@ -49,9 +48,8 @@ from analytic.simulation.equations import (
     Fall,
     Motion,
 )  # fmt: skip
-from analytic.simulation.motion import Moment, Path
+from analytic.simulation.motion import Moment
 from model import State
-from model.arrays import Array
 
 MOST = 8
 """Most coordinates of a case."""
@@ -223,43 +221,3 @@ def levels(values: Any, k: Motion, arm: Any, level: Any) -> bool:
 
 TEXT = (count_ends, begin, _at_wall, _away_from_wall, moment, _off_the_wall, least_slip, hop, levels)
 """What is compiled where numba is installed."""
-
-
-class Chart(NamedTuple):
-    """The motion of one case from a moment on, for what isn't compiled."""
-
-    at: Moment
-    k: Motion
-    start: list[float]
-    """Coordinates then."""
-    scale: list[float]
-    """Natural size of each, for absolute tolerances."""
-    ends: tuple[int, ...]
-    """What can end the case."""
-
-    @classmethod
-    def of(cls, case: int, at: Moment, k: Motion) -> Self:
-        """That of a case."""
-        z, scale = [0.0] * MOST, [0.0] * MOST
-        k, n = begin(case, at, k, z, scale)
-        return cls(at, k, z[:n], scale[:n], ENDS[case][: count_ends(k)])
-
-    def rates(self, t: float, z: Sequence[float]) -> list[float]:
-        """Rates of the coordinates."""
-        out = [0.0] * len(z)
-        equations.rates(t, z, self.k, out)
-        return out
-
-    def guards(self, t: float, z: Sequence[float]) -> list[float]:
-        """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
-        out = [0.0] * len(self.ends)
-        equations.guards(t, z, self.k, out)
-        return out
-
-    def path(self, t: Array, z: Array) -> Path:
-        """States from times (n,) and coordinates (k, n)."""
-        m = moment(t, z, self.at, self.k)
-        theta, alpha, beta, work = (np.broadcast_to(each, t.shape) for each in (m.theta, m.alpha, m.beta, m.work))
-        if self.k.case % 3 == AWAY:
-            theta = np.unwrap(np.append(self.at.theta, theta))[1:]
-        return Path(t, theta, m.x.stacked(), alpha, beta, work)

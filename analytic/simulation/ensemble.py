@@ -7,16 +7,14 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
-from types import ModuleType
+from functools import lru_cache, partial
 
 import numpy as np
 import numpy.typing as npt
 
+from analytic.simulation.motion import Moment
 from analytic.simulation.settings import LANDED, Settings, check_duration, sample_times, start_state
-from analytic.simulation.simulator import simulate
-from model import Flow, InputError, Parameters, SimulationError, State
+from model import Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import TURNING, VARIABLES, full_state
@@ -155,45 +153,17 @@ def _stepped(run: _Run) -> tuple[float, str]:
 
 
 def _event_driven(run: _Run) -> tuple[float, str]:
-    """The same by event-driven simulation; by that of a single run where compiled steps become too short."""
+    """The same by event-driven simulation."""
+    from analytic.simulation import hybrid  # here, since scipy and numba take a while to load
+
     blow = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
-    if whole := whole_runs():
-        stop, taken = np.array([whole.stop(0.0, run.times, run.quiet)]), np.zeros(1, np.int64)
-        rows = whole.Course(run.times, run.x, run.case, run.landings, blow, run.quiet, stop, taken, run.over)
-        if whole.carried_out(run.x0, run.p, run.flow, run.settings, rows):
-            return run.rests(int(taken[0]) - 1)
-        run.landings[:] = 0
-
-    def wanted(done: float) -> None:
-        if run.over[0]:
-            raise InterruptedError
-
-    times, failure = run.times, ""
-    try:
-        last = simulate(run.p, run.x0, times[-1], run.flow, run.settings, sample_interval=times[1], progress=wanted)
-    except SimulationError as error:
-        last, failure = error.trajectory, str(error)
-    count, events = len(last.time), last.events
-    run.x[:count], run.case[:count] = last.x, last.case
-    landed = events.time[np.maximum(events.impulse_A[:, 1], events.impulse_B[:, 0]) > blow]
-    np.add.at(run.landings, np.searchsorted(times, landed), 1)
-    for time, until in pairwise([0.0, *landed, math.inf]):
-        quiet = int(np.searchsorted(times, time + run.quiet, side="right"))
-        if quiet < count and times[quiet] <= until:
-            run.landings[quiet + 1 :] = 0
-            return run.rests(quiet)
-    return (float(last.time[-1]), failure) if failure else run.rests(count - 1)
-
-
-def whole_runs() -> ModuleType | None:
-    """Compiled ones, where numba is installed."""
-    from analytic.simulation import integrator  # here, since scipy and numba take a while to load
-
-    if not integrator.solvers():
-        return None
-    from analytic.simulation import whole_runs
-
-    return whole_runs
+    each = run.times, run.x, run.case, run.landings, blow, run.quiet, run.over
+    given = hybrid.given(run.p, run.flow, run.settings, float(run.times[-1]))
+    rows, failure = hybrid.carry_out(Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Rows.of, *each, whole=False))
+    last = int(rows.taken[0]) - 1
+    if failure:
+        return float(run.times[max(last, 0)]), f"stopped at t = {rows.reached[0]:g} s: {failure}"
+    return run.rests(last)
 
 
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:

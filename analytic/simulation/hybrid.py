@@ -1,74 +1,270 @@
 """Event-driven simulation: each case by its own equations, from one change of case to the next.
 
-`go_through` is one text: `whole_runs` compiles it, with a `follow` and a `note` of its own. Here `integrator` follows
-the coordinates of `charts` up to the guard that turns negative first (with Stokes' drag RR is known in closed form),
-and `transitions` says how to go on.
+`follow` goes along the coordinates of `charts` up to the guard that turns negative first, and `transitions` says how to
+go on. One text: where numba is installed `whole_runs` compiles it with the steps of `solvers`, so that a run is one
+call, which threads can make at once; else, and where those steps become too short, it is plain Python with the steps
+of `integrator`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache, lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import Forces
-from analytic.simulation import charts, equations, motion, transitions, two_point_rolling
-from analytic.simulation.charts import NONE, Chart
-from analytic.simulation.equations import A_LANDS, RR, RR_ENDS, Motion
-from analytic.simulation.integrator import StalledError, Stretch
-from analytic.simulation.motion import REPORT_EVERY, Event, Fluid, Moment, Path, Recorder
+from analytic.simulation import charts, equations, motion, transitions
+from analytic.simulation.charts import NONE
+from analytic.simulation.equations import A_LANDS, AWAY, Motion
+from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, first_pace, stretch
+from analytic.simulation.motion import Event, Fluid, Moment, Recorder
 from analytic.simulation.settings import Settings
 from model import Case, Contact, Flow, Parameters, State
-from model.arrays import Array, Real
+from model.arrays import Array
 
 _LEAST_JUMP = 1e-12
 """Change of the flow at a knot, relative to the largest flow, above which it is a jump."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
+STRIDES, STEPS = 20, 1000
+"""How often a case is followed, and steps each time, between two looks at progress and keyboard."""
+ALL = 2**62
+"""As many as there are."""
 
 
-def go_through(at: Moment, k: Motion, pieces: Any, run: Any) -> None:
-    """From a moment to the last sample, or to when the run is stopped.
+class Stage(NamedTuple):
+    """How far a run has come."""
+
+    at: Moment
+    case: int = NONE
+    begun: int = 0
+    """Pieces of the flow that have begun."""
+    at_once: int = 0
+    """Changes of case since the last progress in time."""
+
+
+class Rows(NamedTuple):
+    """What is kept of a run, a row a sample or event."""
+
+    times: Array
+    """Of the samples, s, shape (n,)."""
+    x: Array
+    """States (n, 8)."""
+    case: npt.NDArray[np.int8]
+    landings: npt.NDArray[np.int64]
+    """Landings since the sample before (n,)."""
+    path: Array
+    """Azimuth, directions of slip, work, and omega_0 (n, 5); none where nobody wants them."""
+    z: Array
+    """Coordinates of samples that are not kept yet (n, MOST)."""
+    events: Array
+    """Times, cases before and after, impulses (m, 9), from the last look on; none where nobody wants them."""
+    taken: npt.NDArray[np.int64]
+    """How many samples are kept, and how many events, shape (2,)."""
+    reached: Array
+    """How far the run is, and the sample at which it is stopped if nothing more lands, shape (2,), s."""
+    blow: float
+    """Normal impulse from which a landing counts, N s."""
+    quiet: float
+    """For how long nothing must land for the run to be stopped, s."""
+    over: npt.NDArray[np.bool_]
+    """Whether nobody wants it any more, shape (1,)."""
+
+    @classmethod
+    def of(
+        cls, times: Array, x: Array, case: Any, landings: Any, blow: float, quiet: float, over: Any, whole: bool
+    ) -> Self:
+        """Those of a run that begins, with paths and events if it is to be kept as a `whole`."""
+        n, events = (len(times), 3 * STRIDES) if whole else (0, 0)
+        landings[:] = 0
+        return cls(
+            times, x, case, landings, np.empty((n, 5)), np.empty((len(times), charts.MOST)), np.empty((events, 9)),
+            np.zeros(2, np.int64), np.array([0.0, _still(0.0, times, quiet)]), blow, quiet, over,
+        )  # fmt: skip
+
+
+def go_through(stage: Stage, k: Motion, pieces: Any, run: Rows, strides: int, steps: int) -> tuple[Any, ...]:
+    """On to the last sample, or to when the run is stopped: whether it is, and the stage, or that after some strides.
+
+    The stage is in parts, plain tuples: a signal would be answered while numba makes named ones, which doesn't look
+    whether it has got them.
 
     pieces : rows of start, end, the `equations.Line` of the flow, and whether it jumps at the start
-    run : keeps what `follow` and `note` find
+    steps : in a stride, at most
     """
-    case, at_once, impact = NONE, 0, False
-    for n in range(len(pieces)):
+    at, case, begun, at_once = stage
+    for n in range(max(begun - 1, 0), len(pieces)):
         piece = pieces[n]
         end = piece[1]
         k = equations.changed(k, k.case, k.side, equations.Line(piece[2], piece[3], piece[4]), k.fall)
-        if case == NONE or piece[5] != 0:
-            before = at
-            after, at, impulse = transitions.settle(at, k)
-            impact = impulse.A_y > 0 or impulse.B_x > 0
-            if impact or (case != NONE and after != case):
-                note(run, before, after if case == NONE else case, at, after, impulse)
-            case = after
-        while at.time < min(end, run.stop[0]):
+        if begun <= n:
+            begun = n + 1
+            if case == NONE or piece[5] != 0:
+                before = at
+                after, at, impulse = transitions.settle(at, k)
+                if impulse.A_y > 0 or impulse.B_x > 0 or (case != NONE and after != case):
+                    _note(run, before, after if case == NONE else case, after, impulse)
+                case = after
+        while at.time < min(end, run.reached[1]):
+            if strides == 0:
+                return False, _parts(at), case, begun, at_once
+            strides -= 1
             since = at.time
-            guard, before = follow(case, at, min(end, run.stop[0]), k, run)
-            at = before
+            guard, at = follow(case, at, min(end, run.reached[1]), k, run, steps)
             if guard != NONE:
+                before = at
                 after, at, impulse = transitions.react(guard, case, before, k)
-                note(run, before, case, at, after, impulse)
+                _note(run, before, case, after, impulse)
                 case = after
             at_once = at_once + 1 if at.time - since <= 1e-14 * end else 0
             if at_once > MAX_EVENTS_AT_ONCE:
                 raise StalledError("no way on: one change of case follows the other")
+    return True, _parts(at), case, begun, at_once
 
 
-def pieces(flow: Flow, t_end: float) -> list[list[float]]:
-    """Those of a flow, as `go_through` takes them."""
-    rows = []
+def _parts(at: Moment) -> tuple[Any, ...]:
+    return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
+
+
+def follow(case: int, at: Moment, until: float, k: Motion, run: Rows, steps: int) -> tuple[int, Moment]:
+    """One case up to the first guard, for so many steps, or up to a time; what ended it, and the moment then."""
+    room = np.empty((6, charts.MOST))
+    k, n = charts.begin(case, at, k, room[0], room[1])
+    z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], charts.count_ends(k)
+    values, arm, level = room[3, :count], room[4, :count], room[5, :count]
+    lands, until = k.fall.landing <= until, min(until, k.fall.landing)
+    equations.guards(at.time, z, k, values)
+    opens, lasts = charts.levels(values, k, arm, level), charts.hop(at, z, k, rate)
+    pace = first_pace(at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0)
+    if run.taken[0] == 0:
+        _sample(case, at, k, run)
+    first, near = run.taken[0], at.theta
+    why, pace, guard, taken = stretch(k, pace, until, z, scale, run.times, first, run.z[:, :n], arm, level, steps)
+    near = keep(case, at, k, taken, n, near, run)
+    now = until if why == DONE else max(pace[0] + pace[1], run.times[taken - 1])
+    run.reached[0] = now
+    if run.over[0]:
+        raise InterruptedError("nobody wants the run any more")
+    if why == STUCK:
+        raise StalledError("steps become too short")
+    fired = charts.ENDS[case][guard] if why == FIRED else A_LANDS if lands and why == DONE else NONE
+    return fired, _turned(case, charts.moment(now, z, at, k), near)
+
+
+def _turned(case: int, at: Moment, near: float) -> Moment:
+    """The same moment; of the azimuths that it may have off the wall that which is nearest to another."""
+    if case % 3 != AWAY:
+        return at
+    theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
+    return Moment(at.time, theta, at.x, at.alpha, at.beta, at.work)
+
+
+def keep(case: int, at: Moment, k: Motion, taken: int, n: int, near: float, run: Rows) -> float:
+    """Keep the coordinates up to a sample of a case that began at a moment; the azimuth after the one given."""
+    these = slice(int(run.taken[0]), taken)
+    if taken > these.start:
+        t = run.times[these]
+        m = charts.moment(t, run.z[these, :n].T, at, k)
+        run.x[these], run.case[these], run.taken[0] = m.x.stacked(), case, taken
+        if len(run.path):
+            theta = np.unwrap(np.append(near, m.theta))[1:] if case % 3 == AWAY else m.theta
+            columns = theta, m.alpha, m.beta, m.work, Fluid(*k.line, k.waves)(t)
+            run.path[these] = np.stack(np.broadcast_arrays(*columns), axis=-1)
+            near = float(run.path[taken - 1, 0])
+    return near
+
+
+def _sample(case: int, at: Moment, k: Motion, run: Rows) -> None:
+    """Keep the next sample."""
+    row = run.taken[0]
+    for i in range(8):
+        run.x[row, i] = at.x[i]
+    run.case[row] = case
+    if len(run.path) > 0:
+        path = run.path[row]
+        path[0], path[1], path[2], path[3] = at.theta, at.alpha, at.beta, at.work
+        path[4] = equations.fluid(at.time, k)
+    run.taken[0] += 1
+
+
+def _note(run: Rows, at: Moment, case: int, after: int, impulse: Forces) -> None:
+    """Keep an event."""
+    if max(impulse.A_y, impulse.B_x) > run.blow:
+        run.landings[min(run.taken[0], len(run.times) - 1)] += 1
+        run.reached[1] = _still(at.time, run.times, run.quiet)
+    if run.taken[1] < len(run.events):
+        event = run.events[run.taken[1]]
+        event[0], event[1], event[2] = at.time, case, after
+        for i in range(6):
+            event[3 + i] = impulse[i]
+        run.taken[1] += 1
+
+
+def _still(landed: float, times: Array, quiet: float) -> float:
+    """The sample at which a run is quiet if nothing lands after a time; inf if there is none."""
+    row = np.searchsorted(times, landed + quiet, side="right")
+    return float(times[row]) if row < len(times) else math.inf
+
+
+TEXT = (follow, _parts, _turned, _sample, _note, _still)
+"""What is compiled beside `go_through`."""
+
+
+@cache
+def compiled() -> Callable[..., Any] | None:
+    """The same as `go_through`, where numba is installed."""
+    try:
+        import numba
+
+        if numba.config.DISABLE_JIT:
+            return None
+        from analytic.simulation.whole_runs import go_through as whole
+    except ImportError:
+        return None
+    return whole
+
+
+@lru_cache
+def given(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[Motion, Array]:
+    """What runs of one ball in one flow share: its motion, and the pieces of the flow, as `go_through` takes them."""
+    k, rows = motion.of_ball(p, Fluid.of(flow, 0.0), settings), []
     for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
         jump = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
         rows.append([start, end, *Fluid.of(flow, start).line(), float(jump > _LEAST_JUMP * np.abs(flow.value).max())])
-    return rows
+    return k, np.array(rows)
+
+
+def carry_out(
+    start: Moment, k: Motion, pieces: Array, rows: Callable[[], Rows], look: Callable[[Rows], None] | None = None
+) -> tuple[Rows, Exception | None]:
+    """A run into new rows, and why it broke down, if it did; `look` has a look at them from time to time.
+
+    In plain Python where the compiled text isn't there or can't go on.
+    """
+    failure: Exception | None = None
+    for way, waves in ((compiled(), np.array(k.waves, dtype=float).reshape(-1, 3)), (go_through, k.waves)):
+        if not way:
+            continue
+        k = k._replace(waves=waves)
+        run, stage, done = rows(), Stage(start), False
+        try:
+            while not done:
+                done, (time, theta, x, *rest), *far = way(stage, k, pieces, run, STRIDES if look else ALL, STEPS)
+                stage = Stage(Moment(time, theta, State(*x), *rest), *far)
+                if look:
+                    look(run)
+            return run, None
+        except InterruptedError as error:
+            return run, error
+        except ArithmeticError as error:
+            failure = error
+    return run, failure
 
 
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
@@ -77,91 +273,44 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the sequence of cases gets
     stuck.
     """
-    following, t_end = _Run(p, settings, recorder), float(recorder.times[-1])
-    try:
-        k = motion.of_ball(p, Fluid.of(flow, 0.0), settings)
-        go_through(Moment(0.0, theta_0, x0), k, pieces(flow, t_end), following)
-    finally:
-        following.hand_over()
+    times, events = recorder.times, recorder.events
+
+    def rows() -> Rows:
+        events.clear()
+        n = len(times)
+        each = np.empty((n, 8)), np.empty(n, np.int8), np.empty(n, np.int64)
+        return Rows.of(times, *each, math.inf, math.inf, np.zeros(1, bool), whole=True)
+
+    def look(run: Rows) -> None:
+        _hand_over(run, recorder)
+        recorder.reached(float(run.reached[0]))
+
+    done, failure = carry_out(Moment(0.0, theta_0, x0), *given(p, flow, settings, float(times[-1])), rows, look)
+    _hand_over(done, recorder)
+    recorder.time = max(recorder.time, float(done.reached[0]))
+    if count := int(done.taken[0]):
+        path = done.path[:count]
+        forces = path_forces(done.case[:count], done.x[:count], path, p)
+        recorder.add(times[:count], path[:, 0], done.x[:count], forces, done.case[:count], path[:, 3])
+    if failure:
+        raise failure
 
 
-class _Run:
-    """What a run in Python keeps."""
-
-    stop = (math.inf,)
-
-    def __init__(self, p: Parameters, settings: Settings, recorder: Recorder) -> None:
-        self.p, self.leave_rolling, self.recorder, self.steps = p, settings.leave_rolling, recorder, 0
-        self.sampled: list[tuple[int, Path, Array]] = []
-        """Stretches of samples: the case, the path, and omega_0 along it."""
-        self.taken = 0
-
-    def keep(self, case: int, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> Moment:
-        """Keep those moments of a path that are samples; the last one of all."""
-        if np.any(wanted):
-            kept = Path(*(column[wanted] for column in path))
-            self.sampled.append((case, kept, np.asarray(fluid(kept.time))))
-            self.taken += len(kept.time)
-        self.recorder.reached(float(path.time[-1]))
-        at = Moment(*(column[-1].tolist() for column in path))
-        return at._replace(x=State(*at.x))
-
-    def hand_over(self) -> None:
-        """Record all samples: forces of one case after the other, since that is quicker than of one path."""
-        if not self.sampled:
-            return
-        cases, paths, fluids = zip(*self.sampled, strict=True)
-        path, omega_0 = Path(*map(np.concatenate, zip(*paths, strict=True))), np.concatenate(fluids)
-        case, forces = np.repeat(cases, [len(each.time) for each in paths]), np.empty((len(omega_0), 6))
-        for each in set(cases):
-            here = case == each
-            forces[here] = path_forces(Case(each), Path(*(column[here] for column in path)), self.p, omega_0[here])
-        self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
+def _hand_over(run: Rows, recorder: Recorder) -> None:
+    """Record the events since the last look."""
+    for time, before, after, *impulse in run.events[: run.taken[1]].tolist():
+        recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
+    run.taken[1] = 0
 
 
-def note(run: _Run, before: Moment, case: int, at: Moment, after: int, impulse: Forces) -> None:
-    """Keep an event between two moments."""
-    run.recorder.events.append(Event(at.time, Case(case), Case(after), impulse))
-
-
-def follow(case: int, at: Moment, until: float, k: Motion, run: _Run) -> tuple[int, Moment]:
-    """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
-    wanted, fluid = run.recorder.times, Fluid(*k.line, k.waves)
-    if case == RR and k.stokes:
-        end = two_point_rolling.end(at, until, run.p, fluid, run.leave_rolling)
-        stop, first = until if end is None else end, not run.taken
-        times = wanted[slice(*np.searchsorted(wanted, [-1.0 if first else at.time, stop], side="right"))]
-        path = two_point_rolling.path(np.append(times, stop), at, run.p, fluid)
-        return NONE if end is None else RR_ENDS, run.keep(case, path, np.arange(len(times) + 1) < len(times), fluid)
-    chart = Chart.of(case, at, k)
-    landing = chart.k.fall.landing
-    lands, until = landing <= until, min(until, landing)
-    moments: list[Array | list[float]] = [[at.time]]
-    states: list[Array | list[list[float]]] = [[chart.start]]
-    sampled, guard = [run.taken == 0], NONE
-    lasts = charts.hop(at, chart.start, chart.k, chart.start.copy())
-    try:
-        for step in Stretch(chart, at.time, until, wanted).steps(lasts / 20 if lasts < until - at.time else None):
-            if len(step.samples):
-                moments.append(step.sample_times)
-                states.append(step.samples)
-            moments.append([step.time])
-            states.append([step.z])
-            sampled += [True] * len(step.samples) + [False]
-            guard = step.guard
-            run.steps += step.stands_for
-            if run.steps >= REPORT_EVERY:
-                run.steps = 0
-                run.recorder.reached(step.time)
-    finally:
-        path = chart.path(np.concatenate(moments), np.concatenate(states).T)
-        last = run.keep(case, path, np.array(sampled), fluid)
-    return A_LANDS if guard == NONE and lands else guard, last
-
-
-def path_forces(case: Case, path: Path, p: Parameters, omega_0: Real) -> Array:
-    """Contact forces along a path, shape (n, 6), N; in RR those of least utilisation."""
-    slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
-    slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None
-    f = dynamics.forces(case, State.of(path.x), p, omega_0, slip_A, slip_B)
-    return np.stack(np.broadcast_arrays(*f, path.time)[:6], axis=-1)
+def path_forces(case: npt.NDArray[np.int8], x: Array, path: Array, p: Parameters) -> Array:
+    """Contact forces at samples, shape (n, 6), N; in RR those of least utilisation. All of one case at once."""
+    forces = np.empty((len(case), 6))
+    for each in map(Case, np.unique(case)):
+        here = case == each
+        _, alpha, beta, _, omega_0 = path[here].T
+        slip_A = (np.sin(alpha), np.cos(alpha)) if each.A is Contact.S else None
+        slip_B = (np.sin(beta), np.cos(beta)) if each.B is Contact.S else None
+        f = dynamics.forces(each, State.of(x[here]), p, omega_0, slip_A, slip_B)
+        forces[here] = np.stack(np.broadcast_arrays(*f, alpha)[:6], axis=-1)
+    return forces

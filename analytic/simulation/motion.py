@@ -20,9 +20,6 @@ from model.arrays import Array, Real
 from model.drag import STOKES
 from model.trajectory import samples
 
-REPORT_EVERY = 1000
-"""Steps after which a simulator notes how far it is, even if there is no sample to take."""
-
 
 @dataclass(frozen=True)
 class Fluid:
@@ -67,17 +64,6 @@ class Moment(NamedTuple):
     """Direction of slip at B (8), rad."""
     work: float = 0.0
     """Work of drag, friction and impacts so far, J."""
-
-
-class Path(NamedTuple):
-    """Moments along a stretch of one case: arrays of shape (n,), and x (n, 8)."""
-
-    time: Array
-    theta: Array
-    x: Array
-    alpha: Array
-    beta: Array
-    work: Array
 
 
 def natural_units(p: Parameters) -> tuple[float, float, float, float]:

@@ -9,15 +9,14 @@ Wanner, Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to 
 from __future__ import annotations
 
 import math
-import sys
 
 import numpy as np
 import numpy.typing as npt
 from scipy.integrate import DOP853
 
-from analytic.mechanics import drag, rigid_body
-from analytic.simulation import charts, compiling, equations
-from analytic.simulation.equations import FINER, LOCAL, ONSET_SLIP, PATIENCE, SMALL_SLIP, Motion
+from analytic.simulation import charts, equations
+from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, Motion
+from analytic.simulation.integrator import DONE, EPS, FIRED, PAUSED, STUCK, Pace
 from model.arrays import Array
 
 A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
@@ -27,8 +26,8 @@ GROWN_SLIP = 1e-4
 """Slip from which on steps that are short cost less than stiff ones."""
 FINEST, FINEST_STIFF = 1e-13, 1e-11
 """Least relative tolerances: what round-off leaves of explicit steps, and of those of a small slip."""
-DONE, FIRED, OTHER, STUCK, PAUSED = range(5)
-"""Why they return: at the end, at a guard, as the other one should go on, with steps too short, for a breath."""
+OTHER = 4
+"""Why steps return beside what `integrator.stretch` says: as the other method should go on."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 """Of the length of a step: below what its error allows; and by how much it may change."""
 LOOKS_A_STEP = 4
@@ -41,7 +40,6 @@ DYING = 1e-7
 ROOT_STEPS = 200
 COLUMNS, USUAL = 12, 9
 """Most columns of an extrapolation, and how many steps aim at."""
-EPS = math.ulp(1.0)
 
 
 def _copy(given: Array, out: Array) -> None:
@@ -423,41 +421,18 @@ def _implicit(
     return PAUSED, tau, h, -1, taken
 
 
-Pace = tuple[float, float, float, bool, int]
-"""How the steps of a stretch go on: a time, s, from which tau counts, since directions settle in less than the
-round-off of the time of the run; tau; length of the next step, 0 if one is to be found; whether a slip is small;
-strides since it was not."""
-
-
-def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float) -> Pace:
-    """That of a stretch; it may be a straight line from the start on if a contact opens there."""
-    small = charts.least_slip(z, scale, case) < ONSET_SLIP
-    return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
-
-
-TEXT = (
-    _copy, _between, _root, _pass, _combined, _dense, _first_fall, _left, _passed, _explicit, _lowest, _factored,
-    _solve, _extrapolated, _implicit, first_pace,
-)  # fmt: skip
-"""What is compiled."""
-
-
-@compiling.compiled(compiling.read(drag, rigid_body, equations, charts, sys.modules[__name__]))
 def stretch(
     k: Motion, pace: Pace, until: float, z: Array, scale: Array, times: Array, taken: int, samples: Array, arm: Array,
     level: Array, most: int,
 ) -> tuple[int, Pace, int, int]:  # fmt: skip
-    """Go on in a case: why that ended, the pace, guard, `taken`.
-
-    z, level and samples are written to: z (n,); level of each guard, as `charts.levels` says; samples, (m, n), at those
-    of `times` that are passed, from the number `taken` on. It pauses after `most` steps.
-    """
+    """As `integrator.stretch`, by the steps above."""
     n, steady = len(z), len(k.waves) == 0 and k.line.slope == 0
     slips = range(charts.TURNING[k.case][0], charts.TURNING[k.case][1], 2)
     rate, values, there, other = np.empty(n), np.empty(len(arm)), np.empty(n), np.empty(n)
     start, tau, h, small, slow = pace
-    why = OTHER
-    while why == OTHER:
+    why, left = OTHER, most
+    while why == OTHER or (why == PAUSED and left > 0):
+        left -= PATIENCE if small else most
         now = start + tau
         if steady and slow % 2 == 1 and equations.straight(now, until, z, scale, k, rate, values, there, other):
             while taken < len(times) and times[taken] <= until:
@@ -486,3 +461,10 @@ def stretch(
         if why == OTHER:
             start, tau, h, small = start + tau, 0.0, 0.0, not small
     return why, (start, tau, h, small, slow), guard, taken
+
+
+TEXT = (
+    _copy, _between, _root, _pass, _combined, _dense, _first_fall, _left, _passed, _explicit, _lowest, _factored,
+    _solve, _extrapolated, _implicit,
+)  # fmt: skip
+"""What is compiled."""

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,11 +25,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from analytic import Settings, simulate, simulate_many
-from analytic.simulation import hybrid, integrator, whole_runs
-from analytic.simulation.charts import NONE, Chart
+from analytic.simulation import equations, hybrid
 from analytic.simulation.ensemble import random_starts
 from analytic.simulation.equations import FINER
-from analytic.simulation.integrator import StalledError, Step
+from analytic.simulation.integrator import DONE, FIRED, STUCK, Pace
 from analytic.stationary.solutions import solution
 from compare.kit.engines import engine
 from compare.kit.pages import Rows
@@ -89,61 +88,62 @@ def run(motion: Motion, rtol: float = 1e-9) -> Any:
 
 def plainly(motion: Motion, rtol: float = 1e-9) -> Any:
     """By the study where numba isn't installed."""
-    with mock.patch.object(integrator, "solvers", return_value=None):
+    with mock.patch.object(hybrid, "compiled", return_value=None):
         return run(motion, rtol)
 
 
-class _Stretch:
-    """In the place of `integrator.Stretch`: scipy's `solve_ivp`, to which what ends a case is an event."""
+def _solved(
+    method: str, k: equations.Motion, pace: Pace, until: float, z: Array, scale: Array, times: Array, taken: int,
+    samples: Array, arm: Array, level: Array, most: int,
+) -> tuple[int, Pace, int, int]:  # fmt: skip
+    """In the place of `integrator.stretch`: scipy's `solve_ivp`, to which what ends a case is an event.
 
-    method = ""
+    The time of the solver runs from zero, since a direction of slip settles very soon.
+    """
+    start, span = pace[0], until - pace[0]
+    due = times[taken : np.searchsorted(times, until, side="right")] - start
 
-    def __init__(self, chart: Chart, start: float, until: float, times: Array) -> None:
-        self.chart, self.start, self.span = chart, start, until - start
-        self.due = times[slice(*np.searchsorted(times, [start, until], side="right"))]
+    def rates(t: float, z: Any) -> list[float]:
+        out = [0.0] * len(z)
+        equations.rates(start + t, z, k, out)
+        return out
 
-    def steps(self, first_step: float | None) -> Iterator[Step]:
-        """All as one step; the time of the solver runs from zero, since a direction of slip settles very soon."""
-        chart, start = self.chart, self.start
+    def falling(guard: int) -> Callable[[float, Any], float]:
+        def value(t: float, z: Any) -> float:
+            out = [0.0] * len(arm)
+            equations.guards(start + t, z, k, out)
+            return out[guard]
 
-        def falling(k: int) -> Callable[[float, Any], float]:
-            def value(t: float, z: Any) -> float:
-                return float(chart.guards(start + t, z)[k])
+        value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
+        return value
 
-            value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
-            return value
-
-        found: Any = solve_ivp(  # type: ignore[call-overload]
-            lambda t, z: chart.rates(start + t, z),
-            (0.0, self.span),
-            chart.start,
-            method=self.method,
-            t_eval=np.union1d(self.due - start, [self.span]).clip(0.0, self.span),
-            events=[falling(k) for k in range(len(chart.ends))],
-            first_step=first_step,
-            rtol=chart.k.rtol,
-            atol=chart.k.rtol / FINER * np.array(chart.scale),
-        )
-        if found.status < 0:
-            raise StalledError(found.message)
-        fired = [k for k, times in enumerate(found.t_events) if len(times)]
-        end, z, guard = self.span, found.y[:, -1] if found.y.size else np.array(chart.start), NONE
-        if fired:
-            end, z, guard = float(found.t_events[fired[0]][0]), found.y_events[fired[0]][0], chart.ends[fired[0]]
-        count = int(np.searchsorted(self.due - start, end, side="right"))
-        samples = found.y.T[:count] if count else integrator.NO_SAMPLES
-        yield Step(start + end, z.tolist(), self.due[:count], samples, guard)
+    found: Any = solve_ivp(  # type: ignore[call-overload]
+        rates,
+        (0.0, span),
+        z,
+        method=method,
+        t_eval=np.union1d(due, [span]).clip(0.0, span),
+        events=[falling(guard) for guard in range(len(arm))],
+        first_step=pace[2] or None,
+        rtol=k.rtol,
+        atol=k.rtol / FINER * scale,
+    )
+    fired = [guard for guard, times in enumerate(found.t_events) if len(times)]
+    end = float(found.t_events[fired[0]][0]) if fired else span
+    if found.y.size or fired:
+        z[:] = found.y_events[fired[0]][0] if fired else found.y[:, -1]
+    count = int(np.searchsorted(due, end, side="right"))
+    if count and found.status >= 0:
+        samples[taken : taken + count] = found.y.T[:count]
+    why = STUCK if found.status < 0 else FIRED if fired else DONE
+    return why, (start + end, 0.0, 0.0, False, 0), fired[0] if fired else -1, taken + count
 
 
 def by_scipy(motion: Motion, method: str, rtol: float) -> Any:
     """By a solver of `solve_ivp` and its events, the equations and what follows an event as the study has them."""
-    with (
-        mock.patch.object(hybrid, "Stretch", _Stretch),
-        mock.patch.object(_Stretch, "method", method),
-        warnings.catch_warnings(),
-    ):
+    with mock.patch.object(hybrid, "stretch", partial(_solved, method)), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it fails with one line more
-        return run(motion, rtol)
+        return plainly(motion, rtol)
 
 
 def deviation(x: Any, right: Any) -> float:
@@ -241,15 +241,17 @@ def many() -> Rows:
         ("simulate_many, one thread, time stepping", lambda: at_once(method="time-stepping")),
     )}  # fmt: skip
     _, whole, *_ = each.values()
-    inside = list[float]()
+    inside, carry_out = list[float](), hybrid.compiled()
+    if not carry_out:
+        sys.exit("numba isn't installed")
 
-    def timed(*given: Any) -> None:
+    def timed(*given: Any) -> Any:
         begin = time.thread_time()
-        carry_out(*given)
+        done = carry_out(*given)
         inside.append(1e3 * (time.thread_time() - begin))
+        return done
 
-    carry_out = whole_runs.carry_out
-    with mock.patch.object(whole_runs, "carry_out", timed):
+    with mock.patch.object(hybrid, "compiled", return_value=timed):
         spent = 1e3 * seconds(at_once, 1) / RUNS
     share, turns = sum(inside) / RUNS / spent, []
     for _ in range(REPEATS):

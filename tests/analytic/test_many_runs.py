@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analytic import Settings, simulate, simulate_many
-from analytic.simulation import ensemble
+from analytic.simulation import hybrid
 from analytic.simulation.ensemble import random_starts
 from analytic.simulation.integrator import StalledError
 from model import Parameters, State
@@ -17,11 +17,11 @@ P = Parameters.named("reference").replace(omega_0=25.0)
 
 @pytest.fixture(params=["compiled", "plain"])
 def way(request, monkeypatch):
-    """Whole runs compiled, or single ones."""
+    """Compiled runs, or those in plain Python."""
     if request.param == "compiled":
         pytest.importorskip("numba")
     else:
-        monkeypatch.setattr(ensemble, "whole_runs", lambda: None)
+        monkeypatch.setattr(hybrid, "compiled", lambda: None)
     return request.param
 
 
@@ -65,19 +65,20 @@ def test_a_quiet_run_ends(way, method):
     assert np.all(run.case[0, 1:] >= 0)
 
 
-def test_where_compiled_steps_become_too_short_a_single_run_goes_on(monkeypatch):
-    pytest.importorskip("numba")
-    x0, given = random_starts(P, 3, 4), {"sample_interval": 0.1, "threads": 1}
-    right, whole = simulate_many(P, x0, 0.5, **given), ensemble.whole_runs()
+def test_where_compiled_steps_become_too_short_plain_python_takes_over(monkeypatch):
+    x0, given = random_starts(P, 3, 4), {"sample_interval": 0.1}
+    many, one = simulate_many(P, x0, 0.5, threads=1, **given), simulate(P, x0[0], 0.5, **given)
 
-    def breaks_off(at, k, pieces, rows):
-        rows.x[:2], rows.landings[:] = 7.0, 7
+    def breaks_off(stage, k, pieces, rows, *most):
+        rows.x[:2], rows.landings[:], rows.taken[:] = 7.0, 7, (2, len(rows.events) > 0)
         raise StalledError
 
-    monkeypatch.setattr(whole, "carry_out", breaks_off)
-    many = simulate_many(P, x0, 0.5, **given)
-    np.testing.assert_allclose(many.x, right.x, rtol=0, atol=1e-7 * np.abs(right.x).max())
-    np.testing.assert_array_equal(many.landings, right.landings)
+    monkeypatch.setattr(hybrid, "compiled", lambda: breaks_off)
+    plain, single = simulate_many(P, x0, 0.5, threads=1, **given), simulate(P, x0[0], 0.5, **given)
+    np.testing.assert_allclose(plain.x, many.x, rtol=0, atol=1e-7 * np.abs(many.x).max())
+    np.testing.assert_array_equal(plain.landings, many.landings)
+    np.testing.assert_allclose(single.x, one.x, rtol=0, atol=1e-7 * np.abs(one.x).max())
+    assert len(single.events) == len(one.events)
 
 
 def test_a_torque_of_the_fluid_is_for_time_stepping():

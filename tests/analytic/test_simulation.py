@@ -131,8 +131,8 @@ def test_the_mirrored_motion(method, torque, x):
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_within_a_long_stretch(method, monkeypatch):
     """A single case and a single sample: the steps themselves report, so that a caller can stop the run in time."""
-    for between_two_reports in ("hybrid.REPORT_EVERY", "integrator.REPORT_EVERY", "time_stepping.AT_ONCE"):
-        monkeypatch.setattr(f"analytic.simulation.{between_two_reports}", 10)
+    for between_two_reports in ("hybrid.STRIDES", "hybrid.STEPS", "time_stepping.AT_ONCE"):
+        monkeypatch.setattr(f"analytic.simulation.{between_two_reports}", 10 if "AT_ONCE" in between_two_reports else 3)
     p, x0, seen = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10], []
     assert len(simulate(p, x0, 0.2, method=method).time) == 1001  # samples as they are by default
     run = simulate(p, x0, 4.0, method=method, timestep=1e-3, sample_interval=4.0, progress=seen.append)
@@ -193,7 +193,9 @@ def test_bad_input_is_refused(arguments, message):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_run_that_progress_ends_carries_its_samples(method):
+def test_a_run_that_progress_ends_carries_its_samples(method, monkeypatch):
+    monkeypatch.setattr("analytic.simulation.hybrid.STRIDES", 1)
+
     def enough(done):
         if done > 0.3:
             raise InterruptedError("enough")

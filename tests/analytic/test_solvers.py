@@ -1,10 +1,10 @@
-"""Compiled steps and those of scipy come to the same, in all cases, drag laws and flows, with restitution."""
+"""Compiled runs and those in plain Python come to the same, in all cases, drag laws and flows, with restitution."""
 
 import numpy as np
 import pytest
 
 from analytic import simulate
-from analytic.simulation import integrator
+from analytic.simulation import hybrid
 from model import Case, Flow, Parameters, State
 from model.drag import LAWS
 
@@ -27,10 +27,10 @@ STARTS = {
 
 
 def both(monkeypatch, *given, **settings):
-    """Runs with compiled steps and without."""
+    """Compiled runs and those in plain Python."""
     compiled = simulate(*given, **settings)
     with monkeypatch.context() as patch:
-        patch.setattr(integrator, "solvers", lambda: None)
+        patch.setattr(hybrid, "compiled", lambda: None)
         return compiled, simulate(*given, **settings)
 
 

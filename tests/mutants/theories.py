@@ -10,7 +10,7 @@ import numpy as np
 
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
-from analytic.mechanics import drag, rolling_forces
+from analytic.mechanics import rolling_forces
 from analytic.orbits.orbit_branch import Place
 from analytic.slipping import slip_bounds
 from compare.kit.levels import Level
@@ -116,16 +116,6 @@ def _ramped(right: Function) -> Function:
 
     def function(p: Parameters, x0: Any, t_end: float, flow: Flow | None = None, **named: Any) -> Any:
         return right(other(c=1.05)(p) if flow and flow.kind == "ramp" else p, x0, t_end, flow, **named)
-
-    return function
-
-
-def _leads(right: Function) -> Function:
-    """Two-point rolling as far ahead of a ramp as it should be behind."""
-
-    def function(t: Any, at: Any, p: Parameters, omega_0: Any) -> Any:
-        k, tau = p.c / (1 + 2 * p.j), np.asarray(t) - at.time
-        return right(t, at, p, omega_0) - 2 * omega_0.slope * k * tau**2 * drag.ramp_lag(k * tau)
 
     return function
 
@@ -401,6 +391,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "one contact slips with 3 % more floor friction": where(
             lambda case: case in (Case.RS, Case.SR), given(other(mu=1.03))
         ),
+        "two-point rolling with 5 % more drag": in_case(Case.RR, given(other(c=1.05))),
         "both contacts slip with 3 % more wall friction": in_case(Case.SS, given(other(eta=1.03))),
         "off the floor there is 3 % more drag": where(lambda case: case in (Case.NR, Case.NS), given(other(c=1.03))),
     },
@@ -410,14 +401,10 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "flight with 5 % more drag": in_case(Case.NN, given(other(c=1.05))),
         "flight with 1 % less weight": in_case(Case.NN, given(other(g=0.99))),
     },
-    "simulation.two_point_rolling.omega_c": {
-        "two-point rolling with 5 % more drag": given(other(c=1.05)),
-        "rolling at both points takes a ramp to begin with the run": lambda right: (
-            lambda t, at, p, omega_0: right(t, at, p, replace(omega_0, start=0.0))
-        ),
-        "rolling at both points leads a ramp": _leads,
+    "simulation.equations.fluid": {
+        "ramps begin with the run": lambda right: lambda t, k: right(t, k._replace(line=k.line._replace(start=0.0)))
     },
-    "simulation.two_point_rolling.end": {"two-point rolling ends with 5 % more floor friction": given(other(mu=1.05))},
+    "simulation.equations.rolls_on": {"two-point rolling ends with 5 % more floor friction": given(other(mu=1.05))},
     "mechanics.rolling_forces.margin": {"forces admit rolling with 5 % more wall friction": given(other(eta=1.05))},
     "mechanics.rolling_forces.slip_margin": {"slip begins with 3 % more floor friction": given(other(mu=1.03))},
     "mechanics.rolling_forces.least_utilisation": {
