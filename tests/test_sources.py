@@ -46,7 +46,7 @@ EXCEPTIONS = {
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
     *("analytic/simulation/equations.py:forces", "analytic/simulation/equations.py:straight"),
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "_explicit")),
-    *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "_implicit", "stretch")),
+    *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "_implicit")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
     *("mjsim/corrections.py:corrections", "mjsim/corrections.py:drive", "mjsim/landing.py:through"),
     *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_hand_on", "_holds", "_put_back")),

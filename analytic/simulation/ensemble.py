@@ -157,9 +157,9 @@ def _event_driven(run: _Run) -> tuple[float, str]:
     from analytic.simulation import hybrid  # here, since scipy and numba take a while to load
 
     blow = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
-    each = run.times, run.x, run.case, run.landings, blow, run.quiet, run.over
+    each = run.times, run.x, run.case, run.landings, hybrid.Stop(blow, run.quiet, run.over)
     given = hybrid.given(run.p, run.flow, run.settings, float(run.times[-1]))
-    rows, failure = hybrid.carry_out(Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Rows.of, *each, whole=False))
+    rows, failure = hybrid.carry_out(Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Kept.of, *each, whole=False))
     last = int(rows.taken[0]) - 1
     if failure:
         return float(run.times[max(last, 0)]), f"stopped at t = {rows.reached[0]:g} s: {failure}"

@@ -22,7 +22,7 @@ from analytic.mechanics.rigid_body import Forces
 from analytic.simulation import charts, equations, motion, transitions
 from analytic.simulation.charts import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
-from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, first_pace, stretch
+from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, Stretch, first_pace, stretch
 from analytic.simulation.motion import Event, Fluid, Moment, Recorder
 from analytic.simulation.settings import Settings
 from model import Case, Contact, Flow, Parameters, State
@@ -34,7 +34,7 @@ MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
 STRIDES, STEPS = 20, 1000
 """How often a case is followed, and steps each time, between two looks at progress and keyboard."""
-ALL = 2**62
+ENDLESS = 2**62
 """As many as there are."""
 
 
@@ -49,7 +49,18 @@ class Stage(NamedTuple):
     """Changes of case since the last progress in time."""
 
 
-class Rows(NamedTuple):
+class Stop(NamedTuple):
+    """What stops a run before its end."""
+
+    blow: float
+    """Normal impulse from which a landing counts, N s."""
+    quiet: float
+    """For how long nothing must land for the run to be stopped, s."""
+    over: npt.NDArray[np.bool_]
+    """Whether nobody wants it any more, shape (1,)."""
+
+
+class Kept(NamedTuple):
     """What is kept of a run, a row a sample or event."""
 
     times: Array
@@ -69,27 +80,19 @@ class Rows(NamedTuple):
     """How many samples are kept, and how many events, shape (2,)."""
     reached: Array
     """How far the run is, and the sample at which it is stopped if nothing more lands, shape (2,), s."""
-    blow: float
-    """Normal impulse from which a landing counts, N s."""
-    quiet: float
-    """For how long nothing must land for the run to be stopped, s."""
-    over: npt.NDArray[np.bool_]
-    """Whether nobody wants it any more, shape (1,)."""
+    stop: Stop
 
     @classmethod
-    def of(
-        cls, times: Array, x: Array, case: Any, landings: Any, blow: float, quiet: float, over: Any, whole: bool
-    ) -> Self:
+    def of(cls, times: Array, x: Array, case: Any, landings: Any, stop: Stop, whole: bool) -> Self:
         """Those of a run that begins, with paths and events if it is to be kept as a `whole`."""
         n, events = (len(times), 3 * STRIDES) if whole else (0, 0)
+        path, z, reached = np.empty((n, 5)), np.empty((len(times), charts.MOST)), [0.0, _still(0.0, times, stop.quiet)]
         landings[:] = 0
-        return cls(
-            times, x, case, landings, np.empty((n, 5)), np.empty((len(times), charts.MOST)), np.empty((events, 9)),
-            np.zeros(2, np.int64), np.array([0.0, _still(0.0, times, quiet)]), blow, quiet, over,
-        )  # fmt: skip
+        taken = np.zeros(2, np.int64)
+        return cls(times, x, case, landings, path, z, np.empty((events, 9)), taken, np.array(reached), stop)
 
 
-def go_through(stage: Stage, k: Motion, pieces: Any, run: Rows, strides: int, steps: int) -> tuple[Any, ...]:
+def go_through(stage: Stage, k: Motion, pieces: Any, run: Kept, strides: int, steps: int) -> tuple[Any, ...]:
     """On to the last sample, or to when the run is stopped: whether it is, and the stage, or that after some strides.
 
     The stage is in parts, plain tuples: a signal would be answered while numba makes named ones, which doesn't look
@@ -132,7 +135,7 @@ def _parts(at: Moment) -> tuple[Any, ...]:
     return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
 
 
-def follow(case: int, at: Moment, until: float, k: Motion, run: Rows, steps: int) -> tuple[int, Moment]:
+def follow(case: int, at: Moment, until: float, k: Motion, run: Kept, steps: int) -> tuple[int, Moment]:
     """One case up to the first guard, for so many steps, or up to a time; what ended it, and the moment then."""
     room = np.empty((6, charts.MOST))
     k, n = charts.begin(case, at, k, room[0], room[1])
@@ -143,49 +146,49 @@ def follow(case: int, at: Moment, until: float, k: Motion, run: Rows, steps: int
     opens, lasts = charts.levels(values, k, arm, level), charts.hop(at, z, k, rate)
     pace = first_pace(at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0)
     if run.taken[0] == 0:
-        _sample(case, at, k, run)
-    first, near = run.taken[0], at.theta
-    why, pace, guard, taken = stretch(k, pace, until, z, scale, run.times, first, run.z[:, :n], arm, level, steps)
-    near = keep(case, at, k, taken, n, near, run)
+        _sample(at, k, run)
+    of = Stretch(k, until, z, scale, run.times, run.z[:, :n], arm, level)
+    why, pace, guard, taken = stretch(of, pace, run.taken[0], steps)
+    near = keep(of, at, taken, run)
     now = until if why == DONE else max(pace[0] + pace[1], run.times[taken - 1])
     run.reached[0] = now
-    if run.over[0]:
+    if run.stop.over[0]:
         raise InterruptedError("nobody wants the run any more")
     if why == STUCK:
         raise StalledError("steps become too short")
     fired = charts.ENDS[case][guard] if why == FIRED else A_LANDS if lands and why == DONE else NONE
-    return fired, _turned(case, charts.moment(now, z, at, k), near)
+    return fired, _turned(charts.moment(now, z, at, k), k, near)
 
 
-def _turned(case: int, at: Moment, near: float) -> Moment:
+def _turned(at: Moment, k: Motion, near: float) -> Moment:
     """The same moment; of the azimuths that it may have off the wall that which is nearest to another."""
-    if case % 3 != AWAY:
+    if k.case % 3 != AWAY:
         return at
     theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
     return Moment(at.time, theta, at.x, at.alpha, at.beta, at.work)
 
 
-def keep(case: int, at: Moment, k: Motion, taken: int, n: int, near: float, run: Rows) -> float:
-    """Keep the coordinates up to a sample of a case that began at a moment; the azimuth after the one given."""
-    these = slice(int(run.taken[0]), taken)
+def keep(of: Stretch, at: Moment, taken: int, run: Kept) -> float:
+    """Keep samples up to a number of a stretch that began at a moment; the azimuth at the last of them, or then."""
+    k, these, near = of.k, slice(int(run.taken[0]), taken), at.theta
     if taken > these.start:
         t = run.times[these]
-        m = charts.moment(t, run.z[these, :n].T, at, k)
-        run.x[these], run.case[these], run.taken[0] = m.x.stacked(), case, taken
+        m = charts.moment(t, of.samples[these].T, at, k)
+        run.x[these], run.case[these], run.taken[0] = m.x.stacked(), k.case, taken
         if len(run.path):
-            theta = np.unwrap(np.append(near, m.theta))[1:] if case % 3 == AWAY else m.theta
+            theta = np.unwrap(np.append(near, m.theta))[1:] if k.case % 3 == AWAY else m.theta
             columns = theta, m.alpha, m.beta, m.work, Fluid(*k.line, k.waves)(t)
             run.path[these] = np.stack(np.broadcast_arrays(*columns), axis=-1)
             near = float(run.path[taken - 1, 0])
     return near
 
 
-def _sample(case: int, at: Moment, k: Motion, run: Rows) -> None:
+def _sample(at: Moment, k: Motion, run: Kept) -> None:
     """Keep the next sample."""
     row = run.taken[0]
     for i in range(8):
         run.x[row, i] = at.x[i]
-    run.case[row] = case
+    run.case[row] = k.case
     if len(run.path) > 0:
         path = run.path[row]
         path[0], path[1], path[2], path[3] = at.theta, at.alpha, at.beta, at.work
@@ -193,11 +196,11 @@ def _sample(case: int, at: Moment, k: Motion, run: Rows) -> None:
     run.taken[0] += 1
 
 
-def _note(run: Rows, at: Moment, case: int, after: int, impulse: Forces) -> None:
+def _note(run: Kept, at: Moment, case: int, after: int, impulse: Forces) -> None:
     """Keep an event."""
-    if max(impulse.A_y, impulse.B_x) > run.blow:
+    if max(impulse.A_y, impulse.B_x) > run.stop.blow:
         run.landings[min(run.taken[0], len(run.times) - 1)] += 1
-        run.reached[1] = _still(at.time, run.times, run.quiet)
+        run.reached[1] = _still(at.time, run.times, run.stop.quiet)
     if run.taken[1] < len(run.events):
         event = run.events[run.taken[1]]
         event[0], event[1], event[2] = at.time, case, after
@@ -241,8 +244,8 @@ def given(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[
 
 
 def carry_out(
-    start: Moment, k: Motion, pieces: Array, rows: Callable[[], Rows], look: Callable[[Rows], None] | None = None
-) -> tuple[Rows, Exception | None]:
+    start: Moment, k: Motion, pieces: Array, rows: Callable[[], Kept], look: Callable[[Kept], None] | None = None
+) -> tuple[Kept, Exception | None]:
     """A run into new rows, and why it broke down, if it did; `look` has a look at them from time to time.
 
     In plain Python where the compiled text isn't there or can't go on.
@@ -255,7 +258,7 @@ def carry_out(
         run, stage, done = rows(), Stage(start), False
         try:
             while not done:
-                done, (time, theta, x, *rest), *far = way(stage, k, pieces, run, STRIDES if look else ALL, STEPS)
+                done, (time, theta, x, *rest), *far = way(stage, k, pieces, run, STRIDES if look else ENDLESS, STEPS)
                 stage = Stage(Moment(time, theta, State(*x), *rest), *far)
                 if look:
                     look(run)
@@ -275,13 +278,13 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     """
     times, events = recorder.times, recorder.events
 
-    def rows() -> Rows:
+    def rows() -> Kept:
         events.clear()
         n = len(times)
         each = np.empty((n, 8)), np.empty(n, np.int8), np.empty(n, np.int64)
-        return Rows.of(times, *each, math.inf, math.inf, np.zeros(1, bool), whole=True)
+        return Kept.of(times, *each, Stop(math.inf, math.inf, np.zeros(1, bool)), whole=True)
 
-    def look(run: Rows) -> None:
+    def look(run: Kept) -> None:
         _hand_over(run, recorder)
         recorder.reached(float(run.reached[0]))
 
@@ -296,7 +299,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
         raise failure
 
 
-def _hand_over(run: Rows, recorder: Recorder) -> None:
+def _hand_over(run: Kept, recorder: Recorder) -> None:
     """Record the events since the last look."""
     for time, before, after, *impulse in run.events[: run.taken[1]].tolist():
         recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))

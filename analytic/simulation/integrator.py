@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import BDF, LSODA
@@ -31,6 +31,25 @@ round-off of the time of the run; tau; length of the next step, 0 if one is to b
 strides since it was not."""
 
 
+class Stretch(NamedTuple):
+    """What to integrate; z, level and samples are written to."""
+
+    k: Motion
+    until: float
+    """s"""
+    z: Array
+    """Coordinates (n,)."""
+    scale: Array
+    """Natural size of each (n,)."""
+    times: Array
+    """Of all samples of the run, s, shape (m,)."""
+    samples: Array
+    """Coordinates then (m, n)."""
+    arm: Array
+    """Above which values guards are armed, and at which they fire (guards,), as `charts.levels` says."""
+    level: Array
+
+
 class StalledError(ArithmeticError):
     """A solver can't go on, or the run makes no progress."""
 
@@ -45,36 +64,28 @@ TEXT = (first_pace,)
 """What is compiled where numba is installed."""
 
 
-def stretch(
-    k: Motion, pace: Pace, until: float, z: Array, scale: Array, times: Array, taken: int, samples: Array, arm: Array,
-    level: Array, most: int,
-) -> tuple[int, Pace, int, int]:  # fmt: skip
-    """Go on in a case: why that ended, the pace, guard, `taken`.
-
-    z, level and samples are written to: z (n,); level of each guard, as `charts.levels` says; samples, (m, n), at those
-    of `times` that are passed, from the number `taken` on. It pauses after `most` steps.
+def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
+    """Go on in a case, of whose samples so many are taken, for so many steps: why that ended, pace, guard, `taken`.
 
     Where a solver's steps become shorter than its time can resolve, the other one goes on with a time that starts from
     zero again; after `MAX_RESTARTS` it is stuck.
     """
     start, tau, first, small, slow = pace
     t, steps, failures = start + tau, 0, 0
-    if slow and _straight(t, until, k, z, scale, times, taken, samples, len(arm)):
-        return DONE, pace, -1, int(np.searchsorted(times, until, side="right"))
-    while t < until:
+    if slow and _straight(t, of, taken):
+        return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
+    while t < of.until:
         slow, method = 0, BDF if small else LSODA
         try:
-            for step in _steps(method, t, until, k, z, scale, times, taken, samples, arm, level, first):
+            for step in _steps(method, t, of, taken, first):
                 (t, guard, taken), first, steps = step, 0.0, steps + 1
                 if guard >= 0:
                     return FIRED, (t, 0.0, 0.0, small, 0), guard, taken
-                grown = least_slip(z, scale, k.case) > SMALL_SLIP
+                grown = least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP
                 slow = 0 if grown else slow + 1
-                if slow % PATIENCE == PATIENCE - 1 and _straight(
-                    t, until, k, z, scale, times, taken, samples, len(arm)
-                ):
-                    return DONE, pace, -1, int(np.searchsorted(times, until, side="right"))
-                if steps >= most and t < until:
+                if slow % PATIENCE == PATIENCE - 1 and _straight(t, of, taken):
+                    return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
+                if steps >= most and t < of.until:
                     return PAUSED, (t, 0.0, 0.0, small, 0), -1, taken
                 if grown if small else slow > PATIENCE:
                     break
@@ -86,12 +97,11 @@ def stretch(
     return DONE, pace, -1, taken
 
 
-def _straight(
-    t: float, until: float, k: Motion, z: Array, scale: Array, times: Array, taken: int, samples: Array, guards: int
-) -> bool:
+def _straight(t: float, of: Stretch, taken: int) -> bool:
     """Go all the rest along a straight line, if that solves the equations."""
+    k, until, z, scale, times, samples, arm, _ = of
     rate, there, other, values = (np.zeros(len(z)) for _ in range(4))
-    if len(k.waves) or k.line.slope or not straight(t, until, z, scale, k, rate, values[:guards], there, other):
+    if len(k.waves) or k.line.slope or not straight(t, until, z, scale, k, rate, values[: len(arm)], there, other):
         return False
     due = slice(taken, int(np.searchsorted(times, until, side="right")))
     samples[due] = z + np.outer(times[due] - t, rate)
@@ -99,12 +109,10 @@ def _straight(
     return True
 
 
-def _steps(
-    method: Any, start: float, until: float, k: Motion, z: Array, scale: Array, times: Array, taken: int,
-    samples: Array, arm: Array, level: Array, first: float,
-) -> Iterator[tuple[float, int, int]]:  # fmt: skip
+def _steps(method: Any, start: float, of: Stretch, taken: int, first: float) -> Iterator[tuple[float, int, int]]:
     """Steps of one solver: time, guard, `taken`; its time runs from zero, for directions settle in less than the
     round-off of `start`."""
+    k, until, z, scale, times, samples, arm, level = of
     least, armed, levels = np.array(scale), arm.tolist(), level.tolist()
     least[slice(*TURNING[k.case], 2)] *= k.rtol
 

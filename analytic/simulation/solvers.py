@@ -16,7 +16,7 @@ from scipy.integrate import DOP853
 
 from analytic.simulation import charts, equations
 from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, Motion
-from analytic.simulation.integrator import DONE, EPS, FIRED, PAUSED, STUCK, Pace
+from analytic.simulation.integrator import DONE, EPS, FIRED, PAUSED, STUCK, Pace, Stretch
 from model.arrays import Array
 
 A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
@@ -421,11 +421,9 @@ def _implicit(
     return PAUSED, tau, h, -1, taken
 
 
-def stretch(
-    k: Motion, pace: Pace, until: float, z: Array, scale: Array, times: Array, taken: int, samples: Array, arm: Array,
-    level: Array, most: int,
-) -> tuple[int, Pace, int, int]:  # fmt: skip
+def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
     """As `integrator.stretch`, by the steps above."""
+    k, until, z, scale, times, samples, arm, level = of
     n, steady = len(z), len(k.waves) == 0 and k.line.slope == 0
     slips = range(charts.TURNING[k.case][0], charts.TURNING[k.case][1], 2)
     rate, values, there, other = np.empty(n), np.empty(len(arm)), np.empty(n), np.empty(n)

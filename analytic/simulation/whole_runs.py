@@ -6,17 +6,18 @@ import sys
 
 from analytic.mechanics import contact_problem, drag, rigid_body
 from analytic.simulation import charts, compiling, equations, hybrid, integrator, solvers, transitions
-from analytic.simulation.equations import Motion
-from analytic.simulation.hybrid import Rows
+from analytic.simulation.hybrid import Kept
+from analytic.simulation.integrator import Stretch
 from analytic.simulation.motion import Moment
 
 
 @compiling.in_place_of(hybrid.keep)
-def _keep(case: int, at: Moment, k: Motion, taken: int, n: int, near: float, run: Rows) -> float:
+def _keep(of: Stretch, at: Moment, taken: int, run: Kept) -> float:
+    near = at.theta
     for row in range(run.taken[0], taken):
-        m = hybrid._turned(case, charts.moment(run.times[row], run.z[row, :n], at, k), near)
+        m = hybrid._turned(charts.moment(run.times[row], of.samples[row], at, of.k), of.k, near)
         near = m.theta
-        hybrid._sample(case, m, k, run)
+        hybrid._sample(m, of.k, run)
     return near
 
 

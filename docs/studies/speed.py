@@ -28,7 +28,7 @@ from analytic import Settings, simulate, simulate_many
 from analytic.simulation import equations, hybrid
 from analytic.simulation.ensemble import random_starts
 from analytic.simulation.equations import FINER
-from analytic.simulation.integrator import DONE, FIRED, STUCK, Pace
+from analytic.simulation.integrator import DONE, FIRED, STUCK, Pace, Stretch
 from analytic.stationary.solutions import solution
 from compare.kit.engines import engine
 from compare.kit.pages import Rows
@@ -92,14 +92,12 @@ def plainly(motion: Motion, rtol: float = 1e-9) -> Any:
         return run(motion, rtol)
 
 
-def _solved(
-    method: str, k: equations.Motion, pace: Pace, until: float, z: Array, scale: Array, times: Array, taken: int,
-    samples: Array, arm: Array, level: Array, most: int,
-) -> tuple[int, Pace, int, int]:  # fmt: skip
+def _solved(method: str, of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
     """In the place of `integrator.stretch`: scipy's `solve_ivp`, to which what ends a case is an event.
 
     The time of the solver runs from zero, since a direction of slip settles very soon.
     """
+    k, until, z, scale, times, samples, arm, _ = of
     start, span = pace[0], until - pace[0]
     due = times[taken : np.searchsorted(times, until, side="right")] - start
 
