@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar
@@ -35,16 +36,33 @@ def compiled(digest: str) -> Callable[[F], F]:
     """
 
     def compile_(function: F) -> F:
-        if numba is None:
+        if numba is None or numba.config.DISABLE_JIT:
             return function
         own: Any = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         own.__qualname__, own.__doc__ = f"{function.__qualname__}_{digest}", function.__doc__
         try:
-            return numba.njit(cache=True, nogil=True, error_model="numpy")(own)  # type: ignore[no-any-return]
+            return _alone(numba.njit(cache=True, nogil=True, error_model="numpy")(own))  # type: ignore[no-any-return]
         except RuntimeError:  # no place for a cache
             return numba.njit(nogil=True, error_model="numpy")(own)  # type: ignore[no-any-return]
 
     return compile_
+
+
+def _alone(function: Any) -> Any:
+    """Of processes that begin at once one compiles a function, and the others wait for what it keeps on disk."""
+    compile_ = function._compile_for_args
+
+    def compile_alone(*given: Any, **named: Any) -> Any:
+        with ExitStack() as stack:
+            with suppress(ImportError, OSError):  # no such locks here
+                import fcntl
+
+                file = stack.enter_context((Path(function.stats.cache_path) / "compiling").open("w"))
+                fcntl.flock(file, fcntl.LOCK_EX)
+            return compile_(*given, **named)
+
+    function._compile_for_args = compile_alone
+    return function
 
 
 def in_place_of(function: Callable[..., Any]) -> Callable[[F], F]:

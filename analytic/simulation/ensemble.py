@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -96,24 +96,30 @@ def simulate_many(
     x[:, 0], end, failure = states, np.zeros(count), [""] * count
     carry_out = _stepped if settings.method == "time-stepping" else _event_driven
 
-    @lru_cache
-    def checked(p: Parameters, flow: Flow | None) -> Flow:
-        flow = flow or Flow.steady(p.omega_0)
-        check_duration(p, flow, t_end)
-        return flow
+    steady = {p: Flow.steady(p.omega_0) for p in dict.fromkeys(sets)}
+    fluids = [flow or steady[p] for p, flow in zip(sets, flows, strict=True)]
+    for p, fluid in dict.fromkeys(zip(sets, fluids, strict=True)):
+        check_duration(p, fluid, t_end)
+    todo = iter(range(count))
 
-    def carried_out(n: int) -> None:
-        flow = checked(sets[n], flows[n])
-        run = _Run(sets[n], states[n], flow, settings, times, still, x[n], case[n], landings[n], over)
-        end[n], failure[n] = carry_out(run)
+    def work() -> None:
+        """One run after the other, of those that no thread has begun: a task each would take longer than short runs."""
+        try:
+            for n in todo:
+                if over[0]:
+                    return
+                run = _Run(sets[n], states[n], fluids[n], settings, times, still, x[n], case[n], landings[n], over)
+                end[n], failure[n] = carry_out(run)
+        except BaseException:
+            over[0] = True  # nobody wants the others any more
+            raise
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            list(pool.map(carried_out, range(count)))
-        except BaseException:  # nobody wants the others any more
+            for each in [pool.submit(work) for _ in range(min(workers, count))]:
+                each.result()
+        finally:
             over[0] = True
-            pool.shutdown(cancel_futures=True)
-            raise
     return Ensemble(times, x, case, landings, end, tuple(failure))
 
 

@@ -1,10 +1,12 @@
 """Compiled runs and those in plain Python come to the same, in all cases, drag laws and flows, with restitution."""
 
+import fcntl
+
 import numpy as np
 import pytest
 
 from analytic import simulate
-from analytic.simulation import hybrid
+from analytic.simulation import compiling, hybrid
 from model import Case, Flow, Parameters, State
 from model.drag import LAWS
 
@@ -65,3 +67,15 @@ def test_the_end_of_rolling_agrees(monkeypatch, leave):
 def test_rebounds_agree(monkeypatch):
     x0 = State(y=0.05, omega_c=5.0, h=0.01, v_h=-0.2).stacked()
     check_same(*both(monkeypatch, P.replace(omega_0=15.0), x0, 0.6, restitution=0.5, sample_interval=0.02), 1e-5)
+
+
+def test_of_processes_one_compiles(monkeypatch):
+    asked = []
+    monkeypatch.setattr(fcntl, "flock", lambda file, how: asked.append(how))
+
+    @compiling.compiled("of_a_test")
+    def more(x):
+        return x + 1
+
+    assert [more(1), more(2)] == [2, 3]
+    assert asked == [fcntl.LOCK_EX]
