@@ -31,26 +31,6 @@ from model import InputError, Parameters
 from model.arrays import Array
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
-_NUMBERS = {
-    "timestep": ("s", POSITIVE),
-    "solreffriction": ("s", POSITIVE),
-    "solimp": ("1", Range(1e-4, 0.9999)),
-    "impratio": ("1", Range(0.1, 1e7)),
-    "servo": ("s", NOT_NEGATIVE),
-    "hover": ("1", NOT_NEGATIVE),
-    "tolerance": ("1", NOT_NEGATIVE),
-    "iterations": ("1", Range(1, whole=True)),
-    "noslip_iterations": ("1", Range(0, whole=True)),
-    "facets": ("1", Range(3, 2000, whole=True)),
-}
-"""Unit and range of each number."""
-_CHOICES = {
-    "cone": ("elliptic", "pyramidal"),
-    "integrator": ("Euler", "implicit", "implicitfast", "discrete"),
-    "coordinates": ("polar", "free"),
-    "wall": ("tangent", "prism"),
-    "law": ("soft", "rigid"),
-}
 FORESEEN = 0.01
 """Share of a force to which a step knows what rigid contacts slip: a fifth of `Law.share` of mjsim.coulomb, by a test.
 (A fifth was chosen after the slip of a rolling ball had been seen, which is a tenth of that.)"""
@@ -59,6 +39,27 @@ _LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
 up to mu eta = 1.03, 2.1, 5 and 9."""
 _FALL = 0.01
 """Distance fallen in a step from which a contact is an impact, in units of the gap that counts as touching."""
+
+
+_NEEDS: dict[tuple[str, Any], tuple[dict[str, Any], str]] = {
+    ("wall", "prism"): ({"coordinates": "free", "servo": 0.0}, "at an edge two facets share the ball"),
+    ("coordinates", "free"): ({"memory": False, "order": 1}, "the corrections are for the joints"),
+    ("law", "rigid"): (
+        {"coordinates": "free", "wall": "tangent", "servo": 0.0, "noslip_iterations": 0},
+        "it holds contacts by itself",
+    ),
+    ("integrator", "discrete"): ({"law": "soft"}, "rigid contacts are for the others"),
+    ("memory", True): ({"cone": "elliptic"}, "rows of the pyramid mix normal and friction"),
+}
+"""What a value of a setting needs of others, and why."""
+
+
+def _number(default: float, unit: str, allowed: Range) -> Any:
+    return dataclasses.field(default=default, metadata={"unit": unit, "allowed": allowed})
+
+
+def _choice(*known: Any) -> Any:
+    return dataclasses.field(default=known[0], metadata={"known": known})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,81 +75,60 @@ class ContactSettings:
         If a value is outside what the engine can do or would be unstable.
     """
 
-    timestep: float = 1e-3
+    timestep: float = _number(1e-3, "s", POSITIVE)
     """Time step, s."""
     solref: tuple[float, float] = (2e-3, 0.5)
     """Time constant (s) and damping ratio of the normal rows; `suited` makes them slower where friction asks for it."""
-    solreffriction: float = 2.0
+    solreffriction: float = _number(2.0, "s", POSITIVE)
     """Time constant tc_f of the friction rows, s."""
-    solimp: float = 1e-3
+    solimp: float = _number(1e-3, "1", Range(1e-4, 0.9999))
     """Impedance d, one value at every depth."""
-    impratio: float = 3e3
+    impratio: float = _number(3e3, "1", Range(0.1, 1e7))
     """How much stiffer the friction rows are than the normal row; beyond 1e7 the solver fails."""
     memory: bool = True
     """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
-    servo: float = 0.01
+    servo: float = _number(0.01, "s", NOT_NEGATIVE)
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
-    hover: float = 0.2
+    hover: float = _number(0.2, "1", NOT_NEGATIVE)
     """Largest hover number of a contact under its load: where slip is faster, friction is damped less. 0: as fast as
     it is. It needs memory or order 2."""
-    order: int = 2
+    order: int = _choice(2, 1)
     """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
-    coordinates: str = "polar"
+    coordinates: str = _choice("polar", "free")
     """``polar``: azimuth, radius and height as joints; ``free``: a free joint, for comparison (`mjsim.free`)."""
-    wall: str = "tangent"
+    wall: str = _choice("tangent", "prism")
     """``tangent``: one plane turned to the ball's azimuth; ``prism``: `facets` fixed planes."""
-    facets: int = 90
+    facets: int = _number(90, "1", Range(3, 2000, whole=True))
     """Number of planes of the prism."""
-    law: str = "soft"
+    law: str = _choice("soft", "rigid")
     """``soft``: contacts as the engine has them; ``rigid``: by `mjsim.Coulomb`, for a free ball, where no parameter of
     soft contacts decides anything."""
-    cone: str = "elliptic"
-    integrator: str = "Euler"
-    iterations: int = 100
-    tolerance: float = 1e-12
-    noslip_iterations: int = 0
+    cone: str = _choice("elliptic", "pyramidal")
+    integrator: str = _choice("Euler", "implicit", "implicitfast", "discrete")
+    iterations: int = _number(100, "1", Range(1, whole=True))
+    tolerance: float = _number(1e-12, "1", NOT_NEGATIVE)
+    noslip_iterations: int = _number(0, "1", Range(0, whole=True))
 
     def __post_init__(self) -> None:
         if len(self.solref) != 2:
             raise InputError(f"solref = {self.solref!r} must be two numbers, time constant (s) and damping ratio")
         check_number("solref time constant", self.solref[0], "s", POSITIVE)
         check_number("solref damping ratio", self.solref[1], "1", POSITIVE)
-        for name, (unit, allowed) in _NUMBERS.items():
-            check_number(name, getattr(self, name), unit, allowed)
-        for name, known in _CHOICES.items():
-            check_choice(name, getattr(self, name), known)
-        for refused, why in (
-            (self.order not in (1, 2), f"order = {self.order!r} must be 1 or 2"),
-            (self.wall == "prism" and self.coordinates != "free", "wall = 'prism' needs coordinates = 'free'"),
-            (
-                self.wall == "prism" and self.servo,
-                f"wall = 'prism' needs servo = 0, not {self.servo:g} s: at an edge two facets share the ball",
-            ),
-            (
-                self.coordinates == "free" and (self.memory or self.order != 1),
-                "coordinates = 'free' needs memory = False and order = 1: the corrections are for the joints",
-            ),
-            (
-                self.rigid and (self.coordinates != "free" or self.wall != "tangent" or self.servo > 0),
-                "law = 'rigid' needs coordinates = 'free', wall = 'tangent' and servo = 0: it holds contacts by itself",
-            ),
-            (
-                self.rigid and (self.integrator == "discrete" or self.noslip_iterations > 0),
-                "law = 'rigid' needs noslip_iterations = 0 and another integrator than discrete",
-            ),
-            (
-                self.memory and self.cone != "elliptic",
-                f"memory needs the elliptic cone, not cone = {self.cone!r}: its rows mix normal and friction",
-            ),
-            (
-                self.timestep > self.largest_timestep * (1 + 1e-12),
+        for field in dataclasses.fields(self):
+            if "unit" in field.metadata:
+                check_number(field.name, getattr(self, field.name), field.metadata["unit"], field.metadata["allowed"])
+            elif "known" in field.metadata:
+                check_choice(field.name, getattr(self, field.name), field.metadata["known"])
+        for (name, value), (needed, why) in _NEEDS.items():
+            for other, only in needed.items() if getattr(self, name) == value else ():
+                if (found := getattr(self, other)) != only:
+                    raise InputError(f"{name} = {value!r} needs {other} = {only!r}, not {found!r}: {why}")
+        if self.timestep > self.largest_timestep * (1 + 1e-12):
+            raise InputError(
                 f"timestep = {self.timestep:g} s is too large for the contact settings: solref {self.solref[0]:g} s, "
                 f"solreffriction {self.solreffriction:g} s and servo {self.servo:g} s allow at most "
-                f"{self.largest_timestep:g} s",
-            ),
-        ):
-            if refused:
-                raise InputError(why)
+                f"{self.largest_timestep:g} s"
+            )
 
     @property
     def rigid(self) -> bool:
@@ -296,7 +276,7 @@ class ContactSettings:
     @classmethod
     def at(cls, timestep: float, **changes: Any) -> Self:
         """The defaults with their times scaled to another step, and the given changes."""
-        check_number("timestep", timestep, *_NUMBERS["timestep"])
+        check_number("timestep", timestep, "s", POSITIVE)
         scale, (time, ratio) = timestep / 1e-3, cls.solref
         scaled = {"solref": (time * scale, ratio), "solreffriction": cls.solreffriction * scale}
         return cls.from_mapping({"timestep": timestep, "servo": cls.servo * scale} | scaled | changes)

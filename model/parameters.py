@@ -76,10 +76,11 @@ def parse_number(name: str, text: str, unit: str, allowed: Range = ANY) -> float
     return check_number(name, number, unit, allowed)
 
 
-def check_choice(name: str, value: Any, known: Sequence[str]) -> None:
+def check_choice(name: str, value: Any, known: Sequence[Any]) -> None:
     """`InputError` if `value` is none of the known ones."""
     if value not in known:
-        raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
+        names = [str(each) for each in known]
+        raise InputError(f"{name} = {value!r} must be one of {', '.join(names)}{suggestion(str(value), names)}")
 
 
 def check_names(given: Collection[str], known: Sequence[str], kind: str, needed: Iterable[str] = ()) -> None:
