@@ -235,11 +235,6 @@ class ContactSettings:
         """Whether floor and wall get surface velocities."""
         return self.memory or self.friction_lag != 0
 
-    @property
-    def corrects(self) -> bool:
-        """Whether anything is added between the steps that needs to know the forces of the last one."""
-        return self.memory or self.servo > 0 or self.order == 2
-
     def contact_decay(self, mu: float, eta: float) -> float:
         """Largest factor by which a small displacement changes in a step, where a ball slips at both contacts.
 

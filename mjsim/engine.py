@@ -105,7 +105,7 @@ class Run:
 
             self._stepper = Free(*given)
         else:
-            self._stepper = Polar(*given, next(self._omega_0(0, 1)), batched or len(models) > 1)
+            self._stepper = Polar(*given, batched or len(models) > 1)
         shown = dataclasses.asdict(settings) | {
             "t_end": float(t_end),
             "sample_interval": self._interval * settings.timestep,

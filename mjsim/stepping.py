@@ -5,7 +5,8 @@ Before each step the wall is turned to be tangent at the ball's azimuth, the mar
 so that forces and velocities of the ball's joint are along the paper's axes. Positions are kept half a step ahead of
 velocities (leapfrog).
 
-A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as `mjsim.landing` says.
+A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as `mjsim.landing` says; so
+it does the first one, which finds the margins and forces that belong to the start.
 
 Arrays have the runs in the last axis and contacts in the order A, B.
 """
@@ -34,11 +35,6 @@ if TYPE_CHECKING:
 
 HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
-_ROUNDS = 60
-"""Most rounds of the search for margins and forces that belong to the first state."""
-_SAME, _SWINGS = 1e-12, 0.01
-"""Change from one round to the next with which it ends, relative to the largest acceleration; and change over two
-rounds, divided by that in the last, with which it goes back and forth for ever, and ends, too."""
 _CHANGE = 0.5
 """Most that contact forces may change in a step before the ball goes on upon its joints, in units of what the
 largest force, at least that of gravity and the wall's friction, does as the ball goes round."""
@@ -52,13 +48,12 @@ class Polar:
     models, parameters, x0s : one of each for every run; full states (8,)
     settings : shared by all runs
     theta_0 : azimuth at the start, rad
-    omega_0 : in the first step, shape (runs,), rad s-1
     batched : whether to use MuJoCo's batch; more than one run needs it
     """
 
     def __init__(
         self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        x0s: Sequence[npt.ArrayLike], theta_0: float, omega_0: Array, batched: bool = True,
+        x0s: Sequence[npt.ArrayLike], theta_0: float, batched: bool = True,
     ) -> None:  # fmt: skip
         from mjsim import compiled  # here, because numba takes long to load
 
@@ -72,10 +67,10 @@ class Polar:
         """Margins of the contacts, shape (2, runs), m."""
         surfaces, self._start = array("geom_surfacevel"), array("qacc_warmstart")
         floor, wall = (surfaces[6 * models[0].geom(name).id :][:2] for name in ("floor", "wall"))
-        self._last, self._forces = np.empty((6, runs)), np.zeros((8, runs))
+        self._last, self._forces = np.zeros((6, runs)), np.zeros((8, runs))
         """Velocities a step ago; generalised forces of the contacts in the last step (6), N and N m, and normal ones,
         which are the engine's, but for"""
-        self._held, self._due = np.ones(runs, dtype=bool), np.zeros(runs, dtype=bool)
+        self._held, self._due = np.ones(runs, dtype=bool), np.full(runs, settings.servo > 0)
         """runs whose last step wasn't the engine's; and runs that take the next one in fine ones."""
         self._again = set[int]()
         """Those among them that did so in the last one."""
@@ -86,50 +81,8 @@ class Polar:
         )  # fmt: skip
         self._fine: dict[Parameters, Fine] = {}
         for run, (x0, p) in enumerate(zip(x0s, parameters, strict=True)):
-            own = slice(run, run + 1)
-            if batched:
-                one = Polar(models[own], parameters[own], settings, x0s[own], theta_0, omega_0[own], batched=False)
-                for name, values in one.state().items():
-                    self._carried()[name][..., run] = values[..., 0]
-            else:
-                self._begin(State.of(x0), theta_0, p, omega_0)
-        self._held[:] = True
-
-    def _begin(self, x: State, theta: float, p: Parameters, fluid: Array) -> None:
-        """Put a run by itself into a state; one that comes down on what it touches lands."""
-        (place, v), settings = recorder.joint_state(x, theta, p), self._settings
-        reach, fall, gaps, speeds = settings.touching(p.g), settings.slowest_fall(p.g), (x.y, x.h), (x.v_y, x.v_h)
-        closed = [abs(gap) < reach and abs(speed) * self._h < reach for gap, speed in zip(gaps, speeds, strict=True)]
-        self._due[:] = any(gap < reach and speed < -fall for gap, speed in zip(gaps, speeds, strict=True))
-        self.margins[:], self._forces[:], rates = 0.0, 0.0, np.zeros(6)
-        if settings.corrects and not self._due[0]:
-            place[[2, 1]] = np.where(closed, 0.0, gaps)
-            rates = self._balance(place, v, np.array(closed)[:, None], fluid)
-        self._set(0, place[:3], v, rates)
-
-    def _balance(self, place: Array, v: Array, closed: Array, fluid: Array) -> Array:
-        """Search for the margins with which closed contacts have no acceleration, and the forces that go with them."""
-        table, *given = self._arguments
-        table = table * (np.arange(len(table)) != Ball._fields.index("gain"))[:, None]
-        given[0], before, latest = np.ones(1, dtype=bool), np.full(8, np.nan), np.full(8, np.nan)
-        self._qpos[:, 0] = place
-        self._qvel[:, 0] = self._last[:, 0] = v
-        rates, stiffness = np.zeros(6), self._settings.solimp * self._settings.k
-        for _ in range(_ROUNDS):
-            self._drive(fluid, table, *given)
-            mujoco.mj_forward(self.model, self.data)
-            np.copyto(self._forces, np.concatenate(self._arguments[3:5]))
-            rates = self.data.qacc.copy()
-            self._last[:, 0] = v - self._h * rates
-            if self._settings.servo:
-                wanted = self.margins - rates[2:0:-1, None] / stiffness
-                self.margins[:] = closed * np.maximum(wanted, 0.0)
-            state = np.append(rates, self.margins * stiffness)
-            swings, changes = np.abs(state - before).max(), np.abs(state - latest).max()
-            if changes <= _SAME * np.abs(rates).max() or swings < _SWINGS * changes:
-                break
-            before, latest = latest, state
-        return rates
+            place, v = recorder.joint_state(State.of(x0), theta_0, p)
+            self._set(run, place[:3], v, np.zeros(6))
 
     def _finely(self, p: Parameters) -> Fine:
         """What takes fine steps with such a ball."""

@@ -190,7 +190,7 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
     omega_0 = np.full((500, 1), p.omega_0)
-    settled = Polar([model], [p], settings, [state.x], 0.0, omega_0[0], batched=False)
+    settled = Polar([model], [p], settings, [state.x], 0.0, batched=False)
     settled.advance(omega_0)
     starts = [p] * runs, [state.x] * runs, steps * settings.timestep, [Flow.steady(p.omega_0)] * runs, settings
     bare, whole = [_bare(settled, runs, steps)], []
