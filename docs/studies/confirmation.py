@@ -132,11 +132,12 @@ def _hover() -> Iterator[Row]:
 def _decay() -> Iterator[Row]:
     """In rolling a slip velocity dies out by the factor 1 - b_f h A/(A + R_t) a step; drag adds c h."""
     for damping, impratio in itertools.product((0.2, 0.5), (1e2, 1e5)):
-        settings = _at(1e-3, 0.03, damping, impratio=impratio, memory=False, order=1)
+        settings = _at(1e-3, 0.03, damping, impratio=impratio, memory=False, order=1, servo=0.0)
         p = ROLLING.replace(omega_0=0.0, mu=1.0, eta=0.0)  # it is away from the wall
         # A spin too slow to reach the cone; a friction row at the floor sees A_t = (1 + 1/j)/m.
         spin = 0.5 * float(settings.regularisation_speed(p.mu * p.g)) / p.r
-        run = simulate(p, (0, 0, 0, 0, 0, spin, 0.01, 0), 0.02, settings=settings, sample_interval=1e-3)
+        x0 = -settings.margin(p.g), 0, 0, 0, 0, spin, 0.01, 0  # as deep as the floor bears it
+        run = simulate(p, x0, 0.02, settings=settings, sample_interval=1e-3)
         share = 1 / (1 + settings.softness / impratio / (1 + 1 / p.j))
         left = float(run.slip_speed_A[3] / run.slip_speed_A[2])
         what = f"slip left after a step of rolling, b_f h = {damping:g}, impratio = {impratio:g}"
