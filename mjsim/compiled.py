@@ -55,7 +55,7 @@ if numba:
         *(corrections.slip, corrections.resistance, corrections.surface, corrections.corrections, corrections.followed),
         *(corrections.lands, corrections.near_axis, corrections.eventful, corrections.velocity_of),
         *(world_axes.outwards, world_axes.driven, world_axes.spun, world_axes.against, world_axes.slip),
-        *(world_axes.unwrapped, world_axes.joint_velocities, free.step, landing.closes, landing.average),
+        *(world_axes.unwrapped, world_axes.joint_velocities, free.step, free.note, landing.closes, landing.average),
     ):
         register_jitable(each)
     _fields = len(Ball._fields)
@@ -70,5 +70,5 @@ if numba:
 
     _rows, _flags = numba.types.Array(numba.float64, 2, "A"), numba.types.Array(numba.boolean, 1, "C")
     _given = numba.types.Array(numba.float64, 2, "A", readonly=True)
-    drive = _compiled(drive, numba.float64[::1], _rows, *[_flags] * 2, *[_given] * 2, *[_rows] * 9)
+    drive = _compiled(drive, numba.float64[::1], *[_rows] * 2, *[_flags] * 2, *[_given] * 2, *[_rows] * 9)
     steps, through = _compiled(steps), _compiled(through)

@@ -261,11 +261,11 @@ def velocity_of(rows: Array, run: int) -> Velocity:
 
 
 def drive(
-    omega_0: Array, balls: Array, due: Any, held: Any, contact: Array, normals: Array, forces: Array, qvel: Array,
-    last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
+    omega_0: Array, row: Array, balls: Array, due: Any, held: Any, contact: Array, normals: Array, forces: Array,
+    qvel: Array, last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
 ) -> bool:  # fmt: skip
     """Let the margins follow the gaps and set what drives the next step; mark runs that are `due` to land in it, and
-    return whether there are any.
+    return whether there are any. A row (runs, columns) begins with place and velocities.
 
     Forces of contacts (6 and 2, runs) are those of the engine's last step, but for runs where others are `held`.
     """
@@ -287,6 +287,7 @@ def drive(
             margins[1, k] = followed(float(margins[1, k]), h, ball.gain)
         turn[0, k], turn[3, k] = math.cos(theta / 2), math.sin(theta / 2)
         qpos[3, k], qpos[4:7, k] = 1.0, 0.0
+        row[k, :7], row[k, 7:13] = qpos[:, k], qvel[:, k]
         driving, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]) = corrections(
             v, before, ball.R - h, float(omega_0[k]), given, loads, ball
         )

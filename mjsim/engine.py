@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import math
 import os
 import threading
@@ -30,14 +29,12 @@ if TYPE_CHECKING:
     from mjsim.free import Free
     from mjsim.journal import Journal
 
-BLOCK = 256
-"""Most samples a run keeps before it hands them out."""
-BLOCK_STEPS = 20_000
-"""Most steps it takes before that, if one sample doesn't need more."""
+BLOCK, BLOCK_STEPS = 256, 20_000
+"""A run hands out its samples once it has so many, or has taken so many steps."""
 EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
 NOTED = 4096
-"""Steps of all runs of which the cases are told at once."""
+"""Steps of all runs that are noted before their cases are told."""
 RUNS_A_THREAD = 16
 """Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's Python."""
 MOST_THREADS = 1024
@@ -123,7 +120,9 @@ class Run:
         self._alike = [[i for i, own in enumerate(lengths) if own == each] for each in dict.fromkeys(lengths)]
         """Runs of the same geometry, whose samples are worked out together."""
         self._classifier = Classifier(parameters, settings)
-        self._noted = np.empty((max(64, NOTED // len(parameters)), len(parameters), recorder.NSENSOR))
+        self._steps = (self._count - 1) * self._interval + 1
+        """All that are taken: nothing is needed of those after the last sample."""
+        self._rows = np.empty((max(64, NOTED // len(parameters)), len(parameters), recorder.COLUMNS))
         self._waiting = [np.empty(0, SAMPLE)] * len(parameters)
         """Samples of each run whose case is not yet decided."""
         self._ends = [math.inf] * len(parameters)
@@ -141,33 +140,29 @@ class Run:
         return self._stepper.margins.T
 
     def __iter__(self) -> Iterator[Blocks]:
-        done = 0
         blocks, state = self._journal.recall() if self._journal else (iter(()), {})
+        done, step, kept = 0, int(state.get("steps", 0)), list[Array]()
         if state:
             self._stepper.restore(state)
             self._classifier.restore(state)
         for raw in blocks:
             yield self._finish(done, raw)
             done += len(raw)
-        size = max(1, min(BLOCK, BLOCK_STEPS // self._interval))
-        # Nothing is needed of the steps after the last sample.
-        omega_0 = self._omega_0(done * self._interval, (self._count - 1) * self._interval + 1)
-        while done < self._count and not all(header.failure for header in self.headers):
-            raw = np.empty((min(size, self._count - done), len(self.headers), recorder.COLUMNS))
-            filled, room, last = 0, len(self._noted), done + len(raw) == self._count
-            for k, row in enumerate(raw):
-                left, first = 1 if last and k + 1 == len(raw) else self._interval, row
-                while left:
-                    self._check()
-                    count = min(left, room - filled)
-                    self._stepper.advance(itertools.islice(omega_0, count), self._noted[filled:], first)
-                    filled, left, first = filled + count, left - count, None
-                    if filled == room:
-                        self._classifier.add(recorder.contacts(self._noted))
-                        filled = 0
-            self._classifier.add(recorder.contacts(self._noted[:filled]), last)
+        first = step
+        while step < self._steps and not all(header.failure for header in self.headers):
+            self._check()
+            rows = self._rows[: self._steps - step]
+            time = (step + np.arange(len(rows)) + 0.5) * self._settings.timestep
+            self._stepper.advance(np.stack([flow(time) for flow in self._flows], axis=-1), rows)
+            kept.append(rows[-step % self._interval :: self._interval].copy())
+            step += len(rows)
+            self._classifier.add(recorder.contacts(rows), step == self._steps)
+            if step < self._steps and step - first < BLOCK_STEPS and sum(map(len, kept)) < BLOCK:
+                continue
+            raw, kept, first = np.concatenate(kept), [], step
             if self._journal:
-                self._journal.note(raw, self._stepper.state() | self._classifier.state())
+                state = {"steps": np.array(step)} | self._stepper.state() | self._classifier.state()
+                self._journal.note(raw, state)
             yield self._finish(done, raw)
             done += len(raw)
 
@@ -179,12 +174,6 @@ class Run:
             for own, block in zip(kept, blocks, strict=True):
                 own.append(block)
         return [Trajectory.from_blocks(*each) for each in zip(self.headers, kept, self.events, strict=True)]
-
-    def _omega_0(self, first: int, stop: int) -> Iterator[Array]:
-        """omega_0 (runs,) in the middle of each step."""
-        for chunk in range(first, stop, 1000):
-            time = (np.arange(chunk, min(chunk + 1000, stop)) + 0.5) * self._settings.timestep
-            yield from np.stack([flow(time) for flow in self._flows], axis=-1)
 
     def _finish(self, first: int, raw: Array) -> Blocks:
         """Samples of each run from raw ones (samples, runs, columns), cut where a run breaks down."""
@@ -198,7 +187,7 @@ class Run:
             kept = sound[runs]
             times = np.broadcast_to(time, kept.shape)[kept]
             rows = raw.transpose(1, 0, 2)[runs][kept]
-            block = recorder.samples(times, rows, self._parameters[runs[0]])
+            block = recorder.samples(times, rows, self._stepper.lead, self._parameters[runs[0]])
             for i, part in zip(runs, np.split(block, kept.sum(axis=1).cumsum()[:-1]), strict=True):
                 if not self.headers[i].failure and len(part) < len(time):
                     self._ends[i] = end = float(time[len(part)])

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -31,7 +31,7 @@ from model.arrays import Array
 from model.kinematics import to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
-_A_x, _A_y, _B_x, _B_y = (recorder.SLIPS - recorder.SENSORS).tolist()
+_SEEN, (_A_x, _A_y, _B_x, _B_y) = recorder.SENSORS, recorder.SLIPS
 
 
 class Body(NamedTuple):
@@ -83,11 +83,26 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
     return theta
 
 
-def steps(body: Body, duration: float, fluid: Array, theta: float, seen: Array) -> float:
-    """A `step` for each omega_0."""
+def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) -> float:
+    """A `step` for each omega_0, noted in rows (steps, `COLUMNS`)."""
     for number in range(len(fluid)):
-        theta = step(body, duration, False, fluid[number], theta, seen[number])
+        row = rows[number]
+        note(row, body.qpos, body.qvel, duration / 2, body.ball)
+        theta = step(body, duration, False, fluid[number], theta, row[_SEEN:])
+        row[0] = theta
     return theta
+
+
+def note(row: Any, qpos: Any, qvel: Any, ahead: float, ball: Ball) -> None:
+    """Coordinates, but for the azimuth, and velocities of the joint chain, upright, as `recorder` has them.
+
+    The place is `ahead` of the velocities; these are along the axes of where the ball was.
+    """
+    row[1], row[2] = ball.R - math.hypot(qpos[0], qpos[1]), qpos[2] - ball.r
+    row[3], row[4], row[5], row[6] = 1.0, 0.0, 0.0, 0.0
+    velocities = joint_velocities(qpos, qpos[3:], qvel, ahead)
+    for i in range(6):
+        row[7 + i] = velocities[i]
 
 
 def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:
@@ -111,18 +126,11 @@ class Free:
         theta_0: float,
     ) -> None:
         self._balls = [FreeBall(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
-        self.margins = np.zeros((2, len(models)))
+        self.margins, self.lead = np.zeros((2, len(models))), self._balls[0].ahead
 
-    def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
-        if row is not None:
-            row[:, : recorder.SENSORS] = [ball.joints() for ball in self._balls]
-        fluid = np.array(list(omega_0))
-        seen = np.empty((*fluid.shape, recorder.NSENSOR)) if sensors is None else sensors
+    def advance(self, omega_0: Array, rows: Array) -> None:
         for k, ball in enumerate(self._balls):
-            ball.advance(fluid[:, k], seen[:, k])
-        if row is not None and sensors is not None:
-            row[:, recorder.SENSORS : -1] = sensors[0]
-            row[:, -1] = [ball.ahead for ball in self._balls]
+            ball.advance(omega_0[:, k], rows[:, k])
 
     def state(self) -> dict[str, Array]:
         kept = np.empty((len(self._balls), mujoco.mj_stateSize(self._balls[0].model, _INTEGRATION)))
@@ -185,34 +193,25 @@ class FreeBall:
         self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:6] = [*now.velocity, *now.spin]
 
-    def joints(self) -> tuple[float, ...]:
-        """Coordinates and velocities of the joint chain, with the orientation upright, as `recorder` has them.
-
-        The place is `ahead` of the velocities; these are along the axes of where the ball was.
-        """
-        place, velocity = self.data.qpos[:3].tolist(), self.data.qvel[:6].tolist()
-        self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
-        there = self.theta, self.p.R - math.hypot(place[0], place[1]), place[2] - self.p.r
-        return *there, 1.0, 0.0, 0.0, 0.0, *joint_velocities(place, self.data.qpos[3:7].tolist(), velocity, self.ahead)
-
     def law_state(self) -> dict[str, Array]:
         """What the law of rigid contacts remembers, if there is one."""
         return self.law.state() if self.law else {}
 
-    def advance(self, fluid: Array, seen: Array) -> None:
-        """Take a step for each omega_0; `seen` (steps, `NSENSOR`) takes the sensors and the gaps of A and B, m."""
+    def advance(self, fluid: Array, rows: Array) -> None:
+        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
         if self.law:
-            self.theta = self._steps(self.body, self._timestep, fluid, self.theta, seen)
+            self.theta = self._steps(self.body, self._timestep, fluid, self.theta, rows)
             return
-        for row, omega_0 in zip(seen, fluid.tolist(), strict=False):
+        for row, omega_0 in zip(rows, fluid.tolist(), strict=True):
             self._soft_step(omega_0, row)
 
-    def _soft_step(self, omega_0: float, seen: Array) -> None:
-        data, p = self.data, self.p
+    def _soft_step(self, omega_0: float, row: Array) -> None:
+        data, ball = self.data, self.body.ball
         place, turned, velocity = data.qpos[:3].tolist(), data.qpos[3:7].tolist(), data.qvel[:6].tolist()
-        data.qfrc_applied[:] = driven(place, turned, velocity, [0.0] * 6, 0.0, omega_0, self.body.ball)
-        self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
+        note(row, place + turned, velocity, 0.0, ball)
+        data.qfrc_applied[:] = driven(place, turned, velocity, [0.0] * 6, 0.0, omega_0, ball)
+        row[0] = self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
         if self._turns:
             self.body.wall[:] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
         mujoco.mj_step(self.model, data)
-        seen[:] = *data.sensordata, place[2] - p.r, p.R - math.hypot(place[0], place[1])
+        row[_SEEN:] = *data.sensordata, row[2], row[1]

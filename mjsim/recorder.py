@@ -13,9 +13,9 @@ from model.kinematics import frame, rotated
 NQ, NV, NSENSOR = 7, 6, 30
 """Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors and the two gaps."""
 SENSORS = NQ + NV
-"""Where the sensors begin in a raw sample, which ends with the time by which all but velocities are ahead of them."""
-COLUMNS = SENSORS + NSENSOR + 1
-SLIPS = SENSORS + np.array([12, 13, 26, 27])
+"""Where the sensors begin in the row of a step, which begins with place and velocities before it."""
+COLUMNS = SENSORS + NSENSOR
+SLIPS = 12, 13, 26, 27
 """Where they hold the slip velocities of A and B."""
 NORMALS = slice(1, 28, 14)
 """Where they hold the normal forces."""
@@ -45,9 +45,9 @@ def state(qpos: Array, qvel: Array, p: Parameters) -> State:
     return State(y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h)
 
 
-def contacts(sensors: Array) -> Contacts:
-    """What the contacts do in successive steps, of sensors (steps, runs, `NSENSOR`)."""
-    each, gaps = sensors[..., :-2].reshape(*sensors.shape[:2], 2, NSENSOR // 2 - 1), sensors[..., -2:]
+def contacts(rows: Array) -> Contacts:
+    """What the contacts do in successive steps, of rows (steps, runs, `COLUMNS`)."""
+    each, gaps = rows[..., SENSORS:-2].reshape(*rows.shape[:2], 2, NSENSOR // 2 - 1), rows[..., -2:]
     normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
     slips = np.moveaxis(each[..., _SLIP], -1, 0)
     return Contacts(normal, np.hypot(first, second), np.hypot(slips[0], slips[1]), gaps)
@@ -61,12 +61,12 @@ def forces(sensors: Array, theta: npt.ArrayLike) -> Array:
     return in_world @ np.swapaxes(frame(np.asarray(theta)), -1, -2)
 
 
-def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
-    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), raw (n, `COLUMNS`).
+def samples(time: Array, rows: Array, lead: float, p: Parameters) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), rows (n, `COLUMNS`).
 
-    Places that are ahead by half a step h are brought back by the velocity: that leaves h^2/8 times the acceleration.
+    Places are `lead` s ahead of velocities, and are brought back by these: that leaves h^2/8 times the acceleration.
     """
-    qpos, qvel, sensors, lead = np.split(raw, [NQ, SENSORS, COLUMNS - 1], axis=1)
+    qpos, qvel, sensors = np.split(rows, [NQ, SENSORS], axis=1)
     loads = forces(sensors, qpos[:, 0])
     qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
     block = trajectory.samples(time, qpos[:, 0], state(qpos, qvel, p), p)

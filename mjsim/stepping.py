@@ -14,8 +14,9 @@ Arrays have the runs in the last axis and contacts in the order A, B.
 from __future__ import annotations
 
 import functools
+import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -60,7 +61,8 @@ class Polar:
         self._parameters, self._settings, runs = parameters, settings, len(models)
         self.model = models[0]
         self.data, array, self._step = _batch(models) if batched else _single(models[0])
-        self._drive, self._h, self._lead = compiled.drive, settings.timestep, settings.timestep * settings.midpoint
+        self._drive, self._h, self.lead = compiled.drive, settings.timestep, settings.timestep * settings.midpoint
+        """What is done before a step; the step, and how far places are ahead of velocities, s."""
         self._qpos, self._qvel, sensors = array("qpos"), array("qvel"), array("sensordata")
         self._gaps = self._qpos[2:0:-1]
         self.margins, self._sensors = array("pair_margin")[:2], sensors.T
@@ -96,7 +98,7 @@ class Polar:
     def _set(self, run: int, place: Array, v: Array, rates: Array) -> None:
         """Let a run go on from a place and velocities at one time, with such accelerations and the forces it has."""
         self._qvel[:, run], self._last[:, run], self._start[:, run] = v, v - self._h * rates, rates
-        self._qpos[:3, run] = place + self._lead * (v + rates * self._lead / 2)[:3]
+        self._qpos[:3, run] = place + self.lead * (v + rates * self.lead / 2)[:3]
         self._held[run] = True
 
     def _bear(self, run: int, place: Array, v: Array) -> None:
@@ -108,33 +110,22 @@ class Polar:
             given = zip((y, h), loads, (p.mu, p.eta), slip_speeds(x.stacked(), p), bears, strict=True)
             self.margins[:, run] = [self._settings.held(*map(float, each)) for each in given]
 
-    def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
-        """Take a step for each omega_0 (runs,), and note its sensors, (steps, runs, `NSENSOR`).
-
-        A row (runs, `COLUMNS`) gets (qpos, qvel, sensors) of the first step and the time by which positions are ahead.
-        """
-        if row is not None:
-            row[:, : recorder.NQ], row[:, recorder.NQ : recorder.SENSORS] = self._qpos.T, self._qvel.T
-            row[:, 3 : recorder.NQ] = 1, 0, 0, 0  # as every step begins
-            row[:, -1] = self._lead
-        for k, fluid in enumerate(omega_0):
-            some = self._drive(fluid, *self._arguments)
+    def advance(self, omega_0: Array, rows: Array | None = None) -> None:
+        """Take steps with omega_0 (steps, runs), and note each in rows (steps, runs, `COLUMNS`)."""
+        scratch = np.empty((len(self._due), recorder.COLUMNS))
+        for fluid, row in zip(omega_0, itertools.repeat(scratch) if rows is None else rows, strict=False):
+            some = self._drive(fluid, row, *self._arguments)
             lands = [(run, *self._where(run), self._gaps[:, run].copy()) for run in self._landing()] if some else []
             self._last[:] = self._qvel
             self._step()
             self._held[:] = self._due[:] = False
-            if sensors is not None:
-                sensors[k] = self._sensors
+            row[:, recorder.SENSORS :] = self._sensors
             for run, x, theta, rates, gaps in lands:
                 landed = self._finely(self._parameters[run]).step(
                     x, theta, rates, float(fluid[run]), run in self._again
                 )
                 self._land(run, landed)
-                if sensors is not None:
-                    sensors[k, run] = landed.seen
-                    sensors[k, run, -2:] = gaps
-        if row is not None and sensors is not None:
-            row[:, recorder.SENSORS : -1] = sensors[0]
+                row[run, recorder.SENSORS :], row[run, -2:] = landed.seen, gaps
 
     def _landing(self) -> list[int]:
         """Runs that land in the coming step, but for those that have diverged."""
@@ -144,7 +135,7 @@ class Polar:
 
     def _where(self, run: int) -> tuple[State, float, Array]:
         """State and azimuth of a run at the time of its velocities, and what a second changes of these."""
-        qpos, v, lead = self._qpos[:, run].copy(), self._qvel[:, run], self._lead
+        qpos, v, lead = self._qpos[:, run].copy(), self._qvel[:, run], self.lead
         rates = (v - self._last[:, run]) / self._h
         qpos[:3] -= lead * (v + rates * lead / 2)[:3]
         return recorder.state(qpos, v, self._parameters[run]), float(qpos[0]), rates
