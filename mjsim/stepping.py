@@ -76,6 +76,8 @@ class Polar:
         """runs whose last step wasn't the engine's; and runs that take the next one in fine ones."""
         self._again = set[int]()
         """Those among them that did so in the last one."""
+        self._calm = set[int]()
+        """Those that begin without a blow: they go on upon their joints after a step, however forces change."""
         self._state = self._forces, self._qvel, self._last, self._qpos, self.margins
         self._arguments = (
             np.array([Ball.of(p, settings) for p in parameters]).T, self._due, self._held, array("qfrc_constraint"),
@@ -83,7 +85,10 @@ class Polar:
         )  # fmt: skip
         self._fine: dict[Parameters, Fine] = {}
         for run, (x0, p) in enumerate(zip(x0s, parameters, strict=True)):
-            place, v = recorder.joint_state(State.of(x0), theta_0, p)
+            x = State.of(x0)
+            place, v = recorder.joint_state(x, theta_0, p)
+            if min(x.v_y, x.v_h) >= -settings.slowest_fall(p.g):
+                self._calm.add(run)
             self._set(run, place[:3], v, np.zeros(6))
 
     def _finely(self, p: Parameters) -> Fine:
@@ -146,7 +151,9 @@ class Polar:
         near = near_axis(p.R - landed.place[1], Velocity(*landed.velocity), ball) and landed.forces[7] == 0
         pace = max(abs(omega_c), math.sqrt(p.g / p.R))
         most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(landed.forces[[1, 2]]).max())
-        self._due[run] = near or landed.change > _CHANGE * self._h * pace * most
+        fast = landed.change > _CHANGE * self._h * pace * most and run not in self._calm
+        self._due[run] = near or fast
+        self._calm.discard(run)
         self._again = self._again | {run} if self._due[run] else self._again - {run}
         self._forces[:, run] = landed.forces
         self._set(run, landed.place, landed.velocity, landed.rates * (not near))
@@ -161,6 +168,7 @@ class Polar:
         for name, values in self._carried().items():
             values[...] = state[name]
         self._held[:], self._again = True, set(np.flatnonzero(self._due).tolist())
+        self._calm.clear()
 
     def _carried(self) -> dict[str, Array]:
         names = ("forces", "qvel", "last", "qpos", "margins")
