@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -265,5 +266,14 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         return tomllib.loads(Path(path).read_text("utf-8-sig"))
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise StorageError(f"{path} is not valid TOML: {error}") from error
+    except UnicodeDecodeError as error:
+        raise StorageError(f"{path} is not valid TOML: it must be text in UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        hint = "; a number takes a point, not a comma" if _comma(Path(path), str(error)) else ""
+        raise StorageError(f"{path} is not valid TOML: {error}{hint}") from error
+
+
+def _comma(path: Path, error: str) -> bool:
+    """Whether the line of a TOML file that an error names has a number with a decimal comma."""
+    line = re.search(r"at line (\d+)", error)
+    return bool(line and re.search(r"=\s*[-+]?\d+,\d", path.read_text("utf-8-sig").splitlines()[int(line[1]) - 1]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import codecs
+import errno
 import gc
 import importlib
 import io
@@ -73,7 +74,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # `_flushed` sees to it
         return 0
     except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
-        where = f"{error.filename}: " if error.filename else ""
+        where = (
+            f"{error.filename}: "
+            if error.filename
+            else "cannot write to standard output: " * (error.errno == errno.ENOSPC)
+        )
         print(f"dualball: error: {where}{error.strerror or error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as error:

@@ -215,7 +215,7 @@ def design(parser: Parser) -> None:
 def render(parser: Parser) -> None:
     """A picture or film of a run: the scene, contact forces, slip, case."""
     parser.add_argument("file", type=Path, help="a run")
-    parser.add_argument("-o", "--output", type=FILM, required=True, help="picture.png, film.gif, or page.html")
+    parser.add_argument("-o", "--output", type=FILM, required=True, help="picture.png, film.gif, film.mp4 or page.html")
     pixels, rates = Number(allowed=Range(160, 1920, whole=True)), Number(allowed=Range(1, 1000, whole=True))
     at = "time of the run: of a picture (default: the end), where a film or page begins"
     parser.add_argument("--at", type=options.moment, help=at)

@@ -14,6 +14,8 @@ from typing import NoReturn
 from model.files import leave
 
 _BOTH = (signal.SIGINT, signal.SIGTERM)
+_PATIENCE = 2.0
+"""Of what is to stop by itself, s."""
 _WAITS = 200
 """How often a signal waits for an import, .01 s at a time: a user's own engine may be one that never ends."""
 
@@ -56,6 +58,31 @@ def answered(answer: Callable[[int, FrameType | None], object]) -> Iterator[Call
 
 
 @contextmanager
+def noted() -> Iterator[list[int]]:
+    """The first signal is but noted in what is yielded. What goes on for seconds, as a compiler does, gets it again."""
+    heard, sent = list[int](), list[threading.Timer]()
+
+    def note(number: int, frame: FrameType | None) -> None:
+        heard.append(number)
+        sent.append(_again(number, _PATIENCE))
+
+    with answered(note):
+        try:
+            yield heard
+        finally:
+            for each in sent:
+                each.cancel()
+
+
+def _again(number: int, seconds: float) -> threading.Timer:
+    """Send a signal a little later."""
+    timer = threading.Timer(seconds, os.kill, (os.getpid(), number))
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+@contextmanager
 def raised() -> Iterator[None]:
     """The first signal raises `Interrupted`, also where a library makes another error of it.
 
@@ -66,9 +93,7 @@ def raised() -> Iterator[None]:
 
     def later(number: int) -> None:
         listen()
-        again = threading.Timer(0.01, os.kill, (os.getpid(), number))
-        again.daemon = True
-        again.start()
+        _again(number, 0.01)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if _imports(frame) and len(waits) < _WAITS:

@@ -28,8 +28,8 @@ def run(args: argparse.Namespace) -> int:
         return live(args)
     args.time = args.time or DURATION
     task = running.task(args, options.parameters(args), flow=running.flow(args))
-    heard: list[int] = []  # the first signal ends the run with its samples, the second without
-    with tempfile.TemporaryDirectory() as scratch, signals.answered(lambda number, _: heard.append(number)):
+    # The first signal ends the run with its samples, the second without.
+    with tempfile.TemporaryDirectory() as scratch, signals.noted() as heard:
         path = args.output or Path(scratch) / "run.h5"
         failure = store(task, path, stop=lambda: bool(heard))
         about = inspection.describe(failed_path(path) if failure else path)

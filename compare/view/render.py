@@ -66,7 +66,7 @@ def write(
     rate: int | None = None,
     **arrows: Any,
 ) -> str:
-    """Write a picture (png), a film (gif), both in 16:10, or a page (html); return in words what was written.
+    """Write a picture (png), a film (gif, mp4), both in 16:10, or a page (html); return in words what was written.
 
     Parameters
     ----------
@@ -76,12 +76,14 @@ def write(
         `time` in s, less if the run ends before; 6 s at 20 frames a second, of a page 60 s at 60
     arrows : `force_arrow` and `slip_arrow` of `frames`
 
-    Raises `InputError` for what can't be shown, or on a machine without OpenGL; `StorageError` if the file can't be
-    written.
+    Raises `InputError` for what can't be shown, on a machine without OpenGL, or for an mp4 where PyAV, an extra, isn't
+    installed; `StorageError` if the file can't be written.
     """
     kind = output.suffix.lower()
-    if kind not in (".png", ".gif", ".html"):
-        raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif, a page to look round in an .html")
+    if kind not in (".png", ".gif", ".mp4", ".html"):
+        raise InputError(
+            f"cannot write {output}: a picture is a .png, a film a .gif or .mp4, a page to look round in an .html"
+        )
     check_writable(output)
     unused: dict[str, Any] = {"time": time, "speed": speed, "rate": rate} if kind == ".png" else {}
     for name, value in (unused or {"width": width if kind == ".html" else None}).items():
@@ -114,24 +116,54 @@ def write(
     slips = bool(np.any(run.slip_speed_A + run.slip_speed_B))
     pairs = frames(run, times, width, **arrows)
     images = (_labelled(*pair, shown, k, note, slips) for k, pair in enumerate(pairs))
-    first, options = next(images), dict[str, Any](optimize=True)
-    if film:
-        # 256 colours for all frames, so that none flickers: half from the first, half shades of those that mean
-        # something, since what moves is small, and a palette of the first frame alone would make it grey.
-        seen = first.quantize(120, dither=Image.Dither.NONE).getpalette() or []
-        meant = np.array([to_rgb(colour) for colour in (*style.COLOURS.values(), FORCE, SLIP, BALL)])
-        shades = np.linspace(0.45, 1.0, 6)[:, None, None] * meant
-        tints = 1 - (1 - meant) * np.array([0.25, 0.5, 0.75])[:, None, None]
-        chosen = np.concatenate([shades.reshape(-1, 3), tints.reshape(-1, 3)])
-        palette = Image.new("P", (1, 1))
-        palette.putpalette([*seen[:360], *np.round(255 * chosen).astype(int).ravel().tolist()])
-        all_ = itertools.chain([first], images)
-        first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in all_)
-        options = {"save_all": True, "append_images": rest, "duration": round(1000 / rate), "loop": 0}
-    out = io.BytesIO()
-    first.save(out, kind[1:], **options)
-    write_bytes(output, out.getvalue())
-    return f"{output}: {len(times)} frames" if film else f"{output}: {width} × {first.height}"
+    if kind == ".mp4":
+        content = _mp4(images, rate)
+    elif film:
+        content = _gif(images, rate)
+    else:
+        out = io.BytesIO()
+        next(images).save(out, "png", optimize=True)
+        content = out.getvalue()
+    write_bytes(output, content)
+    return f"{output}: {len(times)} frames" if film else f"{output}: {width} × {width * 10 // 16}"
+
+
+def _gif(images: Iterator[Image.Image], rate: int) -> bytes:
+    """A film in 256 colours for all frames, so that none flickers.
+
+    Half are from the first, half are shades of those that mean something, since what moves is small, and a palette of
+    the first frame alone would make it grey.
+    """
+    first = next(images)
+    seen = first.quantize(120, dither=Image.Dither.NONE).getpalette() or []
+    meant = np.array([to_rgb(colour) for colour in (*style.COLOURS.values(), FORCE, SLIP, BALL)])
+    shades = np.linspace(0.45, 1.0, 6)[:, None, None] * meant
+    tints = 1 - (1 - meant) * np.array([0.25, 0.5, 0.75])[:, None, None]
+    chosen = np.concatenate([shades.reshape(-1, 3), tints.reshape(-1, 3)])
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*seen[:360], *np.round(255 * chosen).astype(int).ravel().tolist()])
+    all_ = itertools.chain([first], images)
+    first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in all_)
+    out, duration = io.BytesIO(), round(1000 / rate)
+    first.save(out, "gif", optimize=True, save_all=True, append_images=rest, duration=duration, loop=0)
+    return out.getvalue()
+
+
+def _mp4(images: Iterator[Image.Image], rate: int) -> bytes:
+    """A film in H.264, of even width and height as that needs. Raises `InputError` if PyAV, an extra, isn't there."""
+    try:
+        av = importlib.import_module("av")
+    except ImportError as error:
+        raise InputError("an mp4 needs PyAV: pip install 'dualball[film]'") from error
+    out, first = io.BytesIO(), next(images)
+    with av.open(out, "w", format="mp4") as film:
+        stream = film.add_stream("h264", rate=rate, options={"crf": "18"})
+        stream.width, stream.height, stream.pix_fmt = first.width // 2 * 2, first.height // 2 * 2, "yuv420p"
+        for image in itertools.chain([first], images):
+            even = image.crop((0, 0, stream.width, stream.height))
+            film.mux(stream.encode(av.VideoFrame.from_image(even)))
+        film.mux(stream.encode())
+    return out.getvalue()
 
 
 def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, note: str, slips: bool) -> Image.Image:

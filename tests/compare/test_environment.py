@@ -66,7 +66,7 @@ def test_any_backend_and_no_home(here, backend, home):
 def test_a_full_output_is_said(here, words):
     done = dualball(here, words, before=">/dev/full")
     assert (done.returncode, done.stdout) == (2, b"")
-    assert done.stderr.startswith(b"dualball: error: ")
+    assert done.stderr.startswith(b"dualball: error: cannot write to standard output: ")
     assert done.stderr.endswith(b"No space left on device\n")
     assert done.stderr.count(b"\n") == 1
 

@@ -1,6 +1,7 @@
 """Pictures, films and pages of runs show the case and the ball where it is, or say clearly why they can't."""
 
 import dataclasses
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -78,6 +79,23 @@ def test_command_writes_pictures_and_films(run: Trajectory, tmp_path: Path, caps
     assert "320 × 200" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("draws")
+def test_a_film_as_mp4(run, tmp_path, monkeypatch):
+    """Of even size, as its standard wants it: 330 × 206 of 331 × 206."""
+    av, film = pytest.importorskip("av"), tmp_path / "film.mp4"
+    assert render.write(run, film, at=0.2, time=0.4, speed=0.5, rate=10, width=331) == f"{film}: 5 frames"
+    with av.open(film) as read:
+        shown = [frame.to_image() for frame in read.decode(video=0)]
+        assert read.streams.video[0].average_rate == 10
+    assert [image.size for image in shown] == 5 * [(330, 206)]
+    assert np.mean(np.abs(np.asarray(shown[0], float) - np.asarray(shown[-1], float)) > 20) > 0.01  # it moves
+    film.unlink()
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(InputError, match=r"an mp4 needs PyAV: pip install 'dualball\[film\]'"):
+        render.write(run, film)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_page_plays_in_a_browser_without_network(browser, run, tmp_path):
     """Frames, numbers and the case follow the slider; nothing is fetched, nothing fails."""
     pytest.importorskip("nicegui")
@@ -130,7 +148,7 @@ def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("film.mp4", {}, r"cannot write film\.mp4: a picture is a \.png, a film a \.gif, a page"),
+        ("film.avi", {}, r"cannot write film\.avi: a picture is a \.png, a film a \.gif or \.mp4, a page"),
         ("nowhere/p.png", {}, "there is no directory nowhere"),
         ("p.png", {"rate": 5}, "a picture has no rate"),
         ("p.html", {"width": 640}, "a page has no width"),

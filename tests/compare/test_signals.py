@@ -168,3 +168,17 @@ def test_an_import_is_not_cut_short(number, lasts, tmp_path, monkeypatch):
     with pytest.raises(signals.Interrupted), signals.raised():
         work()
     assert hasattr(sys.modules.pop(f"slow_{number}", None), "whole") is (lasts == "0.2")
+
+
+@BOTH
+@pytest.mark.usefixtures("hears")
+def test_what_should_stop_by_itself_and_does_not_is_stopped(number):
+    """As a compiler that a run waits for, on a machine where nothing is compiled yet."""
+
+    def work():
+        os.kill(os.getpid(), number)
+        time.sleep(60)
+
+    with pytest.raises(signals.Interrupted), signals.raised(), signals.noted() as heard:
+        work()
+    assert heard == [number]

@@ -154,6 +154,7 @@ def test_ranges(allowed, inside, outside, words):
         ("m = 0.03\nmuu = 0.2", "unknown parameter 'muu' (did you mean 'mu'?)"),
         ("m = 0.03", "missing parameter 'r', 'R', 'j'"),
         ("m = ", "is not valid TOML"),
+        ("m = 1\nmu = 0,2\n", "line 2, column 7); a number takes a point, not a comma"),
         ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\nm = 1\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 2.0", "m follows"),
         ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu = 1e-6", "unknown fluid property 'nu'"),
         ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = 1e-6\nrho_f = 2.0\nrho_b = 1.0", "floats"),
