@@ -95,7 +95,7 @@ class Run:
         scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
         built = {p: (build or scene.build)(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
-        given = models, parameters, settings, states, theta_0
+        given = models, scenes, settings, states, theta_0
         self._stepper: Free | Polar
         if settings.coordinates == "free":
             from mjsim.free import Free  # here, because the law of its contacts takes long to load

@@ -16,7 +16,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -26,7 +26,7 @@ from mujoco.batch import MODEL_FIELDS, Batch
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Velocity, near_axis
+from mjsim.corrections import Ball, Velocity, ball_of, near_axis
 from model import Parameters, State
 from model.arrays import Array
 from model.kinematics import slip_speeds
@@ -46,7 +46,7 @@ class Polar:
 
     Parameters
     ----------
-    models, parameters, x0s : one of each for every run; full states (8,)
+    models, parameters, x0s : one of each for every run; full states (8,); omega_0 is that of the steps
     settings : shared by all runs
     theta_0 : azimuth at the start, rad
     batched : whether to use MuJoCo's batch; more than one run needs it
@@ -64,7 +64,6 @@ class Polar:
         self._drive, self._h, self.lead = compiled.drive, settings.timestep, settings.timestep * settings.midpoint
         """What is done before a step; the step, and how far places are ahead of velocities, s."""
         self._qpos, self._qvel, sensors = array("qpos"), array("qvel"), array("sensordata")
-        self._gaps = self._qpos[2:0:-1]
         self.margins, self._sensors = array("pair_margin")[:2], sensors.T
         """Margins of the contacts, shape (2, runs), m."""
         surfaces, self._start = array("geom_surfacevel"), array("qacc_warmstart")
@@ -78,12 +77,15 @@ class Polar:
         """Those among them that did so in the last one."""
         self._calm = set[int]()
         """Those that begin without a blow: they go on upon their joints after a step, however forces change."""
-        self._state = self._forces, self._qvel, self._last, self._qpos, self.margins
+        given = {"forces": self._forces, "qvel": self._qvel, "last": self._last, "qpos": self._qpos}
+        given["margins"] = self.margins
+        self._state = given | {"start": self._start, "due": self._due}
+        """All that is carried from one step to the next."""
         self._arguments = (
             np.array([Ball.of(p, settings) for p in parameters]).T, self._due, self._held, array("qfrc_constraint"),
-            sensors[recorder.NORMALS], *self._state, array("mocap_quat"), array("qfrc_applied"), floor, wall,
+            sensors[recorder.NORMALS], *given.values(), array("mocap_quat"), array("qfrc_applied"), floor, wall,
         )  # fmt: skip
-        self._fine: dict[Parameters, Fine] = {}
+        self._fine = functools.cache(functools.partial(_fine, settings=settings))
         for run, (x0, p) in enumerate(zip(x0s, parameters, strict=True)):
             x = State.of(x0)
             place, v = recorder.joint_state(x, theta_0, p)
@@ -91,91 +93,79 @@ class Polar:
                 self._calm.add(run)
             self._set(run, place[:3], v, np.zeros(6))
 
-    def _finely(self, p: Parameters) -> Fine:
-        """What takes fine steps with such a ball."""
-        still = p.replace(omega_0=0.0)
-        if still not in self._fine:
-            from mjsim.landing import Fine  # here, because the law takes long to load
-
-            self._fine[still] = Fine(still, self._settings)
-        return self._fine[still]
-
     def _set(self, run: int, place: Array, v: Array, rates: Array) -> None:
         """Let a run go on from a place and velocities at one time, with such accelerations and the forces it has."""
         self._qvel[:, run], self._last[:, run], self._start[:, run] = v, v - self._h * rates, rates
         self._qpos[:3, run] = place + self.lead * (v + rates * self.lead / 2)[:3]
         self._held[run] = True
 
-    def _bear(self, run: int, place: Array, v: Array) -> None:
-        """Give the contacts of a run the margins with which they bear their forces."""
-        if self._settings.servo:
-            p, (_, h, y), loads = self._parameters[run], place, self._forces[6:, run] / self._parameters[run].m
-            x = recorder.state(np.append(place, [1.0, 0, 0, 0]), v, p)
-            bears = p.g, min(p.g, (p.R - h) * v[0] ** 2)
-            given = zip((y, h), loads, (p.mu, p.eta), slip_speeds(x.stacked(), p), bears, strict=True)
-            self.margins[:, run] = [self._settings.held(*map(float, each)) for each in given]
-
     def advance(self, omega_0: Array, rows: Array | None = None) -> None:
         """Take steps with omega_0 (steps, runs), and note each in rows (steps, runs, `COLUMNS`)."""
         scratch = np.empty((len(self._due), recorder.COLUMNS))
         for fluid, row in zip(omega_0, itertools.repeat(scratch) if rows is None else rows, strict=False):
             some = self._drive(fluid, row, *self._arguments)
-            lands = [(run, *self._where(run), self._gaps[:, run].copy()) for run in self._landing()] if some else []
+            lands = list(self._landing()) if some else []
             self._last[:] = self._qvel
             self._step()
             self._held[:] = self._due[:] = False
             row[:, recorder.SENSORS :] = self._sensors
             for run, x, theta, rates, gaps in lands:
-                landed = self._finely(self._parameters[run]).step(
-                    x, theta, rates, float(fluid[run]), run in self._again
-                )
+                fine = self._fine(self._parameters[run])
+                landed = fine.step(x, theta, rates, float(fluid[run]), run in self._again)
                 self._land(run, landed)
                 row[run, recorder.SENSORS :], row[run, -2:] = landed.seen, gaps
 
-    def _landing(self) -> list[int]:
-        """Runs that land in the coming step, but for those that have diverged."""
-        sound = (np.abs(self._qpos) < HUGE).all(axis=0) & (np.abs(self._qvel) < HUGE).all(axis=0)
-        runs: list[int] = np.flatnonzero(self._due & sound).tolist()
-        return runs
+    def _landing(self) -> Iterator[tuple[Any, ...]]:
+        """Runs that land in the coming step, but for those that have diverged.
 
-    def _where(self, run: int) -> tuple[State, float, Array]:
-        """State and azimuth of a run at the time of its velocities, and what a second changes of these."""
-        qpos, v, lead = self._qpos[:, run].copy(), self._qvel[:, run], self.lead
-        rates = (v - self._last[:, run]) / self._h
-        qpos[:3] -= lead * (v + rates * lead / 2)[:3]
-        return recorder.state(qpos, v, self._parameters[run]), float(qpos[0]), rates
+        Of each its number; state and azimuth at the time of its velocities, what a second changes of these; and gaps.
+        """
+        sound = (np.abs(self._qpos) < HUGE).all(axis=0) & (np.abs(self._qvel) < HUGE).all(axis=0)
+        for run in np.flatnonzero(self._due & sound).tolist():
+            qpos, v, lead = self._qpos[:, run].copy(), self._qvel[:, run], self.lead
+            gaps, rates = qpos[2:0:-1].copy(), (v - self._last[:, run]) / self._h
+            qpos[:3] -= lead * (v + rates * lead / 2)[:3]
+            yield run, recorder.state(qpos, v, self._parameters[run]), float(qpos[0]), rates, gaps
 
     def _land(self, run: int, landed: Landed) -> None:
-        """Go on after a step in fine ones: upon the joints, if forces change slowly and the axis is far."""
-        p, ball, (omega_c, *_) = self._parameters[run], Ball(*self._arguments[0][:, run]), landed.velocity
-        near = near_axis(p.R - landed.place[1], Velocity(*landed.velocity), ball) and landed.forces[7] == 0
-        pace = max(abs(omega_c), math.sqrt(p.g / p.R))
+        """Go on after a step in fine ones: upon the joints, if forces change slowly and the axis is far.
+
+        The contacts get margins with which they bear their forces.
+        """
+        p, (_, h, y), v = self._parameters[run], landed.place, landed.velocity
+        near = near_axis(p.R - h, Velocity(*v), ball_of(self._arguments[0], run)) and landed.forces[7] == 0
+        pace = max(abs(v[0]), math.sqrt(p.g / p.R))
         most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(landed.forces[[1, 2]]).max())
         fast = landed.change > _CHANGE * self._h * pace * most and run not in self._calm
         self._due[run] = near or fast
         self._calm.discard(run)
         self._again = self._again | {run} if self._due[run] else self._again - {run}
         self._forces[:, run] = landed.forces
-        self._set(run, landed.place, landed.velocity, landed.rates * (not near))
-        self._bear(run, landed.place, landed.velocity)
+        self._set(run, landed.place, v, landed.rates * (not near))
+        if self._settings.servo:
+            x = recorder.state(np.append(landed.place, [1.0, 0, 0, 0]), v, p)
+            bears, loads = (p.g, min(p.g, (p.R - h) * v[0] ** 2)), landed.forces[6:] / p.m
+            given = zip((y, h), loads, (p.mu, p.eta), slip_speeds(x.stacked(), p), bears, strict=True)
+            self.margins[:, run] = [self._settings.held(*map(float, each)) for each in given]
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""
-        return {name: values.copy() for name, values in self._carried().items()}
+        np.copyto(self._forces, np.concatenate(self._arguments[3:5]), where=~self._held)
+        return {name: values.copy() for name, values in self._state.items()}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from such a state."""
-        for name, values in self._carried().items():
+        for name, values in self._state.items():
             values[...] = state[name]
         self._held[:], self._again = True, set(np.flatnonzero(self._due).tolist())
         self._calm.clear()
 
-    def _carried(self) -> dict[str, Array]:
-        names = ("forces", "qvel", "last", "qpos", "margins")
-        if not self._held.all():
-            contact, normals = self._arguments[3:5]
-            np.copyto(self._forces, np.concatenate([contact, normals]), where=~self._held)
-        return dict(zip(names, self._state, strict=True)) | {"start": self._start, "due": self._due}
+
+def _fine(p: Parameters, settings: ContactSettings) -> Fine:
+    """What takes fine steps with such a ball."""
+    from mjsim.landing import Fine  # here, because the law takes long to load
+
+    return Fine(p, settings)
 
 
 def _single(model: Any) -> tuple[Any, Callable[[str], Array], Callable[[], Any]]:
