@@ -56,7 +56,7 @@ class Run:
     batched : whether to use MuJoCo's batch even for one run. Its results don't depend on how many runs share it,
         to the bit; a single run outside is faster and rounds differently.
     journal : keeps what was done, and knows what an earlier process did
-    progress : called with the fraction done, from time to time
+    progress : called with the fraction done, from time to time; an error that it raises ends the runs
     build : makes the MuJoCo model, and its MJCF as text, of parameters and settings; `scene.build` if None
 
     Each iteration yields `Blocks`. A run that diverges, or is given up as its steps are divided again and again, yields
@@ -80,12 +80,12 @@ class Run:
         theta_0: float = 0.0,
         batched: bool = True,
         journal: Journal | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], object] | None = None,
         build: Callable[[Parameters, ContactSettings], tuple[Any, str]] | None = None,
     ) -> None:
         limits.check_runs(parameters, x0s, flows, settings)
         self._parameters, self._flows, self._settings = list(parameters), list(flows), settings
-        self._journal, self._progress = journal, progress
+        self._journal, self._progress = journal, progress or (lambda done: None)
         self._interval, self._count = limits.sampling(t_end, settings.timestep, sample_interval)
         theta_0 = check_number("theta_0", theta_0, "rad")
         states = [State.one(x0) for x0 in x0s]
@@ -104,10 +104,9 @@ class Run:
         else:
             self._stepper = Polar(*given, batched or len(models) > 1)
         shown = dataclasses.asdict(settings) | {
-            "t_end": float(t_end),
-            "sample_interval": self._interval * settings.timestep,
-        }
-        shown |= {"x0": None, "theta_0": theta_0, "event_times": EVENT_TIMES}
+            "t_end": float(t_end), "sample_interval": self._interval * settings.timestep, "x0": None,
+            "theta_0": theta_0, "event_times": EVENT_TIMES,
+        }  # fmt: skip
         self.headers = [
             Header("mujoco", p, flow, shown | {"x0": list(x)}, built[still][1])
             for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
@@ -127,7 +126,6 @@ class Run:
         """Samples of each run whose case is not yet decided."""
         self._ends = [math.inf] * len(parameters)
         """When each run broke down, s."""
-        self._check: Callable[[], object] = lambda: None
 
     @property
     def events(self) -> list[Events]:
@@ -150,13 +148,13 @@ class Run:
             done += len(raw)
         first = step
         while step < self._steps and not all(header.failure for header in self.headers):
-            self._check()
             rows = self._rows[: self._steps - step]
             time = (step + np.arange(len(rows)) + 0.5) * self._settings.timestep
             self._stepper.advance(np.stack([flow(time) for flow in self._flows], axis=-1), rows)
             kept.append(rows[-step % self._interval :: self._interval].copy())
             step += len(rows)
             self._classifier.add(recorder.contacts(rows), step == self._steps)
+            self._progress(step / self._steps)
             if step < self._steps and step - first < BLOCK_STEPS and sum(map(len, kept)) < BLOCK:
                 continue
             raw, kept, first = np.concatenate(kept), [], step
@@ -166,10 +164,9 @@ class Run:
             yield self._finish(done, raw)
             done += len(raw)
 
-    def trajectories(self, check: Callable[[], object] = lambda: None) -> list[Trajectory]:
-        """All runs, carried out to their ends; `check` is called from time to time, and may raise an error."""
+    def trajectories(self) -> list[Trajectory]:
+        """All runs, carried out to their ends."""
         kept: list[Blocks] = [[] for _ in self.headers]
-        self._check = check
         for blocks in self:
             for own, block in zip(kept, blocks, strict=True):
                 own.append(block)
@@ -202,8 +199,6 @@ class Run:
                 ready = len(part) if over else int(np.searchsorted(steps, self._classifier.decided))
                 part["case"] = self._classifier.cases(i, steps)
                 blocks[i], self._waiting[i] = part[:ready], part[ready:]
-        if self._progress:
-            self._progress(last / self._count)
         return blocks
 
 
@@ -278,9 +273,11 @@ def simulate_many(
     # The softest settings that any of the runs asks for.
     settings = settings or min((ContactSettings.for_problem(p) for p in parameters), key=lambda s: s.solimp)
     how: dict[str, Any] = {"sample_interval": sample_interval, "theta_0": theta_0}
-    shares, done = [slice(k, None, parts) for k in range(parts)], [0.0] * parts
+    shares, done, over = [slice(k, None, parts) for k in range(parts)], [0.0] * parts, threading.Event()
 
     def report(part: int, fraction: float) -> None:
+        if over.is_set():  # another thread has raised an error
+            raise CancelledError
         done[part] = fraction
         if progress:
             progress(sum(done) / parts)
@@ -290,21 +287,10 @@ def simulate_many(
         for k, own in enumerate(shares)
     ]
     found: list[Any] = [None] * len(flows)
-    for own, trajectories in zip(shares, _carried_out(runs), strict=True):
-        found[own] = trajectories
-    return found
-
-
-def _carried_out(runs: Sequence[Run]) -> list[list[Trajectory]]:
-    """The trajectories of runs, a thread for each; all of them stop if one raises an error."""
-    over = threading.Event()
-
-    def check() -> None:
-        if over.is_set():
-            raise CancelledError
-
-    with ThreadPoolExecutor(len(runs)) as pool:
+    with ThreadPoolExecutor(parts) as pool:
         try:
-            return list(pool.map(lambda run: run.trajectories(check), runs))
+            for own, trajectories in zip(shares, pool.map(Run.trajectories, runs), strict=True):
+                found[own] = trajectories
         finally:
             over.set()
+    return found

@@ -131,7 +131,7 @@ def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -
             )
             for task in tasks
         ]
-    return _begun(tasks).trajectories(check)
+    return _begun(tasks, progress=lambda done: check()).trajectories()
 
 
 def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:
@@ -194,9 +194,9 @@ def journal_path(task: Task, path: Path) -> Path:
     return path.with_name(f"{task.key}.journal")
 
 
-def _begun(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
+def _begun(tasks: Sequence[Task], journal: Journal | None = None, **more: Any) -> mjsim.Run:
     """Runs that hand out their samples, in a batch unless they are long."""
-    first, more = tasks[0], {"batched": not tasks[0].long, "journal": journal}
+    first, more = tasks[0], more | {"batched": not tasks[0].long, "journal": journal}
     parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
     run = parameters, x0s, first.t_end, flows, first.settings
     assert first.simulator.stream
