@@ -136,16 +136,16 @@ class Free:
         kept = np.empty((len(self._balls), mujoco.mj_stateSize(self._balls[0].model, _INTEGRATION)))
         for ball, own in zip(self._balls, kept, strict=True):
             mujoco.mj_getState(ball.model, ball.data, own, _INTEGRATION)
-        laws = [(k, *kept) for k, ball in enumerate(self._balls) for kept in ball.law_state().items()]
-        theta = np.array([ball.theta for ball in self._balls])
-        return {f"{name}_{k}": values for k, name, values in laws} | {"integration": kept, "theta": theta}
+        laws = {k: ball.law.state() for k, ball in enumerate(self._balls) if ball.law}
+        known = {f"{name}_{k}": values for k, law in laws.items() for name, values in law.items()}
+        return known | {"integration": kept, "theta": np.array([ball.theta for ball in self._balls])}
 
     def restore(self, state: dict[str, Array]) -> None:
         for k, ball in enumerate(self._balls):
             mujoco.mj_setState(ball.model, ball.data, state["integration"][k], _INTEGRATION)
             ball.theta = float(state["theta"][k])
             if ball.law:
-                ball.law.restore({name: state[f"{name}_{k}"] for name in ball.law_state()})
+                ball.law.restore({name: state[f"{name}_{k}"] for name in ball.law.state()})
 
 
 class FreeBall:
@@ -192,10 +192,6 @@ class FreeBall:
             place = to_world(there, theta + self.ahead * float(x.omega_c), self.p).position
         self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:6] = [*now.velocity, *now.spin]
-
-    def law_state(self) -> dict[str, Array]:
-        """What the law of rigid contacts remembers, if there is one."""
-        return self.law.state() if self.law else {}
 
     def advance(self, fluid: Array, rows: Array) -> None:
         """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
