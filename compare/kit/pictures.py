@@ -8,6 +8,7 @@ A label that begins with an underscore names a series that no legend lists, as i
 
 from __future__ import annotations
 
+import functools
 import io
 import json
 import re
@@ -16,12 +17,14 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from matplotlib import textpath
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
 from matplotlib.container import Container
 from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import FixedFormatter
 
 from compare.kit.pages import typeset
@@ -32,6 +35,9 @@ _FEW = 4
 _UNNAMED = re.compile(r"_child\d+|_nolegend_|")
 _TEX = {r"\omega": "ω", r"\Omega": "Ω", r"\eta": "η", r"\mu": "μ", r"\rho": "ρ", r"\nu": "ν"}
 _TEX |= {r"\Delta": "Δ", r"\sqrt{R/g}": "√(R/g)", r"^0": "⁰"}
+_textpath: Any = textpath
+_textpath.MathTextParser = functools.cache(MathTextParser)
+"""One for all figures, which remembers formulas: matplotlib makes one for each, and parses its labels anew."""
 for _prefix, _uri in (("", _SVG), ("xlink", _XLINK)):
     ElementTree.register_namespace(_prefix, _uri[1:-1])
 
@@ -42,8 +48,9 @@ def svg(figure: Figure) -> str:
     for gid, (artist, _) in parts.items():
         artist.set_gid(gid)
     out = io.BytesIO()
-    if any(axes.child_axes for axes in figure.axes):  # second scales know their limits only once they were drawn
-        figure.draw_without_rendering()
+    renderer: Any = RendererSVG
+    for second in (each for axes in figure.axes for each in axes.child_axes):
+        second.draw(renderer(1, 1, io.StringIO()))  # it knows its limits only once it was drawn
     canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
     canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
     root = ElementTree.fromstring(re.sub(rb">\s+<", b"><", out.getvalue()))
