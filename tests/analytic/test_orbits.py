@@ -1,5 +1,7 @@
 """Periodic motions close, are as stable as their multipliers say, and motions from many starts come to what they do."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -167,6 +169,15 @@ def test_lyapunov_exponent_of_an_orbit_is_zero(hop):
     # The first of the ten parts has the decay of what lies across, with the modulus of the largest multiplier.
     decay = -np.log(np.abs(hop.multipliers[0])) / hop.period
     assert abs(exponent) <= 3 * error + 0.1 * decay
+
+
+def test_lyapunov_exponent_of_a_known_growth():
+    """Neighbours part by a factor of e every 1/0.3 s."""
+
+    def run(p, x, duration, interval):
+        return SimpleNamespace(x=np.array([x, x * np.exp(0.3 * duration)]), case=[Case.NN], cases=[Case.NN])
+
+    assert fates.lyapunov(HOPPING, np.zeros(8), 20.0, 0.5, run) == pytest.approx((0.3, 0.0), abs=1e-6)
 
 
 def torus(time, z):

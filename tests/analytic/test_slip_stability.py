@@ -107,6 +107,13 @@ def test_counter_example_to_the_claim_after_80():
         assert (extreme(1, Case.RR, Case.SS, x, q)[1] > 0) == grows
 
 
+def test_normal_forces_while_a_slip_is_slight():
+    """Where the wall alone slips the floor bears the weight, and the wall what turns the spin, too."""
+    x, n = State(omega_c=5.0), np.array([1.0])
+    _, A_y, B_x = slip.slip_rates(Case.RR, Case.RS, x, n, P)
+    assert (A_y, B_x) == pytest.approx((P.m * P.g, (1 + P.j) * P.m * P.R * 25.0))
+
+
 # --- arrows -----------------------------------------------------------------------------------------------------
 
 

@@ -1,6 +1,6 @@
 """Wrong theories by a referee, who had read `analytic` and the paper, and neither `theories` nor any claim.
 
-Judged once, before anything was changed: the share that is noticed says more than that of the list the claims grew with.
+Judged once, before anything was changed: the share that is noticed says more than that of a list claims grew with.
 """
 
 from __future__ import annotations
@@ -11,13 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from analytic.flowmeter.real_fluid import Rolling
 from analytic.mechanics import drag, rolling_forces
 from analytic.mechanics.contact_problem import Impulse
-from analytic.mechanics.rigid_body import Forces
 from analytic.simulation import two_point_rolling
 from analytic.slipping import slip_stability
-from analytic.slipping.slip_stability import SlipStability
 from analytic.stationary import slipping_branch
 from model import Case, State
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
@@ -45,40 +42,40 @@ def _by_largest_term(right: Function, acceleration: Any, p: Any) -> Any:
     return np.minimum.reduce(alone) if alone else right(acceleration, p)
 
 
-def _fall_without_its_drag(right: Function, t: Any, y: float, v_y: float, p: Any) -> tuple[Any, Any]:
+def _fall_without_its_drag(right: Function, t: Any, y: float, v_y: float, p: Any) -> Any:
     return y + v_y * t - p.g * t**2 * drag.ramp_lag(p.c * t), drag.fall_speed(t, v_y, p)
 
 
-def _rs_floor(right: Function, x: Any, p: Any, omega_0: Any, slip_B: Any) -> Forces:
+def _rs_floor(right: Function, x: Any, p: Any, omega_0: Any, slip_B: Any) -> Any:
     f, lag = right(x, p, omega_0, slip_B), x[2] - omega_0
     return f._replace(A_z=p.j * p.m * p.R * drag.of_velocity(0.0, 0.0, p.R * lag, p) * lag / (1 + p.j))
 
 
-def _sr_without_slip(right: Function, x: Any, p: Any, omega_0: Any, slip_A: Any) -> Forces:
+def _sr_without_slip(right: Function, x: Any, p: Any, omega_0: Any, slip_A: Any) -> Any:
     return right((*x[:3], 0.0, *x[4:]), p, omega_0, slip_A)
 
 
-def _ss_uncoupled(right: Function, x: Any, p: Any, omega_0: Any, slip_A: Any, slip_B: Any) -> Forces:
+def _ss_uncoupled(right: Function, x: Any, p: Any, omega_0: Any, slip_A: Any, slip_B: Any) -> Any:
     f, B_x, (s, c) = right(x, p, omega_0, slip_A, slip_B), p.m * p.R * x[2] ** 2, slip_B
     return f._replace(B_x=B_x, B_y=p.eta * B_x * c, B_z=-p.eta * B_x * s)
 
 
-def _nr_without_drag(right: Function, x: Any, p: Any, omega_0: Any) -> Forces:
+def _nr_without_drag(right: Function, x: Any, p: Any, omega_0: Any) -> Any:
     B_y = p.j * p.m * (p.g + p.R * x[2] ** 2 + p.r * x[2] * x[3]) / (1 + p.j)
     return right(x, p, omega_0)._replace(B_y=B_y)
 
 
-def _single_coriolis(right: Function, case: Case, x: Any, f: Any, p: Any, omega_0: Any) -> State:
+def _single_coriolis(right: Function, case: Case, x: Any, f: Any, p: Any, omega_0: Any) -> Any:
     rate = right(case, x, f, p, omega_0)
     return rate._replace(omega_c=rate.omega_c - x[7] * x[2] / (p.R - x[6]))
 
 
-def _sinking_keeps_spin(right: Function, case: Case, x: Any, f: Any, p: Any, omega_0: Any) -> State:
+def _sinking_keeps_spin(right: Function, case: Case, x: Any, f: Any, p: Any, omega_0: Any) -> Any:
     rate = right(case, x, f, p, omega_0)
     return rate._replace(slip_z=rate.slip_z + rate.v_y / p.r) if case is Case.NS else rate
 
 
-def _by_fluid_speed(right: Function, omega_c: Any, p: Any, omega_0: Any, B_y: Any) -> Forces:
+def _by_fluid_speed(right: Function, omega_c: Any, p: Any, omega_0: Any, B_y: Any) -> Any:
     f, c = right(omega_c, p, omega_0, B_y), drag.of_velocity(0.0, 0.0, p.R * np.real(omega_0), p)
     z = p.j * p.m * p.R * c * (omega_c - omega_0) / (1 + 2 * p.j)
     return f._replace(A_z=z, B_z=z)
@@ -105,7 +102,7 @@ def _all_share(right: Function, u: Any, z: Any, p: Any) -> Any:
     return np.maximum(k - rolling_forces._normal_forces(k, z, p.eta)[0], 0.0)
 
 
-def _square(right: Function, need: Impulse, friction: Any) -> Impulse:
+def _square(right: Function, need: Impulse, friction: Any) -> Any:
     given = right(need, friction)
     if need.n <= 0 or friction.s != 0 or friction.t != 0:
         return given
@@ -246,14 +243,14 @@ _STATIONARY: dict[str, list[Wrong]] = {
 # --- slipping ---
 
 
-def _alike_for_all(right: Function, case: Case, p: Any, omega_c: Any = None) -> SlipStability:
+def _alike_for_all(right: Function, case: Case, p: Any, omega_c: Any = None) -> Any:
     if case is not Case.RR or p.eta < p.j:
         return right(case, p, omega_c)
     Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     return slip_stability._sign(Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta), p.mu * (1 + p.eta))
 
 
-def _rs_without_j(right: Function, case: Case, p: Any, omega_c: Any = None) -> SlipStability:
+def _rs_without_j(right: Function, case: Case, p: Any, omega_c: Any = None) -> Any:
     if case is not Case.RS:
         return right(case, p, omega_c)
     return slip_stability._sign(p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2, p.mu)
@@ -287,7 +284,7 @@ def _beyond_fold_from_rr(right: Function, p: Any, mu: Any, eta: Any, omega_0: An
     return np.where(plane & 2, plane | 4, plane)
 
 
-def _inertia_without_g(right: Function, p: Any) -> dict[str, float]:
+def _inertia_without_g(right: Function, p: Any) -> Any:
     return {name: value * math.sqrt(1 - p.density_ratio) for name, value in right(p).items()}
 
 
@@ -317,7 +314,7 @@ _BIFURCATION: dict[str, list[Wrong]] = {
 # --- flowmeter ---
 
 
-def _mean_slope_to_fold(right: Function, p: Any) -> float:
+def _mean_slope_to_fold(right: Function, p: Any) -> Any:
     turn = slipping_branch.fold(p)
     if np.isnan(turn):
         return right(p)
@@ -325,7 +322,7 @@ def _mean_slope_to_fold(right: Function, p: Any) -> float:
     return float((b.Omega_c - start.Omega_c) / (b.Omega_0 - start.Omega_0))
 
 
-def _one_reading(right: Function, p: Any, omega_0: Any) -> tuple[Any, Any]:
+def _one_reading(right: Function, p: Any, omega_0: Any) -> Any:
     low, _ = right(p, omega_0)
     return low, low
 
@@ -341,7 +338,7 @@ def _layer_alone(right: Function, spin: Any, p: Any, layer: bool = True) -> Any:
     return stokes * np.maximum(1.0, 6.45 * np.sqrt(spin * p.r**2 / p.nu_f) / (16 * math.pi))
 
 
-def _fluid_without_spin(right: Function, p: Any, layer: bool = True) -> Rolling:
+def _fluid_without_spin(right: Function, p: Any, layer: bool = True) -> Any:
     found = right(p, layer)
     if not (p.fluid_torque and p.drag == STOKES and p.c):
         return found
@@ -430,7 +427,7 @@ _ORBITS: dict[str, list[Wrong]] = {
 # --- simulation ---
 
 
-def _turned(right: Function, case: int, at: Any, k: Any) -> tuple[float, float]:
+def _turned(right: Function, case: int, at: Any, k: Any) -> Any:
     alpha, beta = right(case, at, k)
     return alpha + math.pi, beta + math.pi
 
@@ -459,7 +456,7 @@ def _ss_floor(right: Function, case: int, *args: Any) -> Any:
     return (-k.mu * G * c_A, G, k.mu * G * s_A, *f[3:])
 
 
-def _rolls_like_sliding(right: Function, t: float, z: Any, k: Any, out: Any) -> None:
+def _rolls_like_sliding(right: Function, t: float, z: Any, k: Any, out: Any) -> Any:
     right(t, z, k, out)
     if k.case == Case.RN:
         out[2], out[3] = out[2] * (1 + k.j), out[3] * (1 + k.j)

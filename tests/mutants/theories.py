@@ -103,6 +103,11 @@ def _jams(right: Function) -> Function:
     return function
 
 
+def _whole_inertia(right: Function) -> Function:
+    """RS with the moment of inertia m r^2 where it asks for friction."""
+    return lambda p: [replace(s, exists=p.R * s.state.omega_c**2 <= p.mu * p.g) for s in right(p)]
+
+
 def _hopping(p: Parameters) -> bool:
     return p == Parameters.named("hopping")
 
@@ -216,6 +221,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "mechanics.dynamics.jacobian": {"Jacobians transposed": answer(lambda matrix: np.swapaxes(matrix, -1, -2))},
     "stationary.solutions._rr": {"RR exists at any flow": answer(_everywhere)},
     "stationary.solutions._rs": {
+        "RS on a smooth wall takes friction as if j were 1": _whole_inertia,
         "RS in a fluid that moves": lambda right: lambda p: right(p.replace(omega_0=0.0)),
     },
     "stationary.solutions._nr": {"NR at any flow": answer(_everywhere)},
@@ -240,6 +246,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "regions without SR": _without(Exists.SR),
         "regions in which the ball sinks at any flow": answer(lambda plane: plane | Exists.NS),
         "regions in which RR never ends for η > j": _rolls_for_ever,
+        "regions with SS beyond the fold from ω₀₁ on": answer(
+            lambda plane: np.where(plane & Exists.SS, plane | Exists.SS_BEYOND_FOLD, plane)
+        ),
     },
     "bifurcation.diagram.double_points": {
         "the fold is born at 5 % more η": answer(lambda points: [replace(x, eta=1.05 * x.eta) for x in points]),
@@ -274,6 +283,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "slipping.slip_stability.lift_acceleration": {
         "lift out of RR, SR and SS with 2 % more inertia": given(other(j=1.02)),
         "lift with 2 % more wall friction": given(other(eta=1.02)),
+        "a ball lifts twice as fast": scaled(2.0),
     },
     "slipping.slip_stability.lift_onset": {
         "a fluid that leads makes it lift 2 % early": lambda right: (
@@ -486,6 +496,18 @@ _FAULTS_FOR_TESTS: dict[str, dict[str, tuple[Fault, str]]] = {
         "η_cr of the quadratic law as under Stokes' drag": (
             lambda right: lambda mu, p: right(mu, _by_stokes(p)),
             "closed_forms_with_drag_laws::test_fold_against_a_scan",
+        )
+    },
+    "slipping.slip_stability.slip_rates": {
+        "normal forces of floor and wall exchanged": (
+            answer(lambda rates: (rates[0], *rates[:0:-1])),
+            "slip_stability::test_normal_forces_while_a_slip_is_slight",
+        )
+    },
+    "orbits.fates.lyapunov": {
+        "exponents to the base of ten": (
+            scaled(1 / np.log(10), 0, 1),
+            "orbits::test_lyapunov_exponent_of_a_known_growth",
         )
     },
     "flowmeter.real_fluid.torque_rate": {

@@ -65,6 +65,16 @@ def _branch(m: Measurement) -> Case:
     return next(iter(here or states))
 
 
+def _jumps_up(m: Measurement) -> bool:
+    """Whether the ball was lifted off the floor at a level of the hysteresis loop."""
+    return detected(m) is Case.NR and m.conditions["before"] != Case.NR.name
+
+
+def _jumps_down(m: Measurement) -> bool:
+    """Whether it came down to the floor."""
+    return detected(m) is not Case.NR and m.conditions["before"] == Case.NR.name
+
+
 def _reading(m: Measurement) -> float:
     case = _branch(m)
     return next(float(s.state.omega_c) for s in lasting(m.parameters) if s.case is case)
@@ -180,6 +190,10 @@ CLAIMS = (
         Bearing("settled", "case", _only_rolling, when=every(from_floor, _stays, slips_first)),
         Bearing("settled", "case", _only_rolling, when=every(_stays, lifts_first)),
         Bearing("settled", "omega_c", _reads_flow, when=_stays),
+        *(
+            Bearing("thresholds", end, lambda m: analytic.operating_range(m.parameters), when=first)
+            for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
+        ),
     ),
     claim(
         "unloading-limit",
@@ -203,7 +217,10 @@ CLAIMS = (
         "fig-13-left",
         "Fig. 13, left",
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
-        Bearing("hysteresis", "case", lambda m: float(_branch(m)), by="analytic.stable_solutions"),
+        *(
+            Bearing("hysteresis", "case", lambda m: float(_branch(m)), when=when, by="analytic.stable_solutions")
+            for when in (_jumps_up, _jumps_down, lambda m: not (_jumps_up(m) or _jumps_down(m)))
+        ),
         Bearing("hysteresis", "omega_c", _reading, by="(32), (38), (46)"),
         text=Text.CORRECTED,
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",

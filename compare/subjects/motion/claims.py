@@ -56,6 +56,11 @@ def _holds(case: Case, m: Measurement) -> bool:
     return slip_stability.stability(case, m.parameters) is SlipStability.STABLE
 
 
+def _exists(case: Case, m: Measurement) -> bool:
+    """Whether friction suffices for the stationary state of a case."""
+    return any(s.exists for s in theory(analytic.stationary_solutions, m.parameters, (case,)))
+
+
 def _braked_rolls(m: Measurement) -> float:
     """RR, if friction suffices for it; LookupError else."""
     if not real_fluid.rolling(m.parameters).friction < 1:
@@ -137,13 +142,16 @@ LAW_CLAIMS = (
         "smooth-wall",
         "Prop. 2, Definitions 1-3",
         "Along a wall without friction a ball goes round with the fluid, rolls on the floor and spins about its axis, "
-        "as long as slip at the floor dies out; faster, it slips.",
-        Bearing(
-            "runs",
-            "case",
-            lambda m: Case.RS if _holds(Case.RS, m) else Case.SS,
-            when=given(start="smooth wall"),
-            by=_HOLDS,
+        "as long as slip at the floor dies out, and friction suffices; faster, it slips.",
+        *(
+            Bearing(
+                "runs",
+                "case",
+                lambda m, holds=holds: Case.RS if holds(Case.RS, m) else Case.SS,  # type: ignore[misc]
+                when=given(start="smooth wall"),
+                by=by,
+            )
+            for holds, by in ((_holds, _HOLDS), (_exists, "analytic.stationary_solutions"))
         ),
     ),
     claim(
@@ -206,7 +214,12 @@ def _moving(case: Case) -> Iterator[Bearing]:
         both = theory(analytic.contact_forces, case, state(m), m.parameters)
         return float(forces(*both)[m.quantity.removeprefix("moving_force_")])
 
+    def rising(m: Measurement) -> float:
+        return slip_stability.lift_acceleration(case, case, state(m), m.parameters)
+
     when = given(case=case.name)
+    if case in (Case.NR, Case.NS):  # into which a ball lifts off
+        yield Bearing("field", "rate_v_y", rising, when=when, by="analytic.slip_stability.lift_acceleration")
     for name in TRAITS[case].active:
         if name not in ("y", "h"):
             yield Bearing("field", f"rate_{name}", rate, when=when, by="analytic.vector_field")

@@ -88,14 +88,21 @@ def _region(m: Measurement) -> Exists:
     return Exists(int(bifurcation.case_map(p, [p.mu], [p.eta], [p.omega_0])[0, 0]))
 
 
-_LASTING = {Exists.RR: Case.RR, Exists.SS: Case.SS, Exists.NR: Case.NR, Exists.NS: Case.NS}
-"""What of a region a ball can settle in, SR counted as NR."""
+_LASTING = {
+    Exists.RR: {Case.RR},
+    Exists.SS: {Case.SS},
+    Exists.SS_BEYOND_FOLD: {Case.SS, Case.NR},
+    Exists.NR: {Case.NR},
+    Exists.NS: {Case.NS},
+}
+"""What a ball can settle in where a state exists, SR counted as NR: itself, or both that it divides."""
 
 
 def _in_region(m: Measurement) -> float:
     """The bit mask of the cases in which a ball can settle, by the labels of the region."""
     region = _region(m)
-    return float(sum(1 << case for flag, case in _LASTING.items() if flag in region))
+    lasting = set[Case]().union(*(those for flag, those in _LASTING.items() if flag in region))
+    return float(sum(1 << case for case in lasting))
 
 
 def _dividing(m: Measurement) -> float:
@@ -188,7 +195,7 @@ CLAIMS = (
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
         *_values(_STATE, _SINKS, "(49), (50)"),
-        _cases(_SINKS),
+        _cases(given(start="on the wall")),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),
