@@ -46,6 +46,8 @@ Blocks = list[npt.NDArray[np.void]]
 class Run:
     """Simulations under way: iterating advances them and yields blocks of samples.
 
+    Several share a batch of MuJoCo's; results don't depend on how many do, to the bit.
+
     Parameters
     ----------
     parameters, x0s, flows : one of each for every run; states of 6 or 8 entries
@@ -53,14 +55,10 @@ class Run:
     settings : shared by all runs
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
-    batched : whether to use MuJoCo's batch even for one run. Its results don't depend on how many runs share it,
-        to the bit; a single run outside is faster and rounds differently.
     journal : keeps what was done, and knows what an earlier process did
     progress : called with the fraction done, from time to time; an error that it raises ends the runs
-    build : makes the MuJoCo model, and its MJCF as text, of parameters and settings; `scene.build` if None
 
-    Each iteration yields `Blocks`. A run that diverges, or is given up as its steps are divided again and again, yields
-    what it has, then empty blocks, and its header says why.
+    Each iteration yields `Blocks`. A run that diverges yields what it has, then empty blocks, and its header says why.
 
     Raises
     ------
@@ -78,10 +76,8 @@ class Run:
         *,
         sample_interval: float | None = None,
         theta_0: float = 0.0,
-        batched: bool = True,
         journal: Journal | None = None,
         progress: Callable[[float], object] | None = None,
-        build: Callable[[Parameters, ContactSettings], tuple[Any, str]] | None = None,
     ) -> None:
         limits.check_runs(parameters, x0s, flows, settings)
         self._parameters, self._flows, self._settings = list(parameters), list(flows), settings
@@ -93,7 +89,7 @@ class Run:
             limits.check_timestep(settings.timestep, p, flow, t_end)
             limits.check_start(x, p, settings)
         scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
-        built = {p: (build or scene.build)(p, settings) for p in dict.fromkeys(scenes)}
+        built = {p: scene.build(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
         given = models, scenes, settings, states, theta_0
         self._stepper: Free | Polar
@@ -102,7 +98,7 @@ class Run:
 
             self._stepper = Free(*given)
         else:
-            self._stepper = Polar(*given, batched or len(models) > 1)
+            self._stepper = Polar(*given)
         shown = dataclasses.asdict(settings) | {
             "t_end": float(t_end), "sample_interval": self._interval * settings.timestep, "x0": None,
             "theta_0": theta_0, "event_times": EVENT_TIMES,
@@ -228,12 +224,12 @@ def simulate(
     InputError
         If an argument is of another type or out of range.
     SimulationError
-        If the run diverges, or is given up as its steps are divided again and again; it carries the samples so far.
+        If the run diverges; it carries the samples so far.
     """
     limits.check_runs([p], [x0], [flow], settings)
     flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
     asked = [p], [x0], t_end, flows, settings
-    run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, batched=False, progress=progress)
+    run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, progress=progress)
     (trajectory,) = run.trajectories()
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)

@@ -49,18 +49,17 @@ class Polar:
     models, parameters, x0s : one of each for every run; full states (8,); omega_0 is that of the steps
     settings : shared by all runs
     theta_0 : azimuth at the start, rad
-    batched : whether to use MuJoCo's batch; more than one run needs it
     """
 
     def __init__(
         self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        x0s: Sequence[npt.ArrayLike], theta_0: float, batched: bool = True,
+        x0s: Sequence[npt.ArrayLike], theta_0: float,
     ) -> None:  # fmt: skip
         from mjsim import compiled  # here, because numba takes long to load
 
         self._parameters, self._settings, runs = parameters, settings, len(models)
         self.model = models[0]
-        self.data, array, self._step = _batch(models) if batched else _single(models[0])
+        self.data, array, self._step = _batch(models) if runs > 1 else _single(models[0])
         self._drive, self._h, self.lead = compiled.drive, settings.timestep, settings.timestep * settings.midpoint
         """What is done before a step; the step, and how far places are ahead of velocities, s."""
         self._qpos, self._qvel, sensors = array("qpos"), array("qvel"), array("sensordata")

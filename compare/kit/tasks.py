@@ -195,12 +195,12 @@ def journal_path(task: Task, path: Path) -> Path:
 
 
 def _begun(tasks: Sequence[Task], journal: Journal | None = None, **more: Any) -> mjsim.Run:
-    """Runs that hand out their samples, in a batch unless they are long."""
-    first, more = tasks[0], more | {"batched": not tasks[0].long, "journal": journal}
+    """Runs that hand out their samples, several in a batch."""
+    first = tasks[0]
     parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
     run = parameters, x0s, first.t_end, flows, first.settings
     assert first.simulator.stream
-    return first.simulator.stream(*run, sample_interval=first.sample_interval, **more)
+    return first.simulator.stream(*run, sample_interval=first.sample_interval, journal=journal, **more)
 
 
 @functools.cache

@@ -50,7 +50,7 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     limits.check_start(x0, p, settings)
     model, _ = scene.build(p, settings, shown=True)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
-    return Polar([model], [p], settings, [x0], 0.0, batched=False)
+    return Polar([model], [p], settings, [x0], 0.0)
 
 
 def run(handle: Any, stepper: Polar, flow: Flow, timestep: float, speed: float) -> int:

@@ -190,12 +190,12 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
     omega_0 = np.full((500, 1), p.omega_0)
-    settled = Polar([model], [p], settings, [state.x], 0.0, batched=False)
+    settled = Polar([model], [p], settings, [state.x], 0.0)
     settled.advance(omega_0)
     starts = [p] * runs, [state.x] * runs, steps * settings.timestep, [Flow.steady(p.omega_0)] * runs, settings
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(REPEATS):
-        loop = Run(*starts, sample_interval=100 * settings.timestep, batched=runs > 1)
+        loop = Run(*starts, sample_interval=100 * settings.timestep)
         whole.append(_seconds(functools.partial(list, loop), time.process_time))
         bare.append(_bare(settled, runs, steps))
     ratios = [2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)]

@@ -95,7 +95,7 @@ def _margins() -> Iterator[Row]:
 
 def _steady_slipping(settings: ContactSettings) -> tuple[np.void, Array]:
     """Last sample of a run that settles in slipping at both points, and the margins (2,) there."""
-    run = Run([SLIPPING], [SLIPPING_START], 10.0, [Flow.steady(SLIPPING.omega_0)], settings, batched=False)
+    run = Run([SLIPPING], [SLIPPING_START], 10.0, [Flow.steady(SLIPPING.omega_0)], settings)
     *_, (block,) = run
     return block[-1], run.margins[0]
 

@@ -28,21 +28,20 @@ def test_a_spin_under_which_the_axes_turn_stays_as_large_as_it_is() -> None:
 
 
 def test_batch_is_the_single_run() -> None:
-    """To the bit however many share the batch; slipping along a ramp, and through landings of both kinds."""
+    """To the bit, however many share the batch; slipping along a ramp, and through landings of both kinds."""
     rough = Parameters.named("high-wall-friction").replace(omega_0=20.0)
     p, slips, settings = P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], ContactSettings()
     landings = [0.02, -0.2, 12.0, 30, -10, 20, 0, 0], [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3]
-    for sets, x0s, flow, t_end, tolerance in (
-        ([p, rough.replace(r=0.02, m=0.1)], [slips, slips], Flow.ramp(20.0, 25.0, 0.2), 0.3, 1e-9),
-        ([P.replace(omega_0=12.0), rough], landings, None, 0.1, 1e-7),
+    for sets, x0s, flow, t_end in (
+        ([p, rough.replace(r=0.02, m=0.1)], [slips, slips], Flow.ramp(20.0, 25.0, 0.2), 0.3),
+        ([P.replace(omega_0=12.0), rough], landings, None, 0.1),
     ):
         many = mjsim.simulate_many(sets, x0s, t_end, flow, settings, sample_interval=1e-3)
         for q, x0, run in zip(sets, x0s, many, strict=True):
             alone = mjsim.simulate(q, x0, t_end, flow, settings, sample_interval=1e-3)
             assert np.any(alone.force_A[:, 1] > 0)
-            np.testing.assert_allclose(run.x, alone.x, rtol=0, atol=tolerance)
-            if flow:
-                np.testing.assert_array_equal(run.case, alone.case)
+            np.testing.assert_array_equal(run.x, alone.x)
+            np.testing.assert_array_equal(run.case, alone.case)
     (first,), *counts = (
         mjsim.simulate_many([p] * runs, [slips] * runs, 0.2, settings=settings, sample_interval=0.01)
         for runs in (1, 2, 13)

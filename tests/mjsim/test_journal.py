@@ -13,28 +13,28 @@ from model import Flow, Parameters, StorageError
 P = Parameters.named("reference").replace(omega_0=25.0)
 
 
-def run(directory: Path | None, batched: bool = True) -> Run:
+def run(directory: Path | None, runs: int = 1) -> Run:
     """Spin-up from rest through rolling into slipping: about four blocks of samples."""
     journal = Journal(directory, interval=0.0) if directory else None
-    spin_up = [P], [np.zeros(8)], 4.5, [Flow.steady(25.0)], ContactSettings()
-    return Run(*spin_up, sample_interval=5e-3, batched=batched, journal=journal)
+    spin_up = [P] * runs, [np.zeros(8)] * runs, 4.5, [Flow.steady(25.0)] * runs, ContactSettings()
+    return Run(*spin_up, sample_interval=5e-3, journal=journal)
 
 
 def joined(part: Run) -> np.ndarray:
-    return np.concatenate([blocks[0] for blocks in part])
+    return np.concatenate([block for own in zip(*part, strict=True) for block in own])
 
 
 @pytest.fixture(scope="module")
-def uninterrupted() -> dict[bool, np.ndarray]:
-    return {batched: joined(run(None, batched)) for batched in (False, True)}
+def uninterrupted() -> dict[int, np.ndarray]:
+    return {runs: joined(run(None, runs)) for runs in (1, 2)}
 
 
-@pytest.mark.parametrize("batched", [False, True])
+@pytest.mark.parametrize("runs", [1, 2])
 @pytest.mark.parametrize("blocks", [0, 1, 2, 3])
-def test_taken_up_after_some_blocks(tmp_path, uninterrupted, blocks, batched):
-    list(islice(run(tmp_path / "journal", batched), blocks))
-    again = run(tmp_path / "journal", batched)
-    np.testing.assert_array_equal(joined(again), uninterrupted[batched])
+def test_taken_up_after_some_blocks(tmp_path, uninterrupted, blocks, runs):
+    list(islice(run(tmp_path / "journal", runs), blocks))
+    again = run(tmp_path / "journal", runs)
+    np.testing.assert_array_equal(joined(again), uninterrupted[runs])
 
 
 def test_a_damaged_journal_says_what_to_do(tmp_path: Path) -> None:
