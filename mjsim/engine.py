@@ -111,9 +111,6 @@ class Run:
         corner = (1 / math.cos(math.pi / settings.facets) - 1) * (settings.wall == "prism")
         self._deepest = np.array([(p.r + (p.R + p.r) * corner, p.r) for p in parameters])
         """How far h and y may be negative: a ball with its centre beyond wall or floor has come through."""
-        lengths = [(p.R, p.r) for p in parameters]
-        self._alike = [[i for i, own in enumerate(lengths) if own == each] for each in dict.fromkeys(lengths)]
-        """Runs of the same geometry, whose samples are worked out together."""
         self._classifier = Classifier(parameters, settings)
         self._steps = (self._count - 1) * self._interval + 1
         """All that are taken: nothing is needed of those after the last sample."""
@@ -173,28 +170,24 @@ class Run:
         last = first + len(raw)
         time = np.arange(first, last, dtype=np.float64) * (self._interval * self._settings.timestep)
         inside = (raw[..., 1:3] > -self._deepest).all(axis=2)
-        sound = np.logical_and.accumulate((np.abs(raw) < HUGE).all(axis=2) & inside).T
-        sound &= np.array([[not header.failure] for header in self.headers])
-        blocks = [np.empty(0, SAMPLE)] * len(self.headers)
-        for runs in self._alike:
-            kept = sound[runs]
-            times = np.broadcast_to(time, kept.shape)[kept]
-            rows = raw.transpose(1, 0, 2)[runs][kept]
-            block = recorder.samples(times, rows, self._stepper.lead, self._parameters[runs[0]])
-            for i, part in zip(runs, np.split(block, kept.sum(axis=1).cumsum()[:-1]), strict=True):
-                if not self.headers[i].failure and len(part) < len(time):
-                    self._ends[i] = end = float(time[len(part)])
-                    why = f"diverged by t = {end:g} s"
-                    names = zip(VARIABLES, UNITS, strict=True)
-                    left = [f"{name} = {part[name][-1]:.6g} {unit}" for name, unit in names] if len(part) else []
-                    failure = f"{why}{', after ' * bool(left)}{', '.join(left)}"
-                    self.headers[i] = dataclasses.replace(self.headers[i], failure=failure)
-                part = np.concatenate([self._waiting[i], part])
-                steps = np.rint(part["time"] / self._settings.timestep).astype(int)
-                over = last == self._count or self.headers[i].failure
-                ready = len(part) if over else int(np.searchsorted(steps, self._classifier.decided))
-                part["case"] = self._classifier.cases(i, steps)
-                blocks[i], self._waiting[i] = part[:ready], part[ready:]
+        sound = np.logical_and.accumulate((np.abs(raw) < HUGE).all(axis=2) & inside)
+        blocks: Blocks = []
+        for i, (p, header) in enumerate(zip(self._parameters, self.headers, strict=True)):
+            count = 0 if header.failure else int(sound[:, i].sum())
+            part = recorder.samples(time[:count], raw[:count, i], self._stepper.lead, p)
+            if not header.failure and count < len(time):
+                self._ends[i] = end = float(time[count])
+                names = zip(VARIABLES, UNITS, strict=True)
+                left = [f"{name} = {part[name][-1]:.6g} {unit}" for name, unit in names] if count else []
+                failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
+                self.headers[i] = header = dataclasses.replace(header, failure=failure)
+            part = np.concatenate([self._waiting[i], part])
+            steps = np.rint(part["time"] / self._settings.timestep).astype(int)
+            over = last == self._count or header.failure
+            ready = len(part) if over else int(np.searchsorted(steps, self._classifier.decided))
+            part["case"] = self._classifier.cases(i, steps)
+            blocks.append(part[:ready])
+            self._waiting[i] = part[ready:]
         return blocks
 
 
