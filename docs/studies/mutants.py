@@ -44,6 +44,11 @@ SUBJECTS = {
     "landings on the wall": "landings on the wall with 5 % more friction",
     "added mass": "the fluid adds all of the displaced mass",
     "1 + j of RS": "the wall of RS doesn't turn the spin axis",
+    "RS on a smooth wall": "RS on a smooth wall takes friction as if j were 1",
+    "SS beyond the fold below ω₀₂": "regions with SS beyond the fold from ω₀₁ on",
+    "how fast a ball lifts": "a ball lifts twice as fast",
+    "normal forces as slip sets in": "normal forces of floor and wall exchanged",
+    "Lyapunov exponents": "exponents to the base of ten",
 }
 """What wrong theories of others were about that nobody noticed at first, and a wrong theory here that is about it."""
 BY_HAND = {
