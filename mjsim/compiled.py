@@ -39,7 +39,10 @@ def _compiled(function: Any, *kinds: Any) -> Any:
     """
     files = (Path(str(module.__file__)) for module in (corrections, world_axes, free, landing, kernels))
     function.__qualname__ += f"_{hashlib.sha256(b''.join(file.read_bytes() for file in files)).hexdigest()[:16]}"
-    loop = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    try:
+        loop = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    except RuntimeError:  # no place for a cache
+        loop = numba.njit(nogil=True, error_model="numpy")(function)
 
     def call(*given: Any) -> Any:
         if not loop.overloads:

@@ -32,7 +32,7 @@ def ranked(args: argparse.Namespace) -> int:
 
     usual = [name for name in league.ENTRIES if not args.settings or re.match(r"mujoco(-plain|-defaults)?$", name)]
     chosen: dict[str, Any] = {name: league.ENTRIES.get(name, name) for name in args.engine or usual}
-    modules = {name for name in chosen if re.search(r"[.:]", name) or Path(f"{name}.py").exists()}
+    modules = {name for name in chosen if re.search(r"\w[.:]\w", name) or Path(f"{name}.py").exists()}
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
     if args.settings:
         chosen = {args.settings.stem: native.entry(args.settings)} | chosen

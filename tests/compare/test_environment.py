@@ -62,6 +62,15 @@ def test_any_backend_and_no_home(here, backend, home):
     assert (here / "run ü.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
+def test_no_place_for_what_is_compiled(here):
+    """As for a user without a home, of a package that root has installed: it is compiled each time."""
+    pytest.importorskip("numba")
+    nowhere = {"NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator", "NUMBA_CACHE_DIR": "/proc/nowhere"}
+    done = dualball(here, "simulate", "--time", "0.05", **nowhere)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
 @pytest.mark.parametrize("words", ["predict", "--help", "--version"])
 def test_a_full_output_is_said(here, words):
     done = dualball(here, words, before=">/dev/full")
