@@ -15,7 +15,15 @@ def reference() -> Parameters:
     return Parameters.named("reference")
 
 
+@pytest.hookimpl(trylast=True)  # of those that are left
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What numba takes longest to compile comes first, and so to one of several workers, which compiles it alone."""
+    """What numba takes longest to compile comes first, and MuJoCo's tests in the middle.
+
+    Two workers begin there: each compiles what the other one then loads.
+    """
     first = ("test_many_runs", "test_orbits", "test_basins", "test_attractors", "test_figures", "test_time_stepping")
-    items.sort(key=lambda item: item.path.stem not in first)
+    compiling = [item for item in items if item.path.stem in first]
+    engine = [item for item in items if item.path.parent.name == "mjsim"]
+    others = [item for item in items if item not in {*compiling, *engine}]
+    before = max(len(items) // 2 - len(compiling), 0)
+    items[:] = compiling + others[:before] + engine + others[before:]
