@@ -75,7 +75,7 @@ class Polar:
         self._again = set[int]()
         """Those among them that did so in the last one."""
         self._calm = set[int]()
-        """Those that begin without a blow: they go on upon their joints after a step, however forces change."""
+        """Those that begin without a blow in the first step: then they go on upon their joints, however forces change."""
         given = {"forces": self._forces, "qvel": self._qvel, "last": self._last, "qpos": self._qpos}
         given["margins"] = self.margins
         self._state = given | {"start": self._start, "due": self._due}
@@ -88,7 +88,8 @@ class Polar:
         for run, (x0, p) in enumerate(zip(x0s, parameters, strict=True)):
             x = State.of(x0)
             place, v = recorder.joint_state(x, theta_0, p)
-            if min(x.v_y, x.v_h) >= -settings.slowest_fall(p.g):
+            fall = settings.slowest_fall(p.g)
+            if all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h))):
                 self._calm.add(run)
             self._set(run, place[:3], v, np.zeros(6))
 
