@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import re
 import tomllib
@@ -160,6 +161,7 @@ class Parameters:
             raise InputError(f"drag = {self.drag!r} needs the Reynolds number: nu_f in m2 s-1 must be given")
 
     @classmethod
+    @functools.cache
     def quantities(cls) -> list[dataclasses.Field[float]]:
         """The parameters that are numbers: all but the law of drag."""
         return [field for field in dataclasses.fields(cls) if field.metadata]

@@ -237,7 +237,7 @@ def _with_torque() -> Iterator[Check]:
             middle = (slips + rolls) / 2
             share = middle * stated.friction
             q, x = p.replace(mu=share * p.mu, eta=share * p.eta), State(omega_c=stated.omega_c)
-            run = analytic.simulate(q, x, 0.02, method="time-stepping", timestep=1e-3)
+            run = analytic.simulate(q, x, 0.02, method="time-stepping", timestep=1e-3, sample_interval=1e-3)
             slips, rolls = (slips, middle) if run.case[-1] == Case.RR else (middle, rolls)
         # The stated one is the least at 2001 values of the force that (11) leaves free.
         what = "friction by time stepping divided by that stated, less 1"
