@@ -128,7 +128,7 @@ def _solved(method: str, of: Stretch, pace: Pace, taken: int, most: int) -> tupl
     )
     fired = [guard for guard, times in enumerate(found.t_events) if len(times)]
     end = float(found.t_events[fired[0]][0]) if fired else span
-    if found.y.size or fired:
+    if fired or len(found.y):
         z[:] = found.y_events[fired[0]][0] if fired else found.y[:, -1]
     count = int(np.searchsorted(due, end, side="right"))
     if count and found.status >= 0:
