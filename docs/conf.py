@@ -138,7 +138,7 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
 
 def docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
     """Plain text with `names` between backticks and sections of numpy's kind, as reStructuredText."""
-    text = "\n".join(lines)
+    text = "" if lines[:1] and lines[0].startswith("Alias for field number") else "\n".join(lines)  # says nothing
     text = re.sub(r"^(\w+)\n-{3,}$", r"**\1**\n", text, flags=re.MULTILINE)
     text = re.sub(r"^(\w[\w, ]*) : ", r"``\1``\n    ", text, flags=re.MULTILINE)
     text = re.sub(r"(^\S.*\n)\n(?= {4}\S)", r"\1\n::\n\n", text, flags=re.MULTILINE)

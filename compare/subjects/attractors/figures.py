@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,17 +15,19 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
-from analytic.orbits.orbit_branch import OrbitBranch
+from analytic.orbits.orbit_branch import Bifurcation, OrbitBranch
 from compare.branches import Drawn, check_thresholds, going_round, lifted, slipping, spin
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError
 from compare.subjects.attractors.basins import FATES, Basins
 from model import Case, Contact, Parameters, State
-from model.files import reading_json
 
 SET = Parameters.named("hopping")
 LOWEST_FLOW, HIGHEST_FLOW = 0.9, 1.4
 """Flows shown, in units of omega_02, farther if the set's own is."""
+LEAST_WALL, MOST_WALL = 0.4, 2.0
+"""Friction of the wall that is shown, in units of the set's own."""
+_SHORT, _UNNAMED = {Bifurcation.BIRTH: "birth"}, Bifurcation.PERSISTENCE
 STARTS = 20
 """Random starts from which hops of one's own set are looked for."""
 
@@ -38,9 +38,9 @@ def select(evidence: Evidence, quantity: str) -> Diagram:
 
 
 def of_set(p: Parameters, quantity: str) -> Diagram:
-    """The hops of a set; along rougher walls those that are kept, of one."""
-    if quantity == "orbit_death" and p != SET:
-        raise GapError("it takes minutes; 'dualball attractors --follow eta=FROM:TO' follows hops along rougher walls")
+    """The hops of a set."""
+    if quantity == "orbit_death" and p.eta == 0:
+        raise GapError("its wall has no friction that could grow")
     _orbit(p)
     return Diagram(quantity, p)
 
@@ -101,7 +101,7 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             axes.plot(branch.values, np.where(part, mean, np.nan), color=style.HOPPING, ls=line, lw=2)
         style.name(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, style.HOPPING)
         for special in branch.places:
-            if special.kind is orbit_branch.Bifurcation.BIRTH:
+            if special.kind is Bifurcation.BIRTH:
                 born = State(*special.orbit.mean)
                 style.mark(axes, special.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
         axes.set(xlim=(LOWEST_FLOW * edge, top), xlabel=style.OMEGA_0)
@@ -143,57 +143,71 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     )
 
 
-def walls() -> dict[str, Any]:
-    """The branch of hops over the friction of the wall, which takes minutes, kept as docs/attractors/walls.md says.
+Row = dict[str, float]
+"""What is drawn of an orbit: eta, the height of the hops in m, mean omega_c in rad/s, and whether it is stable."""
+
+
+def _row(orbit: orbits.Orbit) -> Row:
+    height, omega_c = float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c)
+    return {"eta": orbit.p.eta, "height": height, "omega_c": omega_c, "stable": orbit.stable}
+
+
+@functools.cache
+def _walls(p: Parameters) -> tuple[list[Row], list[tuple[Bifurcation, Row]]]:
+    """The branch of hops over the friction of the wall, and what happens on it: both lie on the line.
 
     Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
     """
-    path = Path(str(resources.files("compare.subjects.attractors"))) / "hopping-walls.json"
-    with reading_json(path, "branch") as data:
-        branch: dict[str, Any] = data["sets"][0]["branches"][0]
-    orbits, places = branch["orbits"], branch["places"]
-    for place, (one, two), at in ((places[-1], orbits[:-3:-1], len(orbits)), (places[0], orbits[:2], 0)):
-        if place["kind"] == "nonsmooth birth":
-            share = (place["value"] - one["eta"]) / (two["eta"] - one["eta"])
-            end = {name: one[name] + share * (two[name] - one[name]) for name in ("eta", "height", "omega_c")}
-            place["orbit"] = end | {"stable": one["stable"]}
-            orbits.insert(at, place["orbit"])
-    for place in places[1:-1]:  # where the line is bent least by it
-        x = np.array([(r["eta"] / 0.1, r["height"] / 0.03) for r in (*orbits, place["orbit"])])
-        detour = np.hypot(*(x[:-1] - x[-1]).T)
-        k = 1 + int(np.argmin(detour[:-1] + detour[1:] - np.hypot(*np.diff(x[:-1], axis=0).T)))
-        orbits.insert(k, place["orbit"] | {"stable": orbits[k - 1]["stable"]})
-    return branch
+    branch = orbit_branch.follow(_orbit(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
+    rows, places = [_row(orbit) for orbit in branch.orbits], list[tuple[Bifurcation, Row]]()
+    for place in branch.places:
+        if place.kind is Bifurcation.BIRTH:
+            at, (one, two) = (len(rows), rows[:-3:-1]) if place is branch.places[-1] else (0, rows[:2])
+            share = (place.value - one["eta"]) / (two["eta"] - one["eta"])
+            row = {name: one[name] + share * (two[name] - one[name]) for name in ("eta", "height", "omega_c")}
+            row["stable"] = one["stable"]
+        else:  # where the line is bent least by it
+            row = _row(place.orbit) | {"eta": place.value}
+            x = np.array([(r["eta"] / p.eta, r["height"] / p.r) for r in (*rows, row)])
+            detour = np.hypot(*(x[:-1] - x[-1]).T)
+            at = 1 + int(np.argmin(detour[:-1] + detour[1:] - np.hypot(*np.diff(x[:-1], axis=0).T)))
+            row["stable"] = rows[at - 1]["stable"]
+        if place.kind is not Bifurcation.RANGE:
+            rows.insert(at, row)
+            places.append((place.kind, row))
+    return rows, places
 
 
 def draw_walls(of: Diagram) -> tuple[Figure, str]:
     """Height and mean omega_c of the hops over the friction of the wall."""
-    branch = walls()
-    orbits, places = branch["orbits"], branch["places"]
+    rows, places = _walls(of.p)
     figure, panels = style.panels(9.0, 3.8, 1, 2)
     shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
+    eta, stable = np.array([row["eta"] for row in rows]), np.array([row["stable"] for row in rows], dtype=bool)
+    text = {Bifurcation.TORUS: (0, -20), Bifurcation.FOLD: (8, 4), Bifurcation.BIRTH: (-8, 5)}
     for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
-        for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
-            axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=style.HOPPING, ls=line, lw=2)
-        named = {"torus": ("torus", (0, -20)), "fold": ("fold", (8, 4)), "nonsmooth birth": ("birth", (-8, 5))}
-        for place in places:
-            x, y = place["value"], unit * place["orbit"][quantity]
-            axes.plot(x, y, **style.POINT)
-            if place["kind"] in named:
-                style.name(axes, x, y, *named.pop(place["kind"]))
+        values = unit * np.array([row[quantity] for row in rows])
+        for part, line in ((np.ones_like(stable), style.UNSTABLE), (stable, style.STABLE)):
+            axes.plot(eta, np.where(part, values, np.nan), color=style.HOPPING, ls=line, lw=2)
+        named = set[Bifurcation]()
+        for kind, row in places:
+            axes.plot(row["eta"], unit * row[quantity], **style.POINT)
+            if kind not in named | {_UNNAMED}:
+                style.name(axes, row["eta"], unit * row[quantity], _SHORT.get(kind, str(kind)), text.get(kind, (8, 4)))
+            named.add(kind)
         for m in of.states:
             low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
             axes.axvspan(low, high, color="0.3", alpha=0.4, label=f"{m.engine}: hops end")
         axes.set(xlabel="wall friction $\\eta$", ylabel=label)
         axes.margins(0.2, 0.1)
     style.legend(panels[0], loc="upper left")
-    at = {place["kind"]: f"η = {place['value']:.4g}" for place in reversed(places)}
     mark = " Shaded: the least wall friction at which hops don't last, as measured." if of.states else ""
+    told = ", ".join(f"{_SHORT.get(kind, kind)} η = {row['eta']:.4g}" for kind, row in places if kind is not _UNNAMED)
     return figure, (
-        "Height and mean ω_c of the hopping ball against the friction of the wall. From no height "
-        f"({at['nonsmooth birth']}) hops grow; they lose stability in a torus bifurcation ({at['torus']}), turn back "
-        f"in a fold ({at['fold']}), and end in hops of no height. Dots without names: the sequence of cases changes. "
-        f"Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} rad/s.{mark}"
+        f"Height and mean ω_c of the hopping ball against the friction of the wall, from {LEAST_WALL:g} to "
+        f"{MOST_WALL:g} times its own. Named along the branch: {told or 'nothing'}. At a birth hops have no height; at "
+        "a torus bifurcation they lose stability, in a fold the branch turns back. Dots without names: the sequence of "
+        f"cases changes. Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} rad/s.{mark}"
     )
 
 
