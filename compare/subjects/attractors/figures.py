@@ -143,23 +143,20 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     )
 
 
-Hops = dict[str, float]
-"""What is drawn of an orbit: eta, the height of the hops in m, mean omega_c in rad/s, and whether it is stable."""
-
-
-def _row(orbit: orbits.Orbit) -> Hops:
+def _row(orbit: orbits.Orbit) -> dict[str, float]:
+    """What is drawn of an orbit: eta, the height of the hops in m, mean omega_c in rad/s, and whether it is stable."""
     height, omega_c = float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c)
     return {"eta": orbit.p.eta, "height": height, "omega_c": omega_c, "stable": orbit.stable}
 
 
 @functools.cache
-def _walls(p: Parameters) -> tuple[list[Hops], list[tuple[Bifurcation, Hops]]]:
+def _walls(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifurcation, dict[str, float]]]]:
     """The branch of hops over the friction of the wall, and what happens on it: both lie on the line.
 
     Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
     """
     branch = orbit_branch.follow(_orbit(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
-    rows, places = [_row(orbit) for orbit in branch.orbits], list[tuple[Bifurcation, Hops]]()
+    rows, places = [_row(orbit) for orbit in branch.orbits], list[tuple[Bifurcation, dict[str, float]]]()
     for place in branch.places:
         if place.kind is Bifurcation.BIRTH:
             at, (one, two) = (len(rows), rows[:-3:-1]) if place is branch.places[-1] else (0, rows[:2])
