@@ -17,13 +17,13 @@ def reference() -> Parameters:
 
 @pytest.hookimpl(trylast=True)  # of those that are left
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What numba takes longest to compile comes first, and MuJoCo's tests in the middle.
+    """What numba takes longest to compile comes first, runs of theory, and in the middle, Coulomb's law in MuJoCo.
 
     Two workers begin there: each compiles what the other one then loads.
     """
     first = ("test_many_runs", "test_orbits", "test_basins", "test_attractors", "test_figures", "test_time_stepping")
-    compiling = [item for item in items if item.path.stem in first]
-    engine = [item for item in items if item.path.parent.name == "mjsim"]
-    others = [item for item in items if item not in {*compiling, *engine}]
-    before = max(len(items) // 2 - len(compiling), 0)
-    items[:] = compiling + others[:before] + engine + others[before:]
+    theory = [item for item in items if item.path.stem in first]
+    coulomb = [item for item in items if item.path.stem.startswith("test_coulomb")]
+    others = [item for item in items if item not in {*theory, *coulomb}]
+    before = max(len(items) // 2 - len(theory), 0)
+    items[:] = theory + others[:before] + coulomb + others[before:]
