@@ -75,7 +75,7 @@ class Polar:
         self._again = set[int]()
         """Those among them that did so in the last one."""
         self._calm = set[int]()
-        """Those that begin without a blow in the first step, and then go on upon their joints, however forces change."""
+        """Those that begin without a blow in the first step and then go on upon their joints, however forces change."""
         given = {"forces": self._forces, "qvel": self._qvel, "last": self._last, "qpos": self._qpos}
         given["margins"] = self.margins
         self._state = given | {"start": self._start, "due": self._due}
