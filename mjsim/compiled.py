@@ -73,5 +73,5 @@ if numba:
 
     _rows, _flags = numba.types.Array(numba.float64, 2, "A"), numba.types.Array(numba.boolean, 1, "C")
     _given = numba.types.Array(numba.float64, 2, "A", readonly=True)
-    drive = _compiled(drive, numba.float64[::1], *[_rows] * 2, *[_flags] * 2, *[_given] * 2, *[_rows] * 9)
+    drive = _compiled(drive, numba.float64[::1], *[_rows] * 2, *[_flags] * 2, *[_given] * 2, *[_rows] * 10)
     steps, through = _compiled(steps), _compiled(through)

@@ -13,7 +13,8 @@ the friction rows, the normal row becomes ``a + R f = a_ref + mu |w|``, and in s
     k (margin - gap) = R f - mu |w|,   |w| = b_f v_slip (with memory),   b_f v_slip - mu R_t f (without).
 
 The left side must be positive, or there is no contact: sliding is continuous only while ``mu |w| < R f``. Beyond, the
-contact switches on and off from step to step, hovering over the wall. Everything below follows from these lines.
+contact switches on and off from step to step, hovering over the wall. Everything below follows from these lines. With
+memory ``mu |w|``, as far as it is foreseen, is taken away (`corrections`), and contacts don't hover.
 """
 
 from __future__ import annotations
@@ -86,12 +87,10 @@ class ContactSettings:
     impratio: float = _number(3e3, "1", Range(0.1, 1e7))
     """How much stiffer the friction rows are than the normal row; beyond 1e7 the solver fails."""
     memory: bool = True
-    """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
+    """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep, and slip
+    is kept from lifting contacts: what `mjsim.Coulomb` does in any model."""
     servo: float = _number(0.01, "s", NOT_NEGATIVE)
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
-    hover: float = _number(0.2, "1", NOT_NEGATIVE)
-    """Largest hover number of a contact under its load: where slip is faster, friction is damped less. 0: as fast as
-    it is. It needs memory or order 2."""
     order: int = _choice(2, 1)
     """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
     coordinates: str = _choice("polar", "free")
@@ -175,29 +174,25 @@ class ContactSettings:
         """Margin less gap (m) of a steady contact: the margin that leaves no gap, or else how deep the ball sinks.
 
         `load` is the normal force over the mass (m s-2), `friction` the coefficient, `slip_speed` in m s-1. The value
-        is negative where the contact can't be continuous.
+        is negative where the contact can't be continuous. With memory slip lifts nothing.
         """
-        return self.softness * load * (1 - self.hover_number(load, friction, slip_speed)) / self.k
+        lifted = 0.0 if self.memory else self.hover_number(load, friction, slip_speed)
+        return self.softness * load * (1 - lifted) / self.k
 
-    def held(self, gap: float, load: float, friction: float, slip_speed: float, bears: float) -> float:
-        """Margin (m) of a contact with such a gap that bears a `load`, where the floor or wall moves along with slip
-        beyond what makes it `hover` under what it `bears` in the mean (both m s-2)."""
-        if load <= 0:
-            return 0.0
-        most = self.hover * self.fastest_slip(bears, friction) if self.hover else math.inf
-        return max(gap + self.margin(load, friction, min(slip_speed, most)), 0.0)
+    def held(self, gap: float, load: float, friction: float, slip_speed: float) -> float:
+        """Margin (m) of a contact with such a gap that bears a `load`, m s-2."""
+        return max(gap + self.margin(load, friction, slip_speed), 0.0) if load > 0 else 0.0
 
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
-        """mu |w| / (R f): sliding contact is continuous below 1; `load` > 0."""
+        """mu |w| / (R f), `load` > 0: without memory sliding contact is continuous below 1."""
         kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
         return friction * max(0.0, self.b_f * slip_speed - kept) / (self.softness * load)
 
     def fastest_slip(self, load: float, friction: float) -> float:
-        """Slip speed (m s-1) up to which contact is continuous, where `hover_number` is 1."""
-        if friction == 0 or self.rigid:
+        """Slip speed (m s-1) up to which contact is continuous, where `hover_number` is 1; with memory any."""
+        if friction == 0 or self.rigid or self.memory:
             return math.inf
-        kept = 0.0 if self.memory else friction**2 / self.impratio
-        return self.softness * load * (1 + kept) / (friction * self.b_f)
+        return self.softness * load * (1 + friction**2 / self.impratio) / (friction * self.b_f)
 
     def regularisation_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f.

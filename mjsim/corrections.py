@@ -60,11 +60,9 @@ class Ball(NamedTuple):
     """How many steps after the middle of a step friction takes its direction by itself."""
     hover_A: float
     hover_B: float
-    """Load (m s-2) per slip speed below which a contact hovers, s-1."""
+    """Load (m s-2) per slip speed below which slip lifts a contact, s-1."""
     weight: float
     """g, m s-2."""
-    hover: float
-    """Largest hover number of a contact, infinite where it is left as it is."""
 
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
@@ -82,7 +80,7 @@ class Ball(NamedTuple):
         return cls(
             p.R, p.r, p.m * p.c, *laws[p.drag], p.m, inertia, inertia * p.fluid_torque, settings.midpoint,
             gain, settings.slowest_fall(p.g), settings.timestep, memory, settings.friction_lag,
-            p.mu * hover, p.eta * hover, p.g, (settings.shifts_surfaces and settings.hover) or math.inf,
+            p.mu * hover, p.eta * hover, p.g,
         )  # fmt: skip
 
 
@@ -115,7 +113,7 @@ def resistance(w_z: float, w_h: float, w_y: float, ball: Ball) -> float:
 def corrections(
     v: Velocity, last: Velocity, rho: float, omega_0: float,
     contact: Sequence[float], normals: Sequence[float], ball: Ball,
-) -> tuple[tuple[float, ...], tuple[float, ...]]:  # fmt: skip
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:  # fmt: skip
     """What drives a step that begins with the velocities v, a step after `last`.
 
     Positions are half a step ahead, so that rho is already that at mid step.
@@ -129,6 +127,7 @@ def corrections(
     -------
     generalised forces of the joints (torque about the axis, inward, upward, moments about x, y, z), N and N m
     velocities of the surfaces (floor along z, x, wall along y, z), m s-1
+    forces that slip would take from the contacts A and B, N
     """
     ahead = ball.ahead
     change = Velocity(
@@ -162,12 +161,10 @@ def corrections(
     torque_x, torque_z = -ball.torque * o_x, -ball.torque * o_z
     torque_y = -ball.torque * (v.o_y + ahead * change.o_y + omega_c - omega_0)
 
-    # The floor bears the weight, the wall the centrifugal force, counted up to the weight.
     v_Ax, v_Az, v_By, v_Bz = slip(v, rho, ball.r)
     A_x, A_z, B_y, B_z = slip(change, rho, ball.r)
-    floor_x, floor_z = surface((v_Ax, v_Az), (A_x, A_z), ball.hover_A, ball.weight, ball)
-    thrown = min(rho * v.omega_c * v.omega_c, ball.weight)
-    wall_y, wall_z = surface((v_By, v_Bz), (B_y, B_z), ball.hover_B, thrown, ball)
+    floor_x, floor_z = surface((v_Ax, v_Az), (A_x, A_z), ball)
+    wall_y, wall_z = surface((v_By, v_Bz), (B_y, B_z), ball)
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
     # that speed for the last step's friction f leaves only the change of f to creep: the friction rows then read
@@ -180,38 +177,38 @@ def corrections(
     wall_y += ball.memory * (upward - A_normal)
     wall_z += ball.memory / ball.r * about_y
 
+    # De Saxce's share. In the engine's convex law slip lifts a contact: its normal row gets mu |w|, with the w = b_f v
+    # of its friction rows. It is that law's, too; `drive` takes it away.
+    lift_A, lift_B = 0.0, 0.0
+    if ball.memory > 0:
+        lift_A = ball.mass * ball.hover_A * math.hypot(v_Ax + ahead * A_x, v_Az + ahead * A_z)
+        lift_B = ball.mass * ball.hover_B * math.hypot(v_By + ahead * B_y, v_Bz + ahead * B_z)
+
     forces = (
         rho * (drag_z + inertial_z) + torque_y, drag_h + inertial_h, drag_y,
         moment_x + torque_x, torque_y, moment_z + torque_z,
     )  # fmt: skip
-    return forces, (floor_z, floor_x, wall_y, wall_z)
+    return forces, (floor_z, floor_x, wall_y, wall_z), (lift_A, lift_B)
 
 
-def surface(
-    v: tuple[float, float], change: tuple[float, float], hover: float, load: float, ball: Ball
-) -> tuple[float, float]:
+def surface(v: tuple[float, float], change: tuple[float, float], ball: Ball) -> tuple[float, float]:
     """How a surface moves, m s-1, on which the ball slips at v, by so much more than a step ago.
 
     Direction of sliding friction at mid step: the engine opposes friction to the slip that there would be 1/b_f after
     the beginning of the step. A surface velocity equal to the change of slip between the middle and then removes the
     difference; only where a contact clearly slides, since a slip that ends must be able to.
-
-    Continuous sliding: a contact that slides fast would `hover` under its load, m s-2. Its surface moves along with
-    the excess, which leaves the direction of friction as it is, and delays it by as much more as there is less damping.
     """
     square, changed = v[0] * v[0] + v[1] * v[1], change[0] * change[0] + change[1] * change[1]
-    needed, borne = hover * square**0.5, ball.hover * load
-    less = (needed - borne) / needed if needed > borne else 0.0
     lag = ball.lag if _SLIDES * changed < square else 0.0
-    lag += less / 2 if lag > 0 else 0.0
-    return lag * change[0] + less * v[0], lag * change[1] + less * v[1]
+    return lag * change[0], lag * change[1]
 
 
 def eventful(h: float, y: float, v: Velocity, last: Velocity, normals: tuple[float, float], ball: Ball) -> bool:
     """Whether a ball that lacks a contact lands in the coming step, or comes near the vessel's axis."""
     rho = ball.R - h
     A_x, A_z, B_y, B_z = slip(v, rho, ball.r)
-    hover_A, hover_B = ball.hover_A * (A_x * A_x + A_z * A_z) ** 0.5, ball.hover_B * (B_y * B_y + B_z * B_z) ** 0.5
+    lifts = ball.memory == 0
+    hover_A, hover_B = lifts * ball.hover_A * math.hypot(A_x, A_z), lifts * ball.hover_B * math.hypot(B_y, B_z)
     floor = normals[0] == 0 and lands(y, v.v_y, last.v_y, hover_A, ball)
     wall = normals[1] == 0 and (lands(h, v.v_h, last.v_h, hover_B, ball) or near_axis(rho, v, ball))
     return floor or wall
@@ -263,9 +260,11 @@ def velocity_of(rows: Array, run: int) -> Velocity:
 def drive(
     omega_0: Array, row: Array, balls: Array, due: Any, held: Any, contact: Array, normals: Array, forces: Array,
     qvel: Array, last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
+    adhesion: Array,
 ) -> bool:  # fmt: skip
     """Let the margins follow the gaps and set what drives the next step; mark runs that are `due` to land in it, and
-    return whether there are any. A row (runs, columns) begins with place and velocities.
+    return whether there are any. A row (runs, columns) begins with place and velocities; to the sensors that follow is
+    to be added what they leave out of the normal forces.
 
     Forces of contacts (6 and 2, runs) are those of the engine's last step, but for runs where others are `held`.
     """
@@ -275,7 +274,7 @@ def drive(
         if not held[k]:
             for i in range(6):
                 forces[i, k] = contact[i, k]
-            forces[6, k], forces[7, k] = normals[0, k], normals[1, k]
+            forces[6, k], forces[7, k] = normals[0, k] + adhesion[0, k], normals[1, k] + adhesion[1, k]
         given = float(forces[1, k]), float(forces[2, k]), float(forces[3, k]), float(forces[4, k])
         loads = float(forces[6, k]), float(forces[7, k])
         theta, h, y = float(qpos[0, k]), float(qpos[1, k]), float(qpos[2, k])
@@ -288,8 +287,16 @@ def drive(
         turn[0, k], turn[3, k] = math.cos(theta / 2), math.sin(theta / 2)
         qpos[3, k], qpos[4:7, k] = 1.0, 0.0
         row[k, :7], row[k, 7:13] = qpos[:, k], qvel[:, k]
-        driving, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]) = corrections(
+        driving, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]), (lift_A, lift_B) = corrections(
             v, before, ball.R - h, float(omega_0[k]), given, loads, ball
         )
         applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = driving
+        # Adhesion of a contact adds R times itself to the reference acceleration of its normal row, and pulls the body
+        # by as much. With the pull taken back, minus what slip would take from the contact leaves De Saxce's share.
+        lift_A, lift_B = lift_A * (y < margins[0, k]), lift_B * (h < margins[1, k])
+        adhesion[0, k], adhesion[1, k] = -lift_A, -lift_B
+        row[k, 13:] = 0.0
+        row[k, 14], row[k, 28] = -lift_A, -lift_B
+        applied[1, k] -= lift_B
+        applied[2, k] -= lift_A
     return some

@@ -50,8 +50,7 @@ def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> 
     check_place(x, p, settings.touching(p.g))
     for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x.y, x.h), strict=True):
         fastest = settings.fastest_slip(p.g, friction)
-        kept = settings.hover and settings.shifts_surfaces
-        if abs(gap) < settings.touching(p.g) and speed > fastest and not kept:
+        if abs(gap) < settings.touching(p.g) and speed > fastest:
             warnings.warn(
                 f"the ball slips at {speed:.3g} m s-1 at {contact} at the start, but with these settings contact "
                 f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem gives softer ones",

@@ -95,8 +95,8 @@ def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[An
         model = filled.compile()
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile the scene: {' '.join(str(error).split())}") from error
-    # Without one in the scene, the engine looks at surface velocities only if this flag says so.
-    model.flg_surfacevel = settings.shifts_surfaces
+    # Without any in the scene, the engine looks at surface velocities and adhesion only if these flags say so.
+    model.flg_surfacevel, model.flg_adhesion = settings.shifts_surfaces, settings.memory
     return model, text
 
 

@@ -76,6 +76,8 @@ class Polar:
         """Those among them that did so in the last one."""
         self._calm = set[int]()
         """Those that begin without a blow in the first step and then go on upon their joints, however forces change."""
+        self._adhesion = array("pair_adhesion")[:2]
+        """By how much the engine tells that contacts bear less than they do, N."""
         given = {"forces": self._forces, "qvel": self._qvel, "last": self._last, "qpos": self._qpos}
         given["margins"] = self.margins
         self._state = given | {"start": self._start, "due": self._due}
@@ -83,6 +85,7 @@ class Polar:
         self._arguments = (
             np.array([Ball.of(p, settings) for p in parameters]).T, self._due, self._held, array("qfrc_constraint"),
             sensors[recorder.NORMALS], *given.values(), array("mocap_quat"), array("qfrc_applied"), floor, wall,
+            self._adhesion,
         )  # fmt: skip
         self._fine = functools.cache(functools.partial(_fine, settings=settings))
         for run, (x0, p) in enumerate(zip(x0s, parameters, strict=True)):
@@ -108,7 +111,7 @@ class Polar:
             self._last[:] = self._qvel
             self._step()
             self._held[:] = self._due[:] = False
-            row[:, recorder.SENSORS :] = self._sensors
+            row[:, recorder.SENSORS :] += self._sensors
             for run, x, theta, rates, gaps in lands:
                 fine = self._fine(self._parameters[run])
                 landed = fine.step(x, theta, rates, float(fluid[run]), run in self._again)
@@ -144,13 +147,13 @@ class Polar:
         self._set(run, landed.place, v, landed.rates * (not near))
         if self._settings.servo:
             x = recorder.state(np.append(landed.place, [1.0, 0, 0, 0]), v, p)
-            bears, loads = (p.g, min(p.g, (p.R - h) * v[0] ** 2)), landed.forces[6:] / p.m
-            given = zip((y, h), loads, (p.mu, p.eta), slip_speeds(x.stacked(), p), bears, strict=True)
+            given = zip((y, h), landed.forces[6:] / p.m, (p.mu, p.eta), slip_speeds(x.stacked(), p), strict=True)
             self.margins[:, run] = [self._settings.held(*map(float, each)) for each in given]
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""
-        np.copyto(self._forces, np.concatenate(self._arguments[3:5]), where=~self._held)
+        contact, normals = self._arguments[3:5]
+        np.copyto(self._forces, np.concatenate([contact, normals + self._adhesion]), where=~self._held)
         return {name: values.copy() for name, values in self._state.items()}
 
     def restore(self, state: dict[str, Array]) -> None:

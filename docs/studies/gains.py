@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -18,6 +19,7 @@ import mjsim
 from compare.kit.pages import Rows
 from docs.studies import states
 from mjsim import ContactSettings
+from mjsim.corrections import Ball
 from model import Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.kinematics import state_units
@@ -31,6 +33,7 @@ FALLS = Parameters.named("reference").replace(
     m=0.02, r=0.004, R=0.03, j=0.35, mu=0.15, eta=0.7, g=9.1, c=0.8, omega_0=7.489
 )
 """A ball that slides down the wall as fast as drag lets it, 10 m/s, with a fifth of its weight on the wall."""
+Ball_of = Ball.of
 Way = Callable[[Parameters], ContactSettings]
 
 
@@ -46,12 +49,16 @@ def _landings_left(p: Parameters) -> ContactSettings:
     return states.Unwatched(**vars(_usual(p)))
 
 
+def _lifted(p: Parameters, settings: ContactSettings) -> Ball:
+    return Ball_of(p, settings)._replace(hover_A=0.0, hover_B=0.0)
+
+
 WAYS: dict[str, tuple[Way, AbstractContextManager[object]]] = {
     "all of them": (_usual, nullcontext()),
     "no memory of friction": (_without(memory=False), nullcontext()),
     "no servo, and so no landings": (_without(servo=0.0), nullcontext()),
     "forces of the beginning of a step (order 1)": (_without(order=1), nullcontext()),
-    "friction damped as strongly however fast the slip (hover 0)": (_without(hover=0.0), nullcontext()),
+    "slip lifts contacts, as in the engine's law": (_usual, mock.patch.object(Ball, "of", _lifted)),
     "contacts as fast on rough balls": (lambda p: ContactSettings.at(STEP), nullcontext()),
     "landings left to the contacts": (_landings_left, nullcontext()),
 }

@@ -115,7 +115,7 @@ def test_a_ball_that_crosses_the_axis_goes_on(miss) -> None:
 
 def test_slip_too_fast_for_continuous_contact_is_said() -> None:
     """A contact hovers where mu b_f v > (1 - d)/d g; a spin of 700 rad/s slips at 7 m/s, this allows 1.6."""
-    settings = ContactSettings(solimp=0.03, solreffriction=2e-3 / 0.03, hover=0.0)
+    settings = ContactSettings(solimp=0.03, solreffriction=2e-3 / 0.03, memory=False)
     allowed = (1 - settings.solimp) / settings.solimp * P.g / (P.mu * settings.b_f)
     with pytest.warns(UserWarning, match=rf"slips at 7 m s-1 at A .* only up to {allowed:.3g} m s-1"):
         mjsim.simulate(P, [0, 0, 1, 700, 0, 0], 0.01, settings=settings)
