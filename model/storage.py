@@ -168,15 +168,10 @@ def exists(path: str | Path) -> bool:
     return Path(path).is_file() or Path(path).parent.is_file()
 
 
-def is_batch(file: h5py.File) -> bool:
-    """Whether an open file is one of many runs."""
-    return bool(file.attrs.get("schema") == BATCH)
-
-
 def load_runs(path: str | Path) -> dict[str, Trajectory]:
     """All runs of a file by name; the name of a single one is empty. Raises `StorageError` as `load` does."""
     with reading(path) as file:
-        if not is_batch(file):
+        if file.attrs.get("schema") != BATCH:
             return {"": _read(file, slice(None))}
         _check_schema(file, BATCH, BATCH_VERSION)
         names, headers = (dataset(file, name).asstr()[...].tolist() for name in ("run", "header"))
@@ -214,7 +209,7 @@ def _create(
 
 def _read(file: h5py.File, part: slice) -> Trajectory:
     """Part of the samples of a file of one run, with all events."""
-    if is_batch(file):
+    if file.attrs.get("schema") == BATCH:
         raise StorageError("it holds the runs of a batch: name one of them, as FILE/NAME")
     _check_schema(file, SCHEMA, SCHEMA_VERSION)
     texts = dict(file.attrs) | {"mjcf": dataset(file, "mjcf").asstr()[()]}
