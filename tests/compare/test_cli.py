@@ -190,12 +190,12 @@ def pressing(task, path, stop):
         return stop()
     return store(task, path, stop=pressed)
 simulate.store = pressing
-raise SystemExit(cli.main(["simulate", "--time", "6", "--sample-interval", "0.005", "-o", sys.argv[2]]))
+raise SystemExit(cli.main(["simulate", "--time", "30", "--sample-interval", "0.004", "-o", sys.argv[2]]))
 """
 
 
 def test_an_interrupted_run_is_kept_and_goes_on(tmp_path: Path) -> None:
-    """Ctrl-C in the second block of samples of five: the third and later are what the same command computes."""
+    """Ctrl-C in the second block of thousands of steps: the third and later are what the same command computes."""
 
     def simulate(stop_after: int, output: Path) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-c", INTERRUPTED, str(stop_after), str(output)]
@@ -219,7 +219,7 @@ def test_an_interrupted_run_is_kept_and_goes_on(tmp_path: Path) -> None:
     assert simulate(0, output).returncode == 0
     assert [path.name for path in output.parent.iterdir()] == ["run.h5"]
     whole = tmp_path / "whole.h5"
-    assert cli.main(["simulate", "--time", "6", "--sample-interval", "0.005", "-o", str(whole)]) == 0
+    assert cli.main(["simulate", "--time", "30", "--sample-interval", "0.004", "-o", str(whole)]) == 0
     run, whole = storage.load(output), storage.load(whole)
     assert all(np.array_equal(getattr(run, name), getattr(whole, name)) for name in columns(Trajectory))
     assert run.x[: len(part.x)].tobytes() == part.x.tobytes()
