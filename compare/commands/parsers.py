@@ -185,7 +185,7 @@ def attractors(parser: Parser) -> None:
 
 @command("the ball", "attractors.plane", "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21")
 def basins(parser: Parser) -> None:
-    """What becomes of the ball from each start of a plane of states, resumable."""
+    """What becomes of the ball from each start of a plane of states; what MuJoCo has run is kept."""
     options.add_parameters(parser)
     options.add_start(parser)
     for name in ("across", "up"):

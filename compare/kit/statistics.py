@@ -94,17 +94,21 @@ def top(values: Array, k: npt.NDArray[np.intp], late: Array) -> Array:
 
 
 def hops(run: Trajectory, share: float = 1 / 3) -> bool:
-    """Whether a ball hops on in the last part of a run: twice near the floor, and high above it in between.
+    """Whether a ball hops on in the last part of a run, see `hops_on`."""
+    return hops_on(run.y[tail(run, share)], run.header.parameters.R)
+
+
+def hops_on(y: Array, R: float) -> bool:
+    """Whether heights at samples are those of hops: twice near the floor, and high above it in between.
 
     High is more than half as high as the highest sample, near less than a fifth: every tenth sample of a hop is so low.
     What stays below 1e-4 R doesn't hop.
     """
-    late = run.y[tail(run, share)]
-    highest = late.max()
-    near = np.flatnonzero(late < highest / 5)
-    if highest < 1e-4 * run.header.parameters.R or not len(near):
+    highest = y.max()
+    near = np.flatnonzero(y < highest / 5)
+    if highest < 1e-4 * R or not len(near):
         return False
-    return bool(late[near[0] : near[-1] + 1].max() > highest / 2)
+    return bool(y[near[0] : near[-1] + 1].max() > highest / 2)
 
 
 POINTS = 5

@@ -86,7 +86,8 @@ def caption_plane(basins: Basins) -> str:
     shares = "; ".join(f"{fate} {_share(*basins.share(fate))}" for fate in FATES if basins.share(fate)[0])
     text = (
         f"What becomes of a ball that starts on a plane of states ({fixed}; all others zero). "
-        f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}. Ground: time stepping, {basins.fates.size} starts: {shares}."
+        f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}. "
+        f"Ground: the event-driven simulation, {basins.fates.size} starts: {shares}."
     )
     if not basins.coarse:
         return text

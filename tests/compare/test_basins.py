@@ -50,7 +50,7 @@ def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_
             maps.append(basins(campaign, *given))
         for path in [path for path in tmp_path.glob("*.h5") if len(storage.contents(path)[1]) == 2]:
             path.unlink()  # as if it had been killed before MuJoCo's batch was whole
-    assert (seen[0], seen[-2:]) == (0, [6, 8])
+    assert (seen[0], seen[-1], seen.count(0)) == (0, 2, 2)
     for basin in maps:
         assert {FATES[k] for k in basin.fates.ravel()} == {"SS", "off the floor"}
         np.testing.assert_array_equal(basin.mujoco, basin.fates[::2, ::2])

@@ -1,7 +1,6 @@
-"""Where the ball ends from each start of a plane of states: on a fine grid by time stepping, on a coarse one by MuJoCo.
+"""Where the ball ends from each start of a plane of states: on a fine grid by theory, on a coarse one by MuJoCo.
 
-The two should differ only at the boundaries of basins, where the smallest error decides. A map goes on where it
-stopped.
+The two should differ only at the boundaries of basins, where the smallest error decides. What MuJoCo has run is kept.
 """
 
 from __future__ import annotations
@@ -16,15 +15,16 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+import analytic
 from analytic import Settings
-from analytic.simulation.settings import fitting_step, start_state
+from analytic.simulation.settings import start_state
 from compare.kit.campaign import Campaign
-from compare.kit.engines import MOREAU, MUJOCO
-from compare.kit.statistics import hops
+from compare.kit.engines import MUJOCO
+from compare.kit.statistics import hops_on
 from compare.kit.sweep import Axis
 from compare.kit.tasks import Task
 from mjsim import ContactSettings
-from model import Case, Contact, Flow, InputError, Parameters, State
+from model import Case, Contact, InputError, Parameters, State
 from model.arrays import Array
 from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
@@ -32,6 +32,9 @@ from model.parameters import check_names
 
 FATES = ("hops", "RR", "SS", "off the floor", "undecided")
 """Where a ball may end. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
+UNDECIDED = FATES.index("undecided")
+INSTANTS = 500
+"""Of a run, after the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class Basins:
     """Their values, shapes (n,) and (m,)."""
     y: Array
     fates: npt.NDArray[np.int64]
-    """Indices of `FATES`, by time stepping, shape (m, n)."""
+    """Indices of `FATES`, by the event-driven simulation, shape (m, n)."""
     coarse: int
     """MuJoCo has computed every `coarse`-th point along both axes; 0 for none."""
     mujoco: npt.NDArray[np.int64]
@@ -56,7 +59,7 @@ class Basins:
     timestep: float
 
     def share(self, fate: str) -> tuple[int, int]:
-        """Points of the plane that come to a fate, by time stepping, and all of them."""
+        """Points of the plane that come to a fate, by theory, and all of them."""
         return int(np.sum(self.fates == FATES.index(fate))), self.fates.size
 
     def differences(self) -> Array:
@@ -106,29 +109,31 @@ def basins(
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
-    step = fitting_step(140, p, Flow.steady(p.omega_0), lasts)
     tasks = [
-        Task(engine=engine, parameters=p, x0=x0, t_end=lasts, settings=settings, sample_interval=lasts / 500)
-        for engine, settings, chosen in (
-            (MOREAU.name, Settings(method=MOREAU.name, timestep=step), states),
-            (MUJOCO.name, ContactSettings.for_problem(p, timestep), few),
+        Task(
+            engine=MUJOCO.name, parameters=p, x0=start_state(x0, p, Settings()), t_end=lasts,
+            settings=ContactSettings.for_problem(p, timestep), sample_interval=lasts / INSTANTS,
         )
-        for x0 in (start_state(x, p, Settings()) for x in chosen.reshape(-1, len(VARIABLES)))
-    ]
+        for x0 in few.reshape(-1, len(VARIABLES))
+    ]  # fmt: skip
+    fine, other = [], []
+    threads = max(1, campaign.workers) if isinstance(campaign.workers, int) else None
+    for row in states:
+        runs = analytic.simulate_many(p, row, lasts, sample_interval=lasts / INSTANTS, threads=threads)
+        ends = zip(runs.x[..., 0], runs.case[:, -1], runs.failure, strict=True)
+        fine.append([UNDECIDED if failure else fate(y, Case(last), p) for y, last, failure in ends])
     broken = {failure.task.key for failure in campaign.complete(tasks)}
-    fates = []
-    for task in tasks:
-        fate = "undecided"
-        if task.key not in broken:
-            run = campaign.load(task.key)
-            case = run.cases[-1]
-            if hops(run, 0.3):
-                fate = "hops"
-            elif case in (Case.RR, Case.SS):
-                fate = case.name
-            elif case is Case.SR or case.A is Contact.N:
-                fate = "off the floor"
-        fates.append(FATES.index(fate))
-    fine, other = np.split(np.array(fates), [len(y) * len(x)])
-    maps = fine.reshape(states.shape[:2]), coarse, other.reshape(few.shape[:2])
+    for key in (task.key for task in tasks):
+        run = None if key in broken else campaign.load(key)
+        other.append(fate(run.y, run.cases[-1], p) if run else UNDECIDED)
+    maps = np.array(fine), coarse, np.array(other, dtype=int).reshape(few.shape[:2])
     return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, *maps, timestep)
+
+
+def fate(y: Array, last: Case, p: Parameters) -> int:
+    """What a run comes to by its heights and last case: an index of `FATES`."""
+    if hops_on(y[int(0.7 * len(y)) :], p.R):
+        return FATES.index("hops")
+    if last in (Case.RR, Case.SS):
+        return FATES.index(last.name)
+    return FATES.index("off the floor") if last is Case.SR or last.A is Contact.N else UNDECIDED

@@ -225,7 +225,7 @@ def draw_basins(basins: Basins) -> Figure:
 
 
 def fill_basins(axes: Axes, basins: Basins) -> None:
-    """The map by time stepping, and a point for each run of MuJoCo."""
+    """The map by theory, and a point for each run of MuJoCo."""
     look: dict[str, Any] = {
         "cmap": ListedColormap(_SHADES),
         "vmin": -0.5,
