@@ -60,9 +60,9 @@ class Fine:
         self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0, _SHARE)
         self._ball.ahead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
 
-    def step(self, x: State, theta: float, rates: Array, omega_0: float, again: bool = False) -> Landed:
-        """A whole step from a state, with velocities of the joints that change at such rates; `again` if there was a
-        blow a short time ago."""
+    def step(self, x: State, theta: float, rates: Array, omega_0: float, finely: bool = False) -> Landed:
+        """A whole step from a state, with velocities of the joints that change at such rates; `finely` if there was a
+        blow a short time ago, or there isn't one in a first step, whose forces are the start of all that follow."""
         ball, seen = self._ball, np.zeros((4, recorder.NSENSOR))
         ball.place(x, theta)
         rho = self._p.R - float(x.h)
@@ -72,7 +72,7 @@ class Fine:
             ball.body.last[:3] = away * cos - along * sin, away * sin + along * cos, rates[2]
         from mjsim import compiled  # here, because it has this module compiled
 
-        longest = self._whole / (COARSE if again else _FIRST)
+        longest = self._whole / (COARSE if finely else _FIRST)
         given = ball.body, self._whole, longest, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
         place, velocity, before, duration, since = compiled.through(*given)
         v = np.array(velocity)

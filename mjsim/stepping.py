@@ -114,7 +114,8 @@ class Polar:
             row[:, recorder.SENSORS :] += self._sensors
             for run, x, theta, rates, gaps in lands:
                 fine = self._fine(self._parameters[run])
-                landed = fine.step(x, theta, rates, float(fluid[run]), run in self._again)
+                finely = run in self._again or run in self._calm
+                landed = fine.step(x, theta, rates, float(fluid[run]), finely)
                 self._land(run, landed)
                 row[run, recorder.SENSORS :], row[run, -2:] = landed.seen, gaps
 

@@ -8,7 +8,7 @@ import mjsim
 from mjsim import ContactSettings, scene
 from mjsim.landing import COARSE
 from mjsim.stepping import Polar
-from model import Parameters
+from model import Case, Parameters
 
 HOPS = Parameters.named("hopping")
 """A hop lasts 0.22 s, and the floor is touched for half a millisecond of it."""
@@ -43,6 +43,17 @@ def test_a_start_that_comes_down_on_the_floor_lands_at_once() -> None:
     speeds = HOPS.R * np.abs(run.omega_c - exact.omega_c)[1:], np.abs(run.v_y - exact.v_y)[1:]
     # What forces of the size of the weight do in a step, times the share of it by which a landing may be misplaced.
     assert np.max(speeds) < HOPS.g * settings.timestep * HOPS.omega_0 * settings.timestep
+
+
+@pytest.mark.parametrize("step", [4e-3, 1e-3])
+def test_the_first_step_leaves_a_ball_where_theory_has_it_at_rest(step: float) -> None:
+    """An unstable stationary state, slipping at both points: an edge between two attractors shows where a run began."""
+    p = Parameters(m=0.02, r=0.012, R=0.06, j=0.3, mu=0.45, eta=0.15, g=9.81, c=2.0, omega_0=34.12)
+    (x,) = [each.x for each in analytic.stationary_solutions(p) if each.case is Case.SS and not each.stable]
+    run = mjsim.simulate(p, x, step, settings=ContactSettings.at(step), sample_interval=step)
+    speeds = np.abs(run.x[-1] - x)[1:6] * [1, p.R, p.r, p.r, p.r]
+    # What forces of the size of the weight do in a step, times the square of the angle of a shorter one.
+    assert speeds.max() < p.g * step * (p.omega_0 * step / COARSE) ** 2
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
