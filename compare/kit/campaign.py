@@ -113,6 +113,7 @@ class Campaign:
         if self.limit != math.inf:
             check_number("limit", self.limit, "s", POSITIVE)
         self.directory = Path(self.directory).resolve()
+        self._made = not self.directory.exists()
         make_directory(self.directory)
         self._owned = Lock(self.directory)
         remove_leftovers(self.directory)
@@ -129,6 +130,8 @@ class Campaign:
         self._workers.close(at_once=kind is not None)
         remove_leftovers(self.directory)
         self._owned.release()
+        if kind and self._made and not any(self.directory.iterdir()):
+            self.directory.rmdir()
 
     def under(self, label: str, doing: str) -> Campaign:
         """A part of the campaign with a label and runs of its own; parts may be carried out by several threads."""
