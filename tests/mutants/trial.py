@@ -137,7 +137,7 @@ def _theories(directory: Path, by: str, whole: bool, workers: int) -> list[Trial
 def _right(directory: Path, by: str, number: int) -> Right:
     """What a claim comes to by itself, with nothing that was computed for others."""
     functions, calls = {name_of(each): each for each in THEORIES}, set[str]()
-    measured(directory)
+    validation.stored(directory)  # reading isn't what a claim takes
     forget()
     with believed(*(replace(each, wrong=noting(name, calls)) for name, each in functions.items())):
         begun = time.process_time()
