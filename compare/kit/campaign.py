@@ -130,7 +130,7 @@ class Campaign:
         self._workers.close(at_once=kind is not None)
         remove_leftovers(self.directory)
         self._owned.release()
-        if kind and self._made and not any(self.directory.iterdir()):
+        if self._made and not any(self.directory.iterdir()):
             self.directory.rmdir()
 
     def under(self, label: str, doing: str) -> Campaign:

@@ -32,7 +32,7 @@ LONG = {
     "sweep": "--vary eta=0.1:0.5:20 --time 1e3 --workers 2",
     "collect": "runs -o new.h5",
     "attractors": "--set hopping --random 1000",
-    "basins": "--across omega_c=0:150:21 --up slip_x=-900:900:21 --workers 2",
+    "basins": "--across omega_c=0:150:201 --up slip_x=-900:900:201 --workers 2",
     "design": "meter.toml -o new.html",
     "render": "run.h5 -o new.gif",
     "explore": "--no-browser --port 8099",
