@@ -10,7 +10,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from mjsim import corrections, free, landing, world_axes
+from mjsim import corrections, free, landing, recorder, world_axes
 from mjsim.corrections import Ball
 
 try:
@@ -37,8 +37,7 @@ def _compiled(function: Any, *kinds: Any) -> Any:
     Numba keeps what it compiles on disk by name, and compiles it again when the function's own file has changed, but
     not when that of a function has which it calls: the name contains the digest of those.
     """
-    files = (Path(str(module.__file__)) for module in (corrections, world_axes, free, landing, kernels))
-    function.__qualname__ += f"_{hashlib.sha256(b''.join(file.read_bytes() for file in files)).hexdigest()[:16]}"
+    function.__qualname__ += f"_{_digest}"
     try:
         loop = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # no place for a cache
@@ -61,6 +60,8 @@ if numba:
         *(world_axes.unwrapped, world_axes.joint_velocities, free.step, free.note, landing.closes, landing.average),
     ):
         register_jitable(each)
+    _files = (Path(str(module.__file__)) for module in (corrections, recorder, world_axes, free, landing, kernels))
+    _digest = hashlib.sha256(b"".join(file.read_bytes() for file in _files)).hexdigest()[:16]
     _fields = len(Ball._fields)
 
     @overload(corrections.ball_of, strict=False)  # type: ignore[untyped-decorator]

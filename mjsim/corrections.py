@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from mjsim.contact_settings import ContactSettings
+from mjsim.recorder import NORMALS, NQ, NSENSOR, SENSORS
 from model import Parameters
 from model.arrays import Array
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
@@ -24,6 +25,7 @@ _NEAR = 32.0
 """Steps to the axis from which on they are shorter: the azimuth turns by up to 1/32 in one."""
 _FEW = 16.0
 """A hovering contact lands from the speed that its load gives it in so many steps; one that only hovers reaches 1.2."""
+_NORMAL_A, _NORMAL_B = (SENSORS + at for at in range(NSENSOR)[NORMALS])
 
 
 class Ball(NamedTuple):
@@ -286,7 +288,7 @@ def drive(
             margins[1, k] = followed(float(margins[1, k]), h, ball.gain)
         turn[0, k], turn[3, k] = math.cos(theta / 2), math.sin(theta / 2)
         qpos[3, k], qpos[4:7, k] = 1.0, 0.0
-        row[k, :7], row[k, 7:13] = qpos[:, k], qvel[:, k]
+        row[k, :NQ], row[k, NQ:SENSORS] = qpos[:, k], qvel[:, k]
         driving, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]), (lift_A, lift_B) = corrections(
             v, before, ball.R - h, float(omega_0[k]), given, loads, ball
         )
@@ -295,8 +297,8 @@ def drive(
         # by as much. With the pull taken back, minus what slip would take from the contact leaves De Saxce's share.
         lift_A, lift_B = lift_A * (y < margins[0, k]), lift_B * (h < margins[1, k])
         adhesion[0, k], adhesion[1, k] = -lift_A, -lift_B
-        row[k, 13:] = 0.0
-        row[k, 14], row[k, 28] = -lift_A, -lift_B
+        row[k, SENSORS:] = 0.0
+        row[k, _NORMAL_A], row[k, _NORMAL_B] = -lift_A, -lift_B
         applied[1, k] -= lift_B
         applied[2, k] -= lift_A
     return some

@@ -31,7 +31,7 @@ from model.arrays import Array
 from model.kinematics import to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
-_SEEN, (_A_x, _A_y, _B_x, _B_y) = recorder.SENSORS, recorder.SLIPS
+_NQ, _SEEN, (_A_x, _A_y, _B_x, _B_y) = recorder.NQ, recorder.SENSORS, recorder.SLIPS
 
 
 class Body(NamedTuple):
@@ -102,7 +102,7 @@ def note(row: Any, qpos: Any, qvel: Any, ahead: float, ball: Ball) -> None:
     row[3], row[4], row[5], row[6] = 1.0, 0.0, 0.0, 0.0
     velocities = joint_velocities(qpos, qpos[3:], qvel, ahead)
     for i in range(6):
-        row[7 + i] = velocities[i]
+        row[_NQ + i] = velocities[i]
 
 
 def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:

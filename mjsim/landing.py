@@ -55,10 +55,13 @@ class Fine:
     """One ball that takes steps of some settings in shorter ones."""
 
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
+        from mjsim import compiled  # here, because it has this module compiled
+
         self._p, self._whole, self._fall = p, settings.timestep, settings.slowest_fall(p.g)
         rigid = ContactSettings.rigid_at(settings.timestep / _FIRST)
         self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0, _SHARE)
         self._ball.ahead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
+        self._through = compiled.through
 
     def step(self, x: State, theta: float, rates: Array, omega_0: float, finely: bool = False) -> Landed:
         """A whole step from a state, with velocities of the joints that change at such rates; `finely` if there was a
@@ -70,11 +73,9 @@ class Fine:
             turn, (cos, sin) = float(x.omega_c), (math.cos(theta), math.sin(theta))
             away, along = -rates[1] - rho * turn * turn, rho * rates[0] - 2 * x.v_h * turn
             ball.body.last[:3] = away * cos - along * sin, away * sin + along * cos, rates[2]
-        from mjsim import compiled  # here, because it has this module compiled
-
         longest = self._whole / (COARSE if finely else _FIRST)
         given = ball.body, self._whole, longest, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
-        place, velocity, before, duration, since = compiled.through(*given)
+        place, velocity, before, duration, since = self._through(*given)
         v = np.array(velocity)
         first, last = recorder.forces(seen[1:3], np.array([place[0] - v[0] * since, place[0]]))
         (A_x, A_y, A_z), (B_x, B_y, B_z) = last

@@ -72,10 +72,10 @@ class Polar:
         which are the engine's, but for"""
         self._held, self._due = np.ones(runs, dtype=bool), np.full(runs, settings.servo > 0)
         """runs whose last step wasn't the engine's; and runs that take the next one in fine ones."""
-        self._again = set[int]()
-        """Those among them that did so in the last one."""
+        self._finely = set[int]()
+        """Those among them that take it in the shortest ones, as they did the last; and those that are"""
         self._calm = set[int]()
-        """Those that begin without a blow in the first step and then go on upon their joints, however forces change."""
+        """calm: in the first step, without a blow, after which they go on upon their joints however forces change."""
         self._adhesion = array("pair_adhesion")[:2]
         """By how much the engine tells that contacts bear less than they do, N."""
         given = {"forces": self._forces, "qvel": self._qvel, "last": self._last, "qpos": self._qpos}
@@ -92,8 +92,10 @@ class Polar:
             x = State.of(x0)
             place, v = recorder.joint_state(x, theta_0, p)
             fall = settings.slowest_fall(p.g)
-            if all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h))):
+            calm = all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h)))
+            if calm and self._due[run]:
                 self._calm.add(run)
+                self._finely.add(run)
             self._set(run, place[:3], v, np.zeros(6))
 
     def _set(self, run: int, place: Array, v: Array, rates: Array) -> None:
@@ -114,8 +116,7 @@ class Polar:
             row[:, recorder.SENSORS :] += self._sensors
             for run, x, theta, rates, gaps in lands:
                 fine = self._fine(self._parameters[run])
-                finely = run in self._again or run in self._calm
-                landed = fine.step(x, theta, rates, float(fluid[run]), finely)
+                landed = fine.step(x, theta, rates, float(fluid[run]), run in self._finely)
                 self._land(run, landed)
                 row[run, recorder.SENSORS :], row[run, -2:] = landed.seen, gaps
 
@@ -143,7 +144,7 @@ class Polar:
         fast = landed.change > _CHANGE * self._h * pace * most and run not in self._calm
         self._due[run] = near or fast
         self._calm.discard(run)
-        self._again = self._again | {run} if self._due[run] else self._again - {run}
+        self._finely = self._finely | {run} if self._due[run] else self._finely - {run}
         self._forces[:, run] = landed.forces
         self._set(run, landed.place, v, landed.rates * (not near))
         if self._settings.servo:
@@ -161,7 +162,7 @@ class Polar:
         """Go on from such a state."""
         for name, values in self._state.items():
             values[...] = state[name]
-        self._held[:], self._again = True, set(np.flatnonzero(self._due).tolist())
+        self._held[:], self._finely = True, set(np.flatnonzero(self._due).tolist())
         self._calm.clear()
 
 

@@ -162,9 +162,9 @@ class Parameters:
 
     @classmethod
     @functools.cache
-    def quantities(cls) -> list[dataclasses.Field[float]]:
+    def quantities(cls) -> tuple[dataclasses.Field[float], ...]:
         """The parameters that are numbers: all but the law of drag."""
-        return [field for field in dataclasses.fields(cls) if field.metadata]
+        return tuple(field for field in dataclasses.fields(cls) if field.metadata)
 
     @property
     def kappa(self) -> float:
@@ -265,17 +265,18 @@ Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", "\n    ".j
 def read_toml(path: str | Path) -> dict[str, Any]:
     """What a TOML file holds; raises `StorageError` if it can't be read."""
     try:
-        return tomllib.loads(Path(path).read_text("utf-8-sig"))
+        text = Path(path).read_text("utf-8-sig")
+        return tomllib.loads(text)
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise StorageError(f"{path} is not valid TOML: it must be text in UTF-8") from error
     except tomllib.TOMLDecodeError as error:
-        hint = "; a number takes a point, not a comma" if _comma(Path(path), str(error)) else ""
+        hint = "; a number takes a point, not a comma" if _comma(text, str(error)) else ""
         raise StorageError(f"{path} is not valid TOML: {error}{hint}") from error
 
 
-def _comma(path: Path, error: str) -> bool:
-    """Whether the line of a TOML file that an error names has a number with a decimal comma."""
+def _comma(text: str, error: str) -> bool:
+    """Whether the line of a TOML text that an error names has a number with a decimal comma."""
     line = re.search(r"at line (\d+)", error)
-    return bool(line and re.search(r"=\s*[-+]?\d+,\d", path.read_text("utf-8-sig").splitlines()[int(line[1]) - 1]))
+    return bool(line and re.search(r"=\s*[-+]?\d+,\d", text.splitlines()[int(line[1]) - 1]))

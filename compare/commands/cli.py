@@ -74,12 +74,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # `_flushed` sees to it
         return 0
     except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
-        where = (
-            f"{error.filename}: "
-            if error.filename
-            else "cannot write to standard output: " * (error.errno == errno.ENOSPC)
-        )
-        print(f"dualball: error: {where}{error.strerror or error}", file=sys.stderr)
+        full = "cannot write to standard output" if error.errno == errno.ENOSPC else ""
+        said = [str(each) for each in (error.filename or full, error.strerror or error) if each]
+        print(f"dualball: error: {': '.join(said)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as error:
         there = args.resumes and args.output.is_dir()

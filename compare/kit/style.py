@@ -81,9 +81,15 @@ def panels(width: float, height: float, rows: int = 1, columns: int = 1, **layou
 
 
 _COLUMNS = {
-    **{"theta": "θ", "h": "h", "v_h": "v_h", "slip_speed_A": "|v_A|", "slip_speed_B": "|v_B|"},
-    **{"gap_A": "gap at the floor", "gap_B": "gap at the wall"},
+    "theta": "θ",
+    "h": "h",
+    "v_h": "v_h",
+    "slip_speed_A": "|v_A|",
+    "slip_speed_B": "|v_B|",
+    "gap_A": "gap at the floor",
+    "gap_B": "gap at the wall",
 }
+"""Letters of columns of a motion that nothing measures."""
 
 
 def symbol(name: str) -> str:

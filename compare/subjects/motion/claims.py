@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import analytic
 from analytic.flowmeter import real_fluid
@@ -59,6 +60,11 @@ def _holds(case: Case, m: Measurement) -> bool:
 def _exists(case: Case, m: Measurement) -> bool:
     """Whether friction suffices for the stationary state of a case."""
     return any(s.exists for s in theory(analytic.stationary_solutions, m.parameters, (case,)))
+
+
+def _rolls_or_slips(holds: Callable[[Case, Measurement], bool], m: Measurement) -> float:
+    """Along a smooth wall: RS as long as it holds, SS beyond."""
+    return float(Case.RS if holds(Case.RS, m) else Case.SS)
 
 
 def _braked_rolls(m: Measurement) -> float:
@@ -144,13 +150,7 @@ LAW_CLAIMS = (
         "Along a wall without friction a ball goes round with the fluid, rolls on the floor and spins about its axis, "
         "as long as slip at the floor dies out, and friction suffices; faster, it slips.",
         *(
-            Bearing(
-                "runs",
-                "case",
-                lambda m, holds=holds: Case.RS if holds(Case.RS, m) else Case.SS,  # type: ignore[misc]
-                when=given(start="smooth wall"),
-                by=by,
-            )
+            Bearing("runs", "case", partial(_rolls_or_slips, holds), when=given(start="smooth wall"), by=by)
             for holds, by in ((_holds, _HOLDS), (_exists, "analytic.stationary_solutions"))
         ),
     ),
