@@ -81,7 +81,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
     if not checks and not missing and (known := {m.protocol for m in records.measurements} & claim.protocols):
-        missing = tuple(Missing(name, "all", "no number bears on the claim", 0) for name in sorted(known))
+        missing = tuple(Missing(name, "all sets", "no number bears on the claim", 0) for name in sorted(known))
     return Verdict(claim=claim, outcome=outcome(claim, checks, rows(checks)), checks=checks, missing=missing)
 
 

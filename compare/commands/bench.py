@@ -92,7 +92,7 @@ def foretold(args: argparse.Namespace) -> int:
     finally:
         mujoco.set_mju_user_warning(heard)
     if args.output:
-        write_text(args.output, forecast_page.html(found, after, held, str(args.file)))
+        write_text(args.output, forecast_page.html(found, after, held, args.file.name))
     shown: list[Any] = [Text(f"• {line}") for line in forecast_page.sentences(found)]
     shown += [Text(f"\n{text}") for _, text in forecast_page.paste(found)]
     tables = forecast_page.tables(found) + forecast_page.again(found, after, held)

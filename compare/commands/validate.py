@@ -75,12 +75,12 @@ def line(verdict: Verdict) -> Text:
     """A claim in one line: verdict, largest deviation, what error of theory would be noticed, or what went wrong."""
     kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
     expected = ", as expected" if verdict.passed and verdict.outcome is Outcome.REFUTED else ""
-    shown = Text.assemble((f"{mark} {verdict.outcome + expected:<13}", _STYLES[kind]), f" {verdict.claim.id:<18}")
+    shown = Text.assemble((f"{mark} {verdict.outcome + expected:<13}", _STYLES[kind]), f" {verdict.claim.id:<18} ")
     parts = []
     if verdict.checks:
         found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
         count = len(verdict.checks)
-        parts.append(Text("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found])))
+        parts.append(Text("; ".join([f"{count:>4} number{'s' if count > 1 else ''}", *found])))
     elif verdict.error:
         parts.append(Text(verdict.error, "red"))
     elif verdict.missing:

@@ -79,8 +79,13 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
         text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', letter, picture).replace("<defs></defs>", "")
         text = re.sub(r"<style.*?</style>", "", text)  # for all lines of a picture: pages have it, too
         text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace("xlink:href", "href")
-        made[name] = re.sub(r'^<svg[^>]*?(viewBox="[^"]*")[^>]*>', r'<svg \1 role="img">', text)
+        made[name] = re.sub(r'^<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', _opened, text)
     return made, f'<svg width="0" height="0" style="position:absolute"><defs>{"".join(letters.values())}</defs></svg>'
+
+
+def _opened(found: re.Match[str]) -> str:
+    """How a picture begins on a page; letters of 10 points are at least as high as 6.4 pixels on a phone."""
+    return f'<svg {found[1]} role="img" style="--least:{0.64 * float(found[2]):.0f}px">'
 
 
 def plain(label: str) -> str:

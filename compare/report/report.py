@@ -181,6 +181,7 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
 
 
 def packed(of: Mapping[str, Sequence[Any]]) -> str:
-    """Columns as JSON, compressed (deflate) and written in base64: about a tenth of their length."""
-    text = json.dumps(of, ensure_ascii=False, separators=(",", ":"))
+    """Columns and their texts typeset, as JSON, compressed (deflate) and in base64: about a tenth of their length."""
+    shown = {text: pages.typeset(text) for text in dict.fromkeys([*of["quantity"], *of["conditions"]])}
+    text = json.dumps({**of, "typeset": shown}, ensure_ascii=False, separators=(",", ":"))
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()

@@ -54,6 +54,13 @@ def test_batch_is_the_single_run() -> None:
 RIGID = ContactSettings(coordinates="free", law="rigid", servo=0.0, memory=False, order=1)
 
 
+@pytest.mark.parametrize("settings", [None, ContactSettings(memory=False, servo=0.0), RIGID])
+def test_a_run_begins_at_the_azimuth_that_is_asked_for(settings) -> None:
+    """Later ones are second order in the step: places are brought back by the velocity of the sample."""
+    run = mjsim.simulate(P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], 0.01, settings=settings, theta_0=0.3)
+    assert run.theta[0] == pytest.approx(0.3, abs=1e-11)
+
+
 @pytest.mark.parametrize("settings", [None, RIGID], ids=["joints", "free"])
 def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> None:
     """Also of a run that breaks down, beside others; progress is that of all of them."""

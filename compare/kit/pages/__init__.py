@@ -42,7 +42,11 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
 
 _SYMBOL = re.compile(
     r"((?:(?<![\w.])[A-Za-z]|[Α-ω])\u0303?)(?:_([A-Za-z0-9]{1,3})(?![A-Za-z0-9_(])|([₀-₉]+))"  # with an index
-    r"|((?<![\w.])j(?![\w'’])|[Α-ω](?![a-z])|[Α-ω]?(?<![A-Za-z_])[mgRrcj]+(?=[Α-ω]))"  # alone, or a product
+    r"|([Α-ω](?![ms]\b|[a-z]{2})"  # alone
+    r"|(?<![A-Za-z_.'’])(?<!\d )(?!RR|cm|m(?![gRrcjΑ-ω·]| =))[mgRrcj]+(?![A-Za-z'’_])"  # alone, or a product
+    r"|(?<![\w.'’])(?<!\d )(?<!&#39;)(?:[yht](?![\w'’.])|[A-Za-z](?= [=&≤≥])|[A-Ca-ce-z](?=[Α-ω])|K(?= [Α-ω])))"
+    r"|\^\(?([\d/]+)\)?"  # a power
+    r"|((?<= )-(?= )|(?<![\w).])-(?=\d))"  # minus
 )
 _DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 
@@ -52,7 +56,9 @@ def typeset(text: str) -> str:
     import markupsafe  # comes with jinja2
 
     def symbol(found: re.Match[str]) -> str:
-        letter, name, digits, alone = found.groups("")
+        letter, name, digits, alone, power, minus = found.groups("")
+        if power or minus:
+            return f"<sup>{power}</sup>" if power else "−"
         index = f"<sub>{name or digits.translate(_DIGITS)}</sub>" if letter else ""
         return f"<i>{letter or alone}</i>{index}"
 
