@@ -14,10 +14,9 @@ from enum import StrEnum
 from statistics import median
 from typing import Any
 
-from compare.kit.levels import Level
+from compare.kit.levels import Level, sets
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Condition, Measurement, Missing, Relation
-from compare.kit.sets import sets
 from compare.kit.statistics import Measured
 
 When = Callable[[Measurement], bool]

@@ -1,11 +1,12 @@
-"""Contact settings as MuJoCo itself has them, read from a person's MJCF file, for `dualball league --settings`.
+"""MuJoCo in the league on the study's joints, and with contacts as a person's MJCF file has them.
 
-`mjsim.ContactSettings` holds what the study needs and refuses what can't work. This is for settings of which nobody
-knows yet whether they work.
+`mjsim.ContactSettings` holds what the study needs and refuses what can't work. `Native` is for settings of which nobody
+knows yet whether they work (`dualball league --settings`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +15,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.adapters.mujoco_free import Bodies, pairs
+from compare.adapters.free import State
+from compare.adapters.mujoco_free import Bodies, pairs, studied
 from compare.adapters.scene import Scene
 from compare.bench.settled import load
+from compare.kit.engines import PLAIN
+from compare.kit.tasks import Task, carry_out
 from model import InputError
+from model.kinematics import to_world
 from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, check_number
 
 OPTIONS = {
@@ -126,3 +131,43 @@ def _contacts(model: Any, ball: int) -> tuple[list[Pair], list[Pair]]:
             # The margin is taken apart to the digits that it had in the sum.
             pairs[int(down < _DOWN)].append(Pair(**given, margin=round(contact.includemargin - _FAR, 12)))
     return pairs
+
+
+class OnJoints(Bodies):
+    """The engine `mujoco-plain` for cases that have a `motion`; with the first step the whole of it is simulated."""
+
+    def build(self, case: Any, timestep: float) -> None:
+        self._task: Task | None = None
+        if not case.motion:
+            super().build(case, timestep)
+            return
+        (p, x0), t_end = case.motion, timestep * math.ceil(case.times[-1] / timestep - 1e-9)
+        settings, self._begin, self._at = PLAIN.at(timestep, p), np.array(case.body.position), 0
+        self._task = Task(
+            engine=PLAIN.name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=timestep
+        )
+
+    def step(self, n: int) -> None:
+        if not self._task:
+            super().step(n)
+            return
+        if not self._at:
+            (run,) = carry_out([self._task])
+            if run.header.failure:
+                raise InputError(run.header.failure)
+            self._states = np.stack(to_world(run.x, run.theta, self._task.parameters), axis=1)
+            self._states[:, 0] += self._begin - self._states[0, 0]
+        self._at += n
+
+    def state(self) -> State:
+        return tuple(self._states[self._at]) if self._task else super().state()
+
+
+on_joints = OnJoints(
+    "mujoco-plain",
+    "contacts soft enough for sliding let a ball that lands sink in and throw it back",
+    tune=studied,
+)
+on_joints.DECLARED = (
+    "the ball in the vessel on joints: azimuth, radius, height, spin; elliptic cone, settings of the study"
+)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from compare import testing
 from compare.commands import options
 from compare.kit import collection, drawing
-from compare.view import inspection
+from compare.view import motions
 from model import InputError, storage
 
 
@@ -35,24 +36,19 @@ def inspect(args: argparse.Namespace) -> int:
         options.show(gathered, args.json, collection.table(gathered))
         return 0
     if args.plot:
-        from compare.view import motions  # here, because drawing takes a second to load
-
         drawing.save(motions.draw(storage.load(args.file)), args.plot)
-    about = inspection.describe(args.file)
-    options.show(about, args.json, inspection.table(about))
+    about = motions.describe(args.file)
+    options.show(about, args.json, motions.table(about))
     return 0
 
 
 def compare(args: argparse.Namespace) -> int:
     """Lay two motions side by side."""
-    from compare import testing
-    from compare.view import motions  # here, because drawing takes a second to load
-
     a, b = testing.read(args.a), testing.read(args.b)
-    about = motions.describe(a, b)
+    about = motions.compared(a, b)
     if args.plot:
         drawing.save(motions.draw_both(a, b), args.plot)
-    options.show(about, args.json, *motions.tables(about))
+    options.show(about, args.json, *motions.compared_tables(about))
     return 0
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from compare.commands import options, running, signals
 from compare.kit import campaign, collection, sweep
 from compare.kit.tasks import failed_path, journal_path, store
-from compare.view import inspection
+from compare.view import motions
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, storage
 from model.files import reading_json, write_text
@@ -32,8 +32,8 @@ def run(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() as scratch, signals.noted() as heard:
         path = args.output or Path(scratch) / "run.h5"
         failure = store(task, path, stop=lambda: bool(heard))
-        about = inspection.describe(failed_path(path) if failure else path)
-        options.show(about, args.json, inspection.table(about))
+        about = motions.describe(failed_path(path) if failure else path)
+        options.show(about, args.json, motions.table(about))
         if args.output and not failure and not args.json:
             print(f"written to {args.output}")
         if failure:

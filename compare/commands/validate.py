@@ -14,8 +14,7 @@ from compare.catalogue import CLAIMS
 from compare.claim import Outcome, Verdict
 from compare.commands import options, running
 from compare.kit import pages, progress
-from compare.kit.levels import Level
-from compare.kit.sets import sets
+from compare.kit.levels import Level, sets
 from compare.report import results, wording
 
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}

@@ -26,7 +26,7 @@ from model.versions import version
 
 
 class Role(Enum):
-    """How an engine is heard of a claim, and which sets it measures, see `compare.kit.sets.ASSIGNMENTS`."""
+    """How an engine is heard of a claim, and which sets it measures, see `compare.kit.levels.ASSIGNMENTS`."""
 
     ON_TRIAL = auto()
     IN_THE_LIMIT = auto()

@@ -18,9 +18,8 @@ from pathlib import Path
 from compare.kit import record
 from compare.kit.engines import Engine, Role
 from compare.kit.lab import Lab, coarse_step
-from compare.kit.levels import Level
+from compare.kit.levels import ASSIGNMENTS, MOST_WITNESSED, Assignment, Level, sets
 from compare.kit.record import Measurement, Missing, Records
-from compare.kit.sets import ASSIGNMENTS, MOST_WITNESSED, Assignment, sets
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
 from model import Parameters, StorageError

@@ -1,25 +1,103 @@
-"""Motions over time: one on its cases, or two side by side, how far apart and what they were made with."""
+"""Motions in words, tables and pictures: what a file of one holds, it on its cases, two side by side.
+
+Each is first described as data, then shown.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
+from rich.table import Table
 
-from compare.kit import pages, style
+from compare.kit import pages
 from compare.testing import UNITS, Series, common, difference
-from model import InputError, Trajectory
+from model import Case, Flow, InputError, Parameters, Trajectory, kinematics, storage
+from model.kinematics import VARIABLES
 
+if TYPE_CHECKING:  # it takes a second to load
+    from matplotlib.figure import Figure
+
+LISTED, LISTED_OF_TWO = 20, 8
+"""Most phases, and most events, that are listed of one motion; most phases of one of two."""
+PART = 10_000
+"""Samples read at a time, so that a file may be larger than memory."""
 PAIR_COLOURS = "#0072B2", "#D55E00"
 SEEN = 1e-5
 """A gap in m below which it isn't drawn."""
-LISTED = 8
-"""Most stretches in a case that are listed."""
 
 
-def describe(a: Series, b: Series) -> dict[str, Any]:
+def describe(path: Path) -> dict[str, Any]:
+    """Parameters, versions, cases over time, events and last state of a stored run, JSON-able.
+
+    Raises `StorageError` for a file that isn't a trajectory or isn't whole.
+    """
+    samples = 0
+    stretches: list[tuple[Case, float, float]] = []
+    for last in storage.parts(path, PART):
+        samples += len(last.time)
+        for case, start, end in last.phases():
+            if stretches and stretches[-1][0] is case:
+                start = stretches.pop()[1]
+            stretches.append((case, start, end))
+    header, events = last.header, last.events
+    return {
+        **{name: getattr(header, name) for name in ("engine", "failure", "commit", "created")},
+        "complete": last.complete,
+        "parameters": dataclasses.asdict(header.parameters),
+        "flow": header.flow.to_mapping(),
+        "settings": header.settings,
+        "versions": header.versions,
+        "samples": samples,
+        "duration": float(last.time[-1]) if samples else 0.0,
+        "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in stretches],
+        "events": [
+            {"time": t, "from": Case(a).name, "to": Case(b).name}
+            for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
+        ],
+        "last": dict(zip(VARIABLES, last.x[-1], strict=True)) if samples else {},
+    }
+
+
+def table(about: dict[str, Any]) -> Table:
+    """What `describe` returned as a table of two columns."""
+
+    def listed(items: list[str]) -> str:
+        more = [f"… and {len(items) - LISTED} more"] if len(items) > LISTED else []
+        return "\n".join(items[:LISTED] + more) or "none"
+
+    def short(value: Any) -> str:
+        if isinstance(value, list):
+            return f"[{', '.join(map(short, value))}]"
+        return f"{value:g}" if isinstance(value, float) else str(value)
+
+    parameters, flow = about["parameters"], Flow.from_mapping(about["flow"])
+    units = {field.name: pages.readable(field.metadata["unit"]) for field in Parameters.quantities()}
+    told = f"{flow.kind}, ω₀ from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
+    if flow.is_steady:
+        told = f"steady, ω₀ = {flow.value[0]:g} rad/s"
+    elif len(flow.waves):
+        waves = ", ".join(f"{amplitude:g} rad/s at {frequency:g} Hz" for amplitude, frequency, _ in flow.waves)
+        told = f"{flow.kind}, ω₀ = {flow.value[0]:g} rad/s with waves of {waves}"
+    last = zip(VARIABLES, kinematics.UNITS, strict=True) if about["last"] else ()
+    rows = {
+        "engine": f"{about['engine']} ({', '.join(f'{k} {v}' for k, v in about['versions'].items())})",
+        "made": f"{about['created']} {about['commit'][:12]}".strip(),
+        "parameters": ", ".join(f"{name} = {parameters[name]:g} {unit}".strip() for name, unit in units.items()),
+        "drag": parameters["drag"],
+        "flow": told,
+        "settings": ", ".join(f"{k} = {short(v)}" for k, v in about["settings"].items()),
+        "samples": f"{about['samples']} over {about['duration']:g} s",
+        "cases": listed([f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]),
+        "events": listed([f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]),
+        "last state": "\n".join(f"{n} = {about['last'][n]:.9g} {pages.readable(u)}" for n, u in last),
+    }
+    return pages.pairs(rows | ({"failure": about["failure"]} if about["failure"] else {}))
+
+
+def compared(a: Series, b: Series) -> dict[str, Any]:
     """Differences of all quantities that both have, cases, and parameters that differ, JSON-able.
 
     Raises `InputError` as `difference`, and where they have no quantity in common.
@@ -53,15 +131,15 @@ def describe(a: Series, b: Series) -> dict[str, Any]:
     }
 
 
-def tables(about: dict[str, Any]) -> list[Any]:
-    """What `describe` returned, for the terminal."""
+def compared_tables(about: dict[str, Any]) -> list[Any]:
+    """What `compared` returned, for the terminal."""
     rows = {}
     for letter, each in zip("ab", about["motions"], strict=True):
         made = f"{each['name']}{each['engine'] and ', ' + each['engine']}: {each['samples']} samples"
         rows[letter] = f"{made} from {each['from']:g} to {each['to']:g} s"
         listed = [f"{case} {start:.4g}…{end:.4g} s" for case, start, end in each["cases"]]
-        more = f", and {len(listed) - LISTED} more" if len(listed) > LISTED else ""
-        rows[f"cases of {letter}"] = ", ".join(listed[:LISTED]) + more
+        more = f", and {len(listed) - LISTED_OF_TWO} more" if len(listed) > LISTED_OF_TWO else ""
+        rows[f"cases of {letter}"] = ", ".join(listed[:LISTED_OF_TWO]) + more
         rows[f"failure of {letter}"] = each["failure"]
     differ = about["parameters that differ"].items()
     rows["made with other parameters"] = ", ".join(f"{name} = {a} in a, {b} in b" for name, (a, b) in differ)
@@ -79,6 +157,8 @@ def tables(about: dict[str, Any]) -> list[Any]:
 
 def draw_both(a: Series, b: Series) -> Figure:
     """Both motions in the quantities that both have, on the cases of the first, and how far they are apart in each."""
+    from compare.kit import style  # here, because drawing takes a second to load
+
     names = [name for name in a.values if name in b.values]
     shown = ("omega_c", "slip_x", "slip_y", "slip_z", "y", "h")
     seen = [n for n in shown if n in names and (n not in "yh" or max(a[n].max(), b[n].max()) > SEEN)]
@@ -104,6 +184,8 @@ def draw_both(a: Series, b: Series) -> Figure:
 
 def draw(run: Trajectory) -> Figure:
     """omega_c, slip, gaps and forces over time; backgrounds in the colour of the case, named above."""
+    from compare.kit import style  # here, because drawing takes a second to load
+
     t, p = run.time, run.header.parameters
     blue, green, orange, red, pink = "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7"
     scale, unit = (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")

@@ -4,9 +4,8 @@ from collections import Counter
 
 from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Text
-from compare.kit.levels import Level
+from compare.kit.levels import ASSIGNMENTS, COUNT, Level, sets
 from compare.kit.programme import needed
-from compare.kit.sets import ASSIGNMENTS, COUNT, sets
 
 
 def test_names_are_unique():

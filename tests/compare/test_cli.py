@@ -230,7 +230,7 @@ def test_a_long_description_is_that_of_its_parts(tmp_path, monkeypatch, capsys):
     assert cli.main(["simulate", "--time", "1", "--omega-0", "20", "-o", run, "--json"]) == 0
     whole = capsys.readouterr().out
     assert len(json.loads(whole)["cases"]) > 1
-    monkeypatch.setattr("compare.view.inspection.PART", 7)
+    monkeypatch.setattr("compare.view.motions.PART", 7)
     assert cli.main(["inspect", run, "--json"]) == 0
     assert capsys.readouterr().out == whole
 

@@ -18,7 +18,7 @@ from compare.kit import collection, record
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.report import results
-from compare.view import inspection
+from compare.view import motions
 from model import InputError, Parameters, State, StorageError, storage
 from model.hdf5 import seal
 from tests.measured import measured
@@ -185,7 +185,7 @@ def test_a_header_that_says_something_else(tmp_path: Path, files: dict[str, Path
             text = mutated(file.attrs[name].encode(), rng).decode("utf-8", "replace")
             file.attrs[name] = text.replace("\0", "?")
         try:
-            inspection.table(inspection.describe(path))
+            motions.table(motions.describe(path))
         except StorageError as error:
             refusals.append(str(error))
     assert len(refusals) > count / 4

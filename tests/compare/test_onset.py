@@ -12,9 +12,8 @@ from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
 from compare.kit.lab import time_unit
-from compare.kit.levels import Level
+from compare.kit.levels import Level, sets
 from compare.kit.record import Missing, Records
-from compare.kit.sets import sets
 from compare.kit.settling import PRESSES
 from compare.kit.statistics import Measured, turning, zero_and_slope
 from compare.subjects.thresholds.measure import thresholds

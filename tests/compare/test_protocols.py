@@ -10,10 +10,9 @@ import analytic
 from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit.lab import Lab
-from compare.kit.levels import Level
+from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
-from compare.kit.sets import sets
 from compare.kit.statistics import COVERAGE
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.formal import claims as formal

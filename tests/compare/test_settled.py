@@ -9,9 +9,8 @@ from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit import levels, settling
 from compare.kit.lab import time_unit
-from compare.kit.levels import Level
+from compare.kit.levels import Level, sets
 from compare.kit.record import Measurement, Missing, Records
-from compare.kit.sets import sets
 from compare.subjects.flowmeter import claims as flowmeter
 from compare.subjects.flowmeter import measure as characteristic
 from compare.subjects.stationary import claims as stationary
