@@ -1,10 +1,10 @@
-"""Try the wheel mujoco-coulomb, with nothing else than it, MuJoCo and NumPy: python coulomb.py compiled|formulas."""
+"""Try the wheel mujoco-coulomb, with nothing else than it, MuJoCo and NumPy: python coulomb.py compiled|plain."""
 
 import math
 import sys
 
 import mujoco
-import mujoco_coulomb.doors
+import mujoco_coulomb.compiled
 import numpy as np
 from mujoco_coulomb import Coulomb
 
@@ -96,8 +96,8 @@ def is_the_same_through_all_doors(cone, rigid):
 
 
 if __name__ == "__main__":
-    kernels = mujoco_coulomb.doors.kernels.__name__.rpartition(".")[2]
-    assert kernels == sys.argv[1], f"{kernels} serve, not {sys.argv[1]}"
+    form = "compiled" if mujoco_coulomb.compiled.COMPILES else "plain"
+    assert form == sys.argv[1], f"it is {form}, not {sys.argv[1]}"
     for rigid in False, True:
         slides(rigid)
         for cone in CONES:
@@ -106,4 +106,4 @@ if __name__ == "__main__":
     for cone in CONES:
         holds_in_four_stages(cone)
         lands(cone)
-    print(f"mujoco-coulomb, {kernels}, MuJoCo {mujoco.__version__}: as it should be")
+    print(f"mujoco-coulomb, {form}, MuJoCo {mujoco.__version__}: as it should be")

@@ -12,15 +12,12 @@ from typing import Any
 
 from mjsim import corrections, free, landing, recorder, world_axes
 from mjsim.corrections import Ball
+from mjsim.coulomb import compiled as kernels
 
-try:
+if kernels.COMPILES:
     import numba
     from numba.extending import overload, register_jitable
     from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    from mjsim.coulomb import compiled as kernels
-except ImportError:
-    numba = None
 
 
 drive, steps, through = corrections.drive, free.steps, landing.through
@@ -28,7 +25,7 @@ drive, steps, through = corrections.drive, free.steps, landing.through
 
 def served(law: Any, data: Any) -> Any:
     """What `free.under_law` takes a step with, here."""
-    return law.addresses(data) if numba else (law, data)
+    return law.addresses(data) if kernels.COMPILES else (law, data)
 
 
 def _compiled(function: Any, *kinds: Any) -> Any:
@@ -52,7 +49,7 @@ def _compiled(function: Any, *kinds: Any) -> Any:
     return call
 
 
-if numba:
+if kernels.COMPILES:
     for each in (  # the loops call them
         *(corrections.slip, corrections.resistance, corrections.surface, corrections.corrections, corrections.followed),
         *(corrections.lands, corrections.near_axis, corrections.eventful, corrections.velocity_of),

@@ -62,7 +62,6 @@ SAME = {
     *("CAPTION", "CLAIMS", "DEFAULTS", "FIGURES", "PROTOCOL", "PROTOCOLS", "SCHEMA", "SCHEMA_VERSION", "SECTIONS"),
     *("Scene", "Settings", "best", "defaults", "free"),
     "TEXT",  # what is compiled
-    "Simulation",  # under Coulomb's law, compiled and as formulas
     # the same, with another value: degrees of polynomials, records, random numbers, units and symbols of other names
     *("DEGREES", "EPS", "FEWEST", "G", "LEAST", "LISTED", "PATIENCE", "PUSH", "REFINED", "RTOL", "SEED", "SET"),
     *("SKIPPED", "STARTS", "STEPS", "SYMBOLS", "T", "UNITS"),

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from typing import Any, Protocol
-from unittest import mock
 
 import mujoco
 import numpy as np
@@ -23,7 +22,6 @@ import numpy as np
 from compare.kit.pages import Rows
 from docs.studies.tables import write_all
 from mjsim import Coulomb
-from mjsim.coulomb import doors, formulas
 
 G = 9.81
 SCENES = {
@@ -227,11 +225,10 @@ def costs() -> Rows:
             for count in (8, 27, 64, 216)
         },
     }
-    rows = [["cost of a step", *ways, "soft, no numba"]]
+    rows = [["cost of a step", *ways]]
     for name, measure in scenes.items():
         found = [f"{measure(way):.2f}" if not name.startswith(LONG) or way is SOFT else "–" for way in ways.values()]
-        with mock.patch.object(doors, "kernels", formulas):
-            rows.append([name, *found, f"{measure(SOFT):.2f}" if not name.startswith(LONG) else "–"])
+        rows.append([name, *found])
     return rows
 
 

@@ -1,4 +1,4 @@
-"""The law as loops over contacts, compiled with numba, which the extra `fast` installs; `formulas` has it in NumPy.
+"""The law as loops over contacts, compiled with numba, which the extra `fast` installs, or as they stand.
 
 A step of a small scene takes 10 µs, and handing over its arrays would cost as much. So the loops read and write
 `mjData` where the engine keeps it: `mujoco.introspect` tells the offsets, and the engine's functions are called by
@@ -17,23 +17,26 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding
 import mujoco
-import numba
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
 from mujoco.introspect import ast_nodes, structs
-from numba import types
-from numba.core import cgutils
-from numba.experimental.function_type import _get_wrapper_address
-from numba.extending import intrinsic
 
 from . import law
 from .law import Array
 
-if numba.config.DISABLE_JIT:
-    raise ImportError("numba is told not to compile: formulas on arrays must serve")
+try:
+    import llvmlite.binding
+    import numba
+    from llvmlite import ir
+    from numba import types
+    from numba.core import cgutils
+    from numba.experimental.function_type import _get_wrapper_address
+    from numba.extending import intrinsic
+except ImportError:
+    numba = None
+COMPILES = numba is not None and not numba.config.DISABLE_JIT
+"""Whether the loops are compiled."""
 
 # -- where things are in the engine's memory ---------------------------------------------------------------------------
 
@@ -89,7 +92,7 @@ def _offset(layout: Any, name: str) -> int:
     """Where a member stands; -1 for one that this MuJoCo may lack."""
     member = getattr(layout, name, None) or getattr(layout, _OLD.get(name, name), None)
     if member is None and name not in _LATER:
-        raise ImportError(f"MuJoCo {mujoco.__version__} has no {name}: formulas on arrays must serve")
+        raise ImportError(f"Coulomb's law doesn't know MuJoCo {mujoco.__version__}, which has no {name}")
     return int(member.offset) if member else -1
 
 
@@ -132,7 +135,7 @@ def _agrees() -> bool:
 
 
 if not _agrees():
-    raise ImportError("MuJoCo's structures are not laid out as mujoco.introspect says: formulas on arrays must serve")
+    raise ImportError(f"MuJoCo {mujoco.__version__} doesn't lie in memory as its own mujoco.introspect says")
 
 _library = next(
     path
@@ -143,18 +146,20 @@ _engine = ctypes.CDLL(str(_library))
 _simulations = np.zeros(3 * 4096, np.int64)
 """Simulations under `installed`: how many, the address of `adopt`, 0; then model, data and head of each, by address."""
 SIMULATIONS = len(_simulations) // 3 - 1
-for _name in (
-    "mj_step1", "mj_step2", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint", "mj_isSparse", "mj_addContact",
-    "mj_makeConstraint", "mj_island", "mj_projectConstraint", "mj_fwdVelocity",
-):  # fmt: skip
-    llvmlite.binding.add_symbol(f"coulomb_{_name}", ctypes.cast(getattr(_engine, _name), ctypes.c_void_p).value)
-llvmlite.binding.add_symbol("coulomb_realloc", ctypes.cast(ctypes.pythonapi.PyMem_RawRealloc, ctypes.c_void_p).value)
-llvmlite.binding.add_symbol("coulomb_offsets", _offsets.ctypes.data)
-llvmlite.binding.add_symbol("coulomb_simulations", _simulations.ctypes.data)
 
 
-def _function(name: str, *arguments: Any, returns: Any = types.void) -> Any:
-    return types.ExternalFunction(f"coulomb_{name}", returns(*(arguments or (types.intp, types.intp))))
+def _function(name: str, source: Any = _engine, arguments: int = 2, returns: Any = None) -> Any:
+    """A function of integers, addresses and sizes, of a library: as compiled code calls it, or as Python does."""
+    function = getattr(source, name)
+    if COMPILES:
+        llvmlite.binding.add_symbol(f"coulomb_{name}", ctypes.cast(function, ctypes.c_void_p).value)
+        return _linked(name, arguments, {None: types.void, ctypes.c_int: types.int32}.get(returns, types.intp))
+    function.argtypes, function.restype = [ctypes.c_void_p] * arguments, returns
+    return function
+
+
+def _linked(name: str, arguments: int, returns: Any) -> Any:
+    return types.ExternalFunction(f"coulomb_{name}", returns(*[types.intp] * arguments))
 
 
 mj_step1, mj_step2 = _function("mj_step1"), _function("mj_step2")
@@ -162,34 +167,39 @@ mj_fwdActuation, mj_fwdAcceleration = _function("mj_fwdActuation"), _function("m
 mj_fwdConstraint, mj_fwdVelocity = _function("mj_fwdConstraint"), _function("mj_fwdVelocity")
 mj_makeConstraint, mj_island = _function("mj_makeConstraint"), _function("mj_island")
 mj_projectConstraint = _function("mj_projectConstraint")
-mj_isSparse = _function("mj_isSparse", types.intp, returns=types.int32)
-mj_addContact = _function("mj_addContact", types.intp, types.intp, types.intp, returns=types.int32)
-realloc = _function("realloc", types.intp, types.intp, returns=types.intp)
+mj_isSparse = _function("mj_isSparse", arguments=1, returns=ctypes.c_int)
+mj_addContact = _function("mj_addContact", arguments=3, returns=ctypes.c_int)
+realloc = _function("PyMem_RawRealloc", ctypes.pythonapi, returns=ctypes.c_void_p)
 
 
-def _symbol(name: str) -> Any:
-    """A function that gives the address of a symbol, which compiled code in numba's cache finds anew."""
+def _address(name: str, values: npt.NDArray[np.int64]) -> Any:
+    """A function that gives the address of an array, which compiled code in numba's cache finds anew."""
+    where = values.ctypes.data
+    if not COMPILES:
+        return lambda: where
+    llvmlite.binding.add_symbol(f"coulomb_{name}", where)
 
     @intrinsic  # type: ignore[untyped-decorator]
     def address(typing: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            symbol = (
-                cgutils.add_global_variable(builder.module, ir.IntType(64), name)
-                if (name not in builder.module.globals)
-                else builder.module.globals[name]
-            )
-            return builder.ptrtoint(symbol, ir.IntType(64))
+            known, symbol = builder.module.globals, f"coulomb_{name}"
+            found = known.get(symbol) or cgutils.add_global_variable(builder.module, ir.IntType(64), symbol)
+            return builder.ptrtoint(found, ir.IntType(64))
 
         return types.intp(), code
 
     return address
 
 
-_offsets_address, _simulations_address = _symbol("coulomb_offsets"), _symbol("coulomb_simulations")
+_offsets_address, _simulations_address = _address("offsets", _offsets), _address("simulations", _simulations)
 
 
-def _pointer(item: Any) -> Any:
-    """A function that makes an address a pointer, which compiled code indexes."""
+def _pointer(kind: Any) -> Any:
+    """A function that makes an address a pointer to numbers of a kind."""
+    if not COMPILES:
+        pointer_to = ctypes.POINTER(kind)
+        return lambda address: pointer_to.from_buffer(ctypes.c_void_p(address))
+    item = {ctypes.c_int32: types.int32, ctypes.c_int64: types.int64, ctypes.c_double: types.float64}[kind]
 
     @intrinsic  # type: ignore[untyped-decorator]
     def pointer(typing: Any, address: Any) -> Any:
@@ -201,23 +211,13 @@ def _pointer(item: Any) -> Any:
     return pointer
 
 
-_int32, _int64, _real = _pointer(types.int32), _pointer(types.int64), _pointer(types.float64)
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _adopt(typing: Any, function: Any, m: Any, d: Any) -> Any:
-    """What a C function of two integers at an address returns."""
-
-    def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
-        integer = ir.IntType(64)
-        pointer = builder.inttoptr(args[0], ir.FunctionType(integer, [integer, integer]).as_pointer())
-        return builder.call(pointer, args[1:])
-
-    return types.intp(types.intp, types.intp, types.intp), code
+_int32, _int64, _real = (_pointer(kind) for kind in (ctypes.c_int32, ctypes.c_int64, ctypes.c_double))
 
 
 def compiled(function: Any) -> Any:
     """Compiled, once for all constants; a name with an underscore only for others that are compiled."""
+    if not COMPILES:
+        return function
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
     options["_nrt"] = False  # there are no arrays whose references would be counted
     if function.__name__.startswith("_"):
@@ -410,7 +410,7 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
     mj_fwdActuation(m, d)
     mj_fwdAcceleration(m, d)
     slides = numbers[RIGID] > 0
-    for _ in range(numbers[MOST]):
+    for _ in range(int(numbers[MOST])):
         for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
             kept[W * i + law.GUESS] = -1.0
         _refer(m, d, head)
@@ -1262,15 +1262,16 @@ def _put_back(m: int, d: int, head: int) -> bool:
 @functools.cache
 def link() -> None:
     """Compile the law, and let those that follow call it by its address: once is enough."""
-    for function in control, retain:
+    for function in (control, retain) if COMPILES else ():
         with alone(function):
             function.compile((types.intp,) * 3)
         (signature,) = function.nopython_signatures
         llvmlite.binding.add_symbol(f"coulomb_{function.__name__}", _get_wrapper_address(function, signature))
 
 
-control_linked = _function("control", *(types.intp,) * 3)
-retain_linked = _function("retain", *(types.intp,) * 3)
+control_linked, retain_linked = control, retain
+if COMPILES:
+    control_linked, retain_linked = (_linked(name, 3, types.void) for name in ("control", "retain"))
 
 
 @compiled
@@ -1302,6 +1303,26 @@ def _reset(head: int) -> None:
     _real(head)[MOMENT], _int64(head)[PENDING], _int64(head)[TURNED] = math.nan, 0, 0
 
 
+_FIND = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+
+
+def _adopt(function: int, m: int, d: int) -> int:
+    """What a `_FIND` at an address returns."""
+    return int(_FIND(function)(m, d))
+
+
+if COMPILES:
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def _adopt(typing: Any, function: Any, m: Any, d: Any) -> Any:
+        def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
+            integer = ir.IntType(64)
+            pointer = builder.inttoptr(args[0], ir.FunctionType(integer, [integer, integer]).as_pointer())
+            return builder.call(pointer, args[1:])
+
+        return types.intp(types.intp, types.intp, types.intp), code
+
+
 @compiled
 def _serve(m: int, d: int) -> None:
     """`control` for a simulation of a model that is under `doors.Coulomb.installed`; others are left alone."""
@@ -1316,25 +1337,22 @@ def _serve(m: int, d: int) -> None:
         control_linked(m, d, head)
 
 
-def _native(function: Any) -> Any:
-    """As a callback of MuJoCo's."""
-    signature = types.void(types.intp, types.intp)
-    try:
-        return numba.cfunc(signature, cache=True, nopython=True)(function)
-    except RuntimeError:  # no place for a cache
-        return numba.cfunc(signature, nopython=True)(function)
-
-
 @functools.cache
 def callback(find: Callable[[int, int], int]) -> Any:
     """A control callback that asks `find` for the head of a simulation which it sees for the first time; 0: none.
 
     `find` is a Python function of the addresses of model and data.
     """
-    ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(find)
+    ask = _FIND(find)
     _simulations[1] = ctypes.cast(ask, ctypes.c_void_p).value or 0
     _kept.append(ask)
-    return _native(_serve.py_func).ctypes
+    if not COMPILES:
+        return lambda model, data: _serve(model._address, data._address)
+    signature, serve = types.void(types.intp, types.intp), _serve.py_func
+    try:
+        return numba.cfunc(signature, cache=True, nopython=True)(serve).ctypes
+    except RuntimeError:  # no place for a cache
+        return numba.cfunc(signature, nopython=True)(serve).ctypes
 
 
 _kept: list[Any] = []

@@ -11,12 +11,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from . import compiled
 from .law import WIDTH, Array, Law, free_bodies
-
-try:
-    from . import compiled as kernels
-except ImportError:
-    from . import formulas as kernels  # type: ignore[no-redef]
 
 _INTEGRATORS = ("EULER", "RK4", "IMPLICIT", "IMPLICITFAST")
 
@@ -73,7 +69,7 @@ class Coulomb:
         if rigid:
             _see_ahead(model)
             self._damped = _damp_at_the_end(model)
-        self._own = kernels.Simulation(model, self._law)
+        self._own = compiled.Simulation(model, self._law)
         self._adopted: dict[int, Any] | None = None
 
     def _check(self) -> None:
@@ -195,13 +191,13 @@ class Coulomb:
             raise ValueError("the model's flag actuation is disabled, and with it the callback: use step() instead")
         self._adopted = {}
         _INSTALLED[model._address] = self
-        kernels.forget_all()
-        mujoco.set_mjcb_control(kernels.callback(_simulation))
+        compiled.forget_all()
+        mujoco.set_mjcb_control(compiled.callback(_simulation))
         try:
             yield self
         finally:
             del _INSTALLED[model._address]
-            kernels.forget_all()
+            compiled.forget_all()
             self._adopted = None
             if not _INSTALLED:
                 mujoco.set_mjcb_control(None)
@@ -215,13 +211,13 @@ def _simulation(model: int, data: int) -> Any:
     """What serves a simulation that the callback meets for the first time, as its form tells it, or 0."""
     coulomb = _INSTALLED.get(model)
     if coulomb is None or coulomb._adopted is None:
-        kernels.remember(model, data, 0)
+        compiled.remember(model, data, 0)
         return 0
     known = coulomb._adopted
     if data not in known:
-        known[data] = kernels.Simulation(coulomb.model, coulomb._law) if known else coulomb._own
+        known[data] = compiled.Simulation(coulomb.model, coulomb._law) if known else coulomb._own
     head = known[data].serve(data)
-    kernels.remember(model, data, head)
+    compiled.remember(model, data, head)
     return head
 
 
