@@ -7,6 +7,7 @@ Of balls on joints `drive` of `mjsim.corrections`, of free ones those of `mjsim.
 from __future__ import annotations
 
 import hashlib
+import inspect
 from pathlib import Path
 from typing import Any
 
@@ -50,14 +51,12 @@ def _compiled(function: Any, *kinds: Any) -> Any:
 
 
 if kernels.COMPILES:
-    for each in (  # the loops call them
-        *(corrections.slip, corrections.resistance, corrections.surface, corrections.corrections, corrections.followed),
-        *(corrections.lands, corrections.near_axis, corrections.eventful, corrections.velocity_of),
-        *(world_axes.outwards, world_axes.driven, world_axes.spun, world_axes.against, world_axes.slip),
-        *(world_axes.unwrapped, world_axes.joint_velocities, free.step, free.note, landing.closes, landing.average),
-    ):
-        register_jitable(each)
-    _files = (Path(str(module.__file__)) for module in (corrections, recorder, world_axes, free, landing, kernels))
+    _modules = corrections, world_axes, free, landing
+    for module in _modules:  # the loops call their functions
+        for each in vars(module).values():
+            if inspect.isfunction(each) and each.__module__ == module.__name__:
+                register_jitable(each)
+    _files = (Path(str(module.__file__)) for module in (*_modules, recorder, kernels))
     _digest = hashlib.sha256(b"".join(file.read_bytes() for file in _files)).hexdigest()[:16]
     _fields = len(Ball._fields)
 
@@ -69,7 +68,7 @@ if kernels.COMPILES:
     def _under_law(served: Any, duration: Any, anew: Any) -> Any:
         return lambda served, duration, anew: kernels.step_of(served[0], served[1], served[2], duration, anew)
 
-    _rows, _flags = numba.types.Array(numba.float64, 2, "A"), numba.types.Array(numba.boolean, 1, "C")
+    _rows, _flags = numba.types.Array(numba.float64, 2, "A"), (numba.int8[::1], numba.boolean[::1])
     _given = numba.types.Array(numba.float64, 2, "A", readonly=True)
-    drive = _compiled(drive, numba.float64[::1], *[_rows] * 2, *[_flags] * 2, *[_given] * 2, *[_rows] * 10)
+    drive = _compiled(drive, numba.float64[::1], *[_rows] * 2, *_flags, *[_given] * 2, *[_rows] * 10)
     steps, through = _compiled(steps), _compiled(through)

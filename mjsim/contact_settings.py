@@ -42,19 +42,6 @@ _FALL = 0.01
 """Distance fallen in a step from which a contact is an impact, in units of the gap that counts as touching."""
 
 
-_NEEDS: dict[tuple[str, Any], tuple[dict[str, Any], str]] = {
-    ("wall", "prism"): ({"coordinates": "free", "servo": 0.0}, "at an edge two facets share the ball"),
-    ("coordinates", "free"): ({"memory": False, "order": 1}, "the corrections are for the joints"),
-    ("law", "rigid"): (
-        {"coordinates": "free", "wall": "tangent", "servo": 0.0, "noslip_iterations": 0},
-        "it holds contacts by itself",
-    ),
-    ("integrator", "discrete"): ({"law": "soft"}, "rigid contacts are for the others"),
-    ("memory", True): ({"cone": "elliptic"}, "rows of the pyramid mix normal and friction"),
-}
-"""What a value of a setting needs of others, and why."""
-
-
 def _number(default: float, unit: str, allowed: Range) -> Any:
     return dataclasses.field(default=default, metadata={"unit": unit, "allowed": allowed})
 
@@ -93,20 +80,11 @@ class ContactSettings:
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
     order: int = _choice(2, 1)
     """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
-    coordinates: str = _choice("polar", "free")
-    """``polar``: azimuth, radius and height as joints; ``free``: a free joint, for comparison (`mjsim.free`)."""
-    wall: str = _choice("tangent", "prism")
-    """``tangent``: one plane turned to the ball's azimuth; ``prism``: `facets` fixed planes."""
-    facets: int = _number(90, "1", Range(3, 2000, whole=True))
-    """Number of planes of the prism."""
-    law: str = _choice("soft", "rigid")
-    """``soft``: contacts as the engine has them; ``rigid``: by `mjsim.Coulomb`, for a free ball, where no parameter of
-    soft contacts decides anything."""
-    cone: str = _choice("elliptic", "pyramidal")
-    integrator: str = _choice("Euler", "implicit", "implicitfast", "discrete")
-    iterations: int = _number(100, "1", Range(1, whole=True))
-    tolerance: float = _number(1e-12, "1", NOT_NEGATIVE)
-    noslip_iterations: int = _number(0, "1", Range(0, whole=True))
+    scene: str = _choice("joints", "facets", "rigid")
+    """``joints``: azimuth, radius and height as joints, the wall a plane that is turned to the ball. ``facets``: a free
+    ball in `scene.FACETS` fixed planes, friction of the pyramidal cone, as MuJoCo comes. ``rigid``: a free ball whose
+    contacts obey `mjsim.Coulomb`, for which no parameter of soft ones decides anything."""
+    integrator: str = _choice("Euler", "implicit")
 
     def __post_init__(self) -> None:
         if len(self.solref) != 2:
@@ -118,10 +96,8 @@ class ContactSettings:
                 check_number(field.name, getattr(self, field.name), field.metadata["unit"], field.metadata["allowed"])
             elif "known" in field.metadata:
                 check_choice(field.name, getattr(self, field.name), field.metadata["known"])
-        for (name, value), (needed, why) in _NEEDS.items():
-            for other, only in needed.items() if getattr(self, name) == value else ():
-                if (found := getattr(self, other)) != only:
-                    raise InputError(f"{name} = {value!r} needs {other} = {only!r}, not {found!r}: {why}")
+        if self.scene != "joints" and (self.memory or self.servo or self.order == 2):
+            raise InputError(f"scene = {self.scene!r} needs memory = False, servo = 0, order = 1: it has no joints")
         if self.timestep > self.largest_timestep * (1 + 1e-12):
             raise InputError(
                 f"timestep = {self.timestep:g} s is too large for the contact settings: solref {self.solref[0]:g} s, "
@@ -132,7 +108,7 @@ class ContactSettings:
     @property
     def rigid(self) -> bool:
         """Whether contacts are rigid."""
-        return self.law == "rigid"
+        return self.scene == "rigid"
 
     @property
     def largest_timestep(self) -> float:
@@ -188,12 +164,6 @@ class ContactSettings:
         kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
         return friction * max(0.0, self.b_f * slip_speed - kept) / (self.softness * load)
 
-    def fastest_slip(self, load: float, friction: float) -> float:
-        """Slip speed (m s-1) up to which contact is continuous, where `hover_number` is 1; with memory any."""
-        if friction == 0 or self.rigid or self.memory:
-            return math.inf
-        return self.softness * load * (1 + friction**2 / self.impratio) / (friction * self.b_f)
-
     def regularisation_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f.
 
@@ -222,8 +192,7 @@ class ContactSettings:
     @property
     def friction_lag(self) -> float:
         """How far in steps past the middle of a step friction takes its direction by itself, 1/(b_f h) - 1/2."""
-        corrected = self.order == 2 and self.cone == "elliptic"
-        return 1 / (self.b_f * self.timestep) - 0.5 if corrected else 0.0
+        return 1 / (self.b_f * self.timestep) - 0.5 if self.order == 2 else 0.0
 
     @property
     def shifts_surfaces(self) -> bool:
@@ -274,7 +243,7 @@ class ContactSettings:
     @classmethod
     def rigid_at(cls, timestep: float) -> Self:
         """Rigid contacts of a free ball, for a step of any length."""
-        own = cls(coordinates="free", law="rigid", solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
+        own = cls(scene="rigid", solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
         return dataclasses.replace(own, timestep=timestep)
 
     def suited(self, p: Parameters) -> Self:

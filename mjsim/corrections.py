@@ -14,17 +14,18 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from mjsim.contact_settings import ContactSettings
-from mjsim.recorder import NORMALS, NQ, NSENSOR, SENSORS
+from mjsim.recorder import COORDINATES, NORMALS, NSENSOR, SENSORS
 from model import Parameters
 from model.arrays import Array
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 
 _SLIDES = 9.0
 """A contact slides if its speed squared exceeds this times that of its change in a step; ending slip changes faster."""
+NOT, LANDS, GOES_ON, BEGINS = range(4)
+"""Whether a ball takes the next step in fine ones: not; as it lands; in the shortest, as it did the last one; or in
+these as the first of all, without a blow, after which it goes on upon its joints however forces change."""
 _NEAR = 32.0
 """Steps to the axis from which on they are shorter: the azimuth turns by up to 1/32 in one."""
-_FEW = 16.0
-"""A hovering contact lands from the speed that its load gives it in so many steps; one that only hovers reaches 1.2."""
 _NORMAL_A, _NORMAL_B = (SENSORS + at for at in range(NSENSOR)[NORMALS])
 
 
@@ -63,8 +64,6 @@ class Ball(NamedTuple):
     hover_A: float
     hover_B: float
     """Load (m s-2) per slip speed below which slip lifts a contact, s-1."""
-    weight: float
-    """g, m s-2."""
 
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
@@ -82,7 +81,7 @@ class Ball(NamedTuple):
         return cls(
             p.R, p.r, p.m * p.c, *laws[p.drag], p.m, inertia, inertia * p.fluid_torque, settings.midpoint,
             gain, settings.slowest_fall(p.g), settings.timestep, memory, settings.friction_lag,
-            p.mu * hover, p.eta * hover, p.g,
+            p.mu * hover, p.eta * hover,
         )  # fmt: skip
 
 
@@ -207,12 +206,8 @@ def surface(v: tuple[float, float], change: tuple[float, float], ball: Ball) -> 
 
 def eventful(h: float, y: float, v: Velocity, last: Velocity, normals: tuple[float, float], ball: Ball) -> bool:
     """Whether a ball that lacks a contact lands in the coming step, or comes near the vessel's axis."""
-    rho = ball.R - h
-    A_x, A_z, B_y, B_z = slip(v, rho, ball.r)
-    lifts = ball.memory == 0
-    hover_A, hover_B = lifts * ball.hover_A * math.hypot(A_x, A_z), lifts * ball.hover_B * math.hypot(B_y, B_z)
-    floor = normals[0] == 0 and lands(y, v.v_y, last.v_y, hover_A, ball)
-    wall = normals[1] == 0 and (lands(h, v.v_h, last.v_h, hover_B, ball) or near_axis(rho, v, ball))
+    floor = normals[0] == 0 and lands(y, v.v_y, last.v_y, ball)
+    wall = normals[1] == 0 and (lands(h, v.v_h, last.v_h, ball) or near_axis(ball.R - h, v, ball))
     return floor or wall
 
 
@@ -222,19 +217,12 @@ def near_axis(rho: float, v: Velocity, ball: Ball) -> bool:
     return rho < ball.R / 4 and rho * rho <= reach * reach * (v.v_h * v.v_h + along * along)
 
 
-def lands(gap: float, speed: float, last: float, hover: float, ball: Ball) -> bool:
-    """Whether a gap, known `ahead` of its speed, closes by the end of a step with the acceleration of the last one.
-
-    A contact that would hover under half of the weight, or under what presses it now, may open and close all the time:
-    that is no landing, unless it comes down faster than the forces of a few steps can make it. `hover` is the load,
-    m s-2, below which it does so with the present slip and damping.
-    """
+def lands(gap: float, speed: float, last: float, ball: Ball) -> bool:
+    """Whether a gap, known `ahead` of its speed, closes by the end of a step with the acceleration of the last one."""
     change = speed - last
     gap = gap - ball.step * ball.ahead * (speed + ball.ahead / 2 * change)  # at the beginning
     end, closing = gap + ball.step * (speed + change / 2), speed * speed - 2 * change * gap / ball.step
-    presses, few = 2 * hover < ball.weight and ball.step * hover < -change, _FEW * ball.step * hover
-    falls = closing > ball.fall * ball.fall and (presses or closing > few * few)
-    return end < 0 and speed + change < 0 and falls
+    return end < 0 and speed + change < 0 and closing > ball.fall * ball.fall
 
 
 def followed(margin: float, gap: float, gain: float) -> float:
@@ -264,9 +252,9 @@ def drive(
     qvel: Array, last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
     adhesion: Array,
 ) -> bool:  # fmt: skip
-    """Let the margins follow the gaps and set what drives the next step; mark runs that are `due` to land in it, and
-    return whether there are any. A row (runs, columns) begins with place and velocities; to the sensors that follow is
-    to be added what they leave out of the normal forces.
+    """Let the margins follow the gaps and set what drives the next step; say of runs that land in it that they are
+    `due`, and return whether any takes it in fine ones. A row (runs, columns) begins with place and velocities; to the
+    sensors that follow is to be added what they leave out of the normal forces.
 
     Forces of contacts (6 and 2, runs) are those of the engine's last step, but for runs where others are `held`.
     """
@@ -280,15 +268,15 @@ def drive(
         given = float(forces[1, k]), float(forces[2, k]), float(forces[3, k]), float(forces[4, k])
         loads = float(forces[6, k]), float(forces[7, k])
         theta, h, y = float(qpos[0, k]), float(qpos[1, k]), float(qpos[2, k])
-        if loads[0] * loads[1] == 0 and eventful(h, y, v, before, loads, ball):
-            due[k] = True
-        some |= due[k]
+        if due[k] == NOT and loads[0] * loads[1] == 0 and eventful(h, y, v, before, loads, ball):
+            due[k] = LANDS
+        some |= due[k] != NOT
         if ball.gain > 0:
             margins[0, k] = followed(float(margins[0, k]), y, ball.gain)
             margins[1, k] = followed(float(margins[1, k]), h, ball.gain)
         turn[0, k], turn[3, k] = math.cos(theta / 2), math.sin(theta / 2)
         qpos[3, k], qpos[4:7, k] = 1.0, 0.0
-        row[k, :NQ], row[k, NQ:SENSORS] = qpos[:, k], qvel[:, k]
+        row[k, :COORDINATES], row[k, COORDINATES:SENSORS] = qpos[:COORDINATES, k], qvel[:, k]
         driving, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]), (lift_A, lift_B) = corrections(
             v, before, ball.R - h, float(omega_0[k]), given, loads, ball
         )

@@ -23,7 +23,6 @@ from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_number
-from model.trajectory import SAMPLE
 
 if TYPE_CHECKING:
     from mjsim.free import Free
@@ -93,7 +92,7 @@ class Run:
         models = [built[p][0] for p in scenes]
         given = models, scenes, settings, states, theta_0
         self._stepper: Free | Polar
-        if settings.coordinates == "free":
+        if settings.scene != "joints":
             from mjsim.free import Free  # here, because the law of its contacts takes long to load
 
             self._stepper = Free(*given)
@@ -108,15 +107,13 @@ class Run:
             for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
-        corner = (1 / math.cos(math.pi / settings.facets) - 1) * (settings.wall == "prism")
+        corner = (1 / math.cos(math.pi / scene.FACETS) - 1) * (settings.scene == "facets")
         self._deepest = np.array([(p.r + (p.R + p.r) * corner, p.r) for p in parameters])
         """How far h and y may be negative: a ball with its centre beyond wall or floor has come through."""
         self._classifier = Classifier(parameters, settings)
         self._steps = (self._count - 1) * self._interval + 1
         """All that are taken: nothing is needed of those after the last sample."""
         self._rows = np.empty((max(64, NOTED // len(parameters)), len(parameters), recorder.COLUMNS))
-        self._waiting = [np.empty(0, SAMPLE)] * len(parameters)
-        """Samples of each run whose case is not yet decided."""
         self._ends = [math.inf] * len(parameters)
         """When each run broke down, s."""
 
@@ -132,7 +129,7 @@ class Run:
 
     def __iter__(self) -> Iterator[Blocks]:
         blocks, state = self._journal.recall() if self._journal else (iter(()), {})
-        done, step, kept = 0, int(state.get("steps", 0)), list[Array]()
+        done, step, kept = 0, int(state.get("steps", 0)), [state["waiting"]] if state else []
         if state:
             self._stepper.restore(state)
             self._classifier.restore(state)
@@ -150,9 +147,12 @@ class Run:
             self._progress(step / self._steps)
             if step < self._steps and step - first < BLOCK_STEPS and sum(map(len, kept)) < BLOCK:
                 continue
-            raw, kept, first = np.concatenate(kept), [], step
+            first, ready = step, -(-self._classifier.decided // self._interval) - done
+            raw, waiting = np.split(np.concatenate(kept), [ready])
+            kept = [waiting]  # their cases are not yet decided
             if self._journal:
-                state = {"steps": np.array(step)} | self._stepper.state() | self._classifier.state()
+                state = {"steps": np.array(step), "waiting": waiting}
+                state |= self._stepper.state() | self._classifier.state()
                 self._journal.note(raw, state)
             yield self._finish(done, raw)
             done += len(raw)
@@ -167,8 +167,8 @@ class Run:
 
     def _finish(self, first: int, raw: Array) -> Blocks:
         """Samples of each run from raw ones (samples, runs, columns), cut where a run breaks down."""
-        last = first + len(raw)
-        time = np.arange(first, last, dtype=np.float64) * (self._interval * self._settings.timestep)
+        samples = np.arange(first, first + len(raw))
+        time = samples.astype(float) * (self._interval * self._settings.timestep)
         inside = (raw[..., 1:3] > -self._deepest).all(axis=2)
         sound = np.logical_and.accumulate((np.abs(raw) < HUGE).all(axis=2) & inside)
         blocks: Blocks = []
@@ -181,13 +181,8 @@ class Run:
                 left = [f"{name} = {part[name][-1]:.6g} {unit}" for name, unit in names] if count else []
                 failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
                 self.headers[i] = header = dataclasses.replace(header, failure=failure)
-            part = np.concatenate([self._waiting[i], part])
-            steps = np.rint(part["time"] / self._settings.timestep).astype(int)
-            over = last == self._count or header.failure
-            ready = len(part) if over else int(np.searchsorted(steps, self._classifier.decided))
-            part["case"] = self._classifier.cases(i, steps)
-            blocks.append(part[:ready])
-            self._waiting[i] = part[ready:]
+            part["case"] = self._classifier.cases(i, samples[:count] * self._interval)
+            blocks.append(part)
         return blocks
 
 

@@ -1,10 +1,7 @@
-"""The ball on a free joint, for comparison with the joint chain.
+"""The ball on a free joint, which may cross the axis; of what is done between the steps it has drag alone.
 
-A free ball takes the curve of the wall from the engine: the more independent witness and the less accurate one, since
-MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis. Of the
-corrections between the steps only drag and the turning of the wall apply to it.
-
-With ``law="rigid"`` its contacts obey `mjsim.Coulomb`, which serves any model and knows nothing of this one.
+With ``scene="facets"`` it is MuJoCo as it comes. With ``scene="rigid"`` contacts obey `mjsim.Coulomb`, which serves any
+model and knows nothing of this one.
 Semi-implicit steps are leapfrog: places are half a step ahead of velocities. The wall is a block that is turned to the
 ball before each step and moves during it as a cylinder does past the ball (`against`).
 """
@@ -31,7 +28,7 @@ from model.arrays import Array
 from model.kinematics import to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
-_NQ, _SEEN, (_A_x, _A_y, _B_x, _B_y) = recorder.NQ, recorder.SENSORS, recorder.SLIPS
+_PLACE, _SEEN, (_A_x, _A_y, _B_x, _B_y) = recorder.COORDINATES, recorder.SENSORS, recorder.SLIPS
 
 
 class Body(NamedTuple):
@@ -94,15 +91,14 @@ def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) 
 
 
 def note(row: Any, qpos: Any, qvel: Any, ahead: float, ball: Ball) -> None:
-    """Coordinates, but for the azimuth, and velocities of the joint chain, upright, as `recorder` has them.
+    """Coordinates, but for the azimuth, and velocities of the joint chain, as `recorder` has them.
 
     The place is `ahead` of the velocities; these are along the axes of where the ball was.
     """
     row[1], row[2] = ball.R - math.hypot(qpos[0], qpos[1]), qpos[2] - ball.r
-    row[3], row[4], row[5], row[6] = 1.0, 0.0, 0.0, 0.0
     velocities = joint_velocities(qpos, qpos[3:], qvel, ahead)
     for i in range(6):
-        row[_NQ + i] = velocities[i]
+        row[_PLACE + i] = velocities[i]
 
 
 def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:
@@ -177,7 +173,6 @@ class FreeBall:
             ball=Ball(*map(float, Ball.of(p, settings))),
             served=self.law and compiled.served(self.law, data),
         )
-        self._turns = settings.wall == "tangent"
         self.place(x, theta_0)
 
     def place(self, x: npt.ArrayLike, theta: float) -> None:
@@ -207,7 +202,5 @@ class FreeBall:
         note(row, place + turned, velocity, 0.0, ball)
         data.qfrc_applied[:] = driven(place, turned, velocity, [0.0] * 6, 0.0, omega_0, ball)
         row[0] = self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
-        if self._turns:
-            self.body.wall[:] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
         mujoco.mj_step(self.model, data)
         row[_SEEN:] = *data.sensordata, row[2], row[1]

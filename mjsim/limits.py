@@ -12,7 +12,6 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
 from model import Flow, InputError, Parameters, State, time_scales
 from model.errors import check_type
-from model.kinematics import slip_speeds
 from model.parameters import Range, check_number
 
 
@@ -37,8 +36,7 @@ def check_runs(
 def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> None:
     """Refuse a state on or beyond the axis, where polar coordinates end.
 
-    Warn if contact can't be continuous at its slip speeds, where nothing keeps it so, taking the load of gravity for
-    both contacts, or if friction at both makes them chatter.
+    Warn if friction at both contacts makes them chatter.
     """
     x = State.one(x0)
     if settings.contact_decay(p.mu, p.eta) > 1:
@@ -48,14 +46,6 @@ def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> 
             stacklevel=4,
         )
     check_place(x, p, settings.touching(p.g))
-    for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x.y, x.h), strict=True):
-        fastest = settings.fastest_slip(p.g, friction)
-        if abs(gap) < settings.touching(p.g) and speed > fastest:
-            warnings.warn(
-                f"the ball slips at {speed:.3g} m s-1 at {contact} at the start, but with these settings contact "
-                f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem gives softer ones",
-                stacklevel=4,
-            )
 
 
 def check_place(x: State, p: Parameters, depth: float) -> None:

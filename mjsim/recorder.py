@@ -8,12 +8,13 @@ import numpy.typing as npt
 from mjsim.classify import Contacts
 from model import Parameters, State, trajectory
 from model.arrays import Array
-from model.kinematics import frame, rotated
+from model.kinematics import frame
 
-NQ, NV, NSENSOR = 7, 6, 30
-"""Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors and the two gaps."""
-SENSORS = NQ + NV
-"""Where the sensors begin in the row of a step, which begins with place and velocities before it."""
+COORDINATES, NSENSOR = 3, 30
+"""Sizes of the row of a step: azimuth, inward and upward; after their velocities and spin two contact sensors and gaps.
+"""
+SENSORS = COORDINATES + 6
+"""Where the sensors begin; place and velocities are those before the step."""
 COLUMNS = SENSORS + NSENSOR
 SLIPS = 12, 13, 26, 27
 """Where they hold the slip velocities of A and B."""
@@ -23,24 +24,22 @@ _COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8)
 
 
 def joint_state(x: npt.ArrayLike, theta: float, p: Parameters) -> tuple[Array, Array]:
-    """qpos (..., 7) and qvel (..., 6) of states x (..., 6 or 8), with the orientation at rest.
+    """Places (..., 3) and velocities (..., 6) of the joints of states x (..., 6 or 8).
 
     The axes of the joints are the paper's, so that the velocities are v_A, v_B and the slip of (4) rearranged:
     ``qvel = (omega_c, v_h, v_y, o_x, o_y - omega_c, o_z)`` with the angular velocity o of the ball.
     """
     y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = State.of(x)
     roll = (p.R - h) / p.r * omega_c
-    zero, one = np.zeros_like(y), np.ones_like(y)
-    qpos = np.stack([zero + theta, h, y, one, zero, zero, zero], axis=-1)
+    place = np.stack([np.zeros_like(y) + theta, h, y], axis=-1)
     qvel = np.stack([omega_c, v_h, v_y, slip_x + roll, slip_y - roll - omega_c, slip_z + v_y / p.r], axis=-1)
-    return qpos, qvel
+    return place, qvel
 
 
-def state(qpos: Array, qvel: Array, p: Parameters) -> State:
-    """The states of joint coordinates, as columns; the inverse of `joint_state`, for any orientation."""
-    _, h, y, *_ = np.moveaxis(qpos, -1, 0)
-    omega_c, v_h, v_y, *_ = np.moveaxis(qvel, -1, 0)
-    o_x, o_y, o_z = np.moveaxis(rotated(qpos[..., 3:], qvel[..., 3:]), -1, 0)
+def state(place: Array, qvel: Array, p: Parameters) -> State:
+    """The states of joint coordinates, as columns; the inverse of `joint_state`."""
+    _, h, y = np.moveaxis(place, -1, 0)
+    omega_c, v_h, v_y, o_x, o_y, o_z = np.moveaxis(qvel, -1, 0)
     roll = (p.R - h) / p.r * omega_c
     return State(y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h)
 
@@ -66,10 +65,10 @@ def samples(time: Array, rows: Array, lead: float, p: Parameters) -> npt.NDArray
 
     Places are `lead` s ahead of velocities, and are brought back by these: that leaves h^2/8 times the acceleration.
     """
-    qpos, qvel, sensors = np.split(rows, [NQ, SENSORS], axis=1)
-    loads = forces(sensors, qpos[:, 0])
-    qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
-    block = trajectory.samples(time, qpos[:, 0], state(qpos, qvel, p), p)
+    place, qvel, sensors = np.split(rows, [COORDINATES, SENSORS], axis=1)
+    loads = forces(sensors, place[:, 0])
+    place = place - lead * qvel[:, :3]
+    block = trajectory.samples(time, place[:, 0], state(place, qvel, p), p)
     for k, (contact, sensor) in enumerate(zip("AB", np.split(sensors[:, :-2], 2, axis=1), strict=True)):
         gap, speed, touches = block[f"gap_{contact}"], block[f"slip_speed_{contact}"], sensor[:, _COUNT] > 0
         block[f"force_{contact}"] = loads[:, k]

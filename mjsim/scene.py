@@ -15,6 +15,8 @@ from mjsim.contact_settings import ContactSettings
 from model import InputError, Parameters
 
 SCENE = Path(__file__).with_name("scene.xml")
+FACETS = 90
+"""Planes that stand for the wall as MuJoCo comes."""
 
 _HEAVY = 1e6
 """Mass of a wall that moves, divided by that of the ball."""
@@ -27,9 +29,8 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     spec = mujoco.MjSpec.from_string(SCENE.read_text("utf-8"))
     option, body, wall, height = spec.option, spec.body("ball"), spec.geom("wall"), 2 * p.r
     option.gravity = (0.0, 0.0, -p.g)
-    for name in ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations"):
+    for name in ("timestep", "impratio"):
         setattr(option, name, getattr(settings, name))
-    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     body.pos, body.mass, body.inertia = (p.R, 0.0, p.r), p.m, (p.j * p.m * p.r**2,) * 3
     spec.joint("azimuth").pos = (p.R, -p.r, 0.0)
@@ -39,7 +40,7 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     spec.geom("vessel").pos, spec.geom("vessel").size = (0.0, 0.0, height * 1.005), (p.R + p.r, height, 0.0)
     for name, friction in (("A", p.mu), ("B", p.eta)):
         _set_pair(spec.pair(name), friction, settings)
-    if settings.coordinates == "free":
+    if settings.scene != "joints":
         for each in (*map(spec.sensor, ("gap A", "gap B")), *map(spec.joint, ("azimuth", "inward", "upward", "spin"))):
             spec.delete(each)
         body.add_freejoint(name="free")
@@ -53,10 +54,10 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         spec.delete(wall)
         part = moving.add_geom(name="wall", type=box, size=[half] * 3, pos=(p.R + p.r + half, 0, 0), rgba=rgba)
         part.mass, part.contype, part.conaffinity = p.m / _HEAVY, 0, 0
-    if settings.wall == "prism":  # of fixed planes, tangent to the vessel's cylinder
-        sensor = spec.sensor("B")
-        for facet in range(settings.facets):
-            azimuth = 2 * math.pi * facet / settings.facets
+    if settings.scene == "facets":  # fixed planes, tangent to the vessel's cylinder
+        option.cone, sensor = mujoco.mjtCone.mjCONE_PYRAMIDAL, spec.sensor("B")
+        for facet in range(FACETS):
+            azimuth = 2 * math.pi * facet / FACETS
             outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
             place, plane = (p.R + p.r) * outwards + [0.0, 0.0, height], mujoco.mjtGeom.mjGEOM_PLANE
             part = spec.worldbody.add_geom(name=f"facet{facet}", type=plane, pos=place, size=wall.size, rgba=wall.rgba)

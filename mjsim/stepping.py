@@ -26,7 +26,7 @@ from mujoco.batch import MODEL_FIELDS, Batch
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Velocity, ball_of, near_axis
+from mjsim.corrections import BEGINS, GOES_ON, LANDS, NOT, Ball, Velocity, ball_of, near_axis
 from model import Parameters, State
 from model.arrays import Array
 from model.kinematics import slip_speeds
@@ -70,17 +70,13 @@ class Polar:
         self._last, self._forces = np.zeros((6, runs)), np.zeros((8, runs))
         """Velocities a step ago; generalised forces of the contacts in the last step (6), N and N m, and normal ones,
         which are the engine's, but for"""
-        self._held, self._due = np.ones(runs, dtype=bool), np.full(runs, settings.servo > 0)
-        """runs whose last step wasn't the engine's; and runs that take the next one in fine ones."""
-        self._finely = set[int]()
-        """Those among them that take it in the shortest ones, as they did the last; and those that are"""
-        self._calm = set[int]()
-        """calm: in the first step, without a blow, after which they go on upon their joints however forces change."""
+        self._held, self._due = np.ones(runs, dtype=bool), np.full(runs, NOT, dtype=np.int8)
+        """runs whose last step wasn't the engine's; and whether they take the next one in fine ones."""
         self._adhesion = array("pair_adhesion")[:2]
         """By how much the engine tells that contacts bear less than they do, N."""
         given = {"forces": self._forces, "qvel": self._qvel, "last": self._last, "qpos": self._qpos}
         given["margins"] = self.margins
-        self._state = given | {"start": self._start, "due": self._due}
+        self._state: dict[str, Any] = given | {"start": self._start, "due": self._due}
         """All that is carried from one step to the next."""
         self._arguments = (
             np.array([Ball.of(p, settings) for p in parameters]).T, self._due, self._held, array("qfrc_constraint"),
@@ -93,10 +89,9 @@ class Polar:
             place, v = recorder.joint_state(x, theta_0, p)
             fall = settings.slowest_fall(p.g)
             calm = all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h)))
-            if calm and self._due[run]:
-                self._calm.add(run)
-                self._finely.add(run)
-            self._set(run, place[:3], v, np.zeros(6))
+            if settings.servo:
+                self._due[run] = BEGINS if calm else LANDS
+            self._set(run, place, v, np.zeros(6))
 
     def _set(self, run: int, place: Array, v: Array, rates: Array) -> None:
         """Let a run go on from a place and velocities at one time, with such accelerations and the forces it has."""
@@ -112,28 +107,30 @@ class Polar:
             lands = list(self._landing()) if some else []
             self._last[:] = self._qvel
             self._step()
-            self._held[:] = self._due[:] = False
+            self._held[:], self._due[:] = False, NOT
             row[:, recorder.SENSORS :] += self._sensors
-            for run, x, theta, rates, gaps in lands:
+            for run, how, x, theta, rates, gaps in lands:
                 fine = self._fine(self._parameters[run])
-                landed = fine.step(x, theta, rates, float(fluid[run]), run in self._finely)
-                self._land(run, landed)
+                landed = fine.step(x, theta, rates, float(fluid[run]), how != LANDS)
+                self._land(run, landed, how == BEGINS)
                 row[run, recorder.SENSORS :], row[run, -2:] = landed.seen, gaps
 
     def _landing(self) -> Iterator[tuple[Any, ...]]:
         """Runs that land in the coming step, but for those that have diverged.
 
-        Of each its number; state and azimuth at the time of its velocities, what a second changes of these; and gaps.
+        Of each its number, and how; state and azimuth at the time of its velocities, what a second changes of these;
+        and gaps.
         """
         sound = (np.abs(self._qpos) < HUGE).all(axis=0) & (np.abs(self._qvel) < HUGE).all(axis=0)
-        for run in np.flatnonzero(self._due & sound).tolist():
-            qpos, v, lead = self._qpos[:, run].copy(), self._qvel[:, run], self.lead
-            gaps, rates = qpos[2:0:-1].copy(), (v - self._last[:, run]) / self._h
-            qpos[:3] -= lead * (v + rates * lead / 2)[:3]
-            yield run, recorder.state(qpos, v, self._parameters[run]), float(qpos[0]), rates, gaps
+        for run in np.flatnonzero((self._due != NOT) & sound).tolist():
+            ahead, v = self._qpos[:3, run], self._qvel[:, run]
+            rates = (v - self._last[:, run]) / self._h
+            place = ahead - self.lead * (v + rates * self.lead / 2)[:3]
+            x, gaps = recorder.state(place, v, self._parameters[run]), ahead[:0:-1].copy()
+            yield run, int(self._due[run]), x, float(place[0]), rates, gaps
 
-    def _land(self, run: int, landed: Landed) -> None:
-        """Go on after a step in fine ones: upon the joints, if forces change slowly and the axis is far.
+    def _land(self, run: int, landed: Landed, calm: bool) -> None:
+        """Go on after a step in fine ones: upon the joints, if forces change slowly or are `calm`, and the axis is far.
 
         The contacts get margins with which they bear their forces.
         """
@@ -141,15 +138,13 @@ class Polar:
         near = near_axis(p.R - h, Velocity(*v), ball_of(self._arguments[0], run)) and landed.forces[7] == 0
         pace = max(abs(v[0]), math.sqrt(p.g / p.R))
         most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(landed.forces[[1, 2]]).max())
-        fast = landed.change > _CHANGE * self._h * pace * most and run not in self._calm
-        self._due[run] = near or fast
-        self._calm.discard(run)
-        self._finely = self._finely | {run} if self._due[run] else self._finely - {run}
+        fast = landed.change > _CHANGE * self._h * pace * most and not calm
+        self._due[run] = GOES_ON if near or fast else NOT
         self._forces[:, run] = landed.forces
         self._set(run, landed.place, v, landed.rates * (not near))
         if self._settings.servo:
-            x = recorder.state(np.append(landed.place, [1.0, 0, 0, 0]), v, p)
-            given = zip((y, h), landed.forces[6:] / p.m, (p.mu, p.eta), slip_speeds(x.stacked(), p), strict=True)
+            slips = slip_speeds(recorder.state(landed.place, v, p).stacked(), p)
+            given = zip((y, h), landed.forces[6:] / p.m, (p.mu, p.eta), slips, strict=True)
             self.margins[:, run] = [self._settings.held(*map(float, each)) for each in given]
 
     def state(self) -> dict[str, Array]:
@@ -162,8 +157,7 @@ class Polar:
         """Go on from such a state."""
         for name, values in self._state.items():
             values[...] = state[name]
-        self._held[:], self._finely = True, set(np.flatnonzero(self._due).tolist())
-        self._calm.clear()
+        self._held[:] = True
 
 
 def _fine(p: Parameters, settings: ContactSettings) -> Fine:

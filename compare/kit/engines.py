@@ -130,14 +130,9 @@ def newcomer(step: float) -> ContactSettings:
     return replace(contacts, servo=0.0, memory=False, order=1)
 
 
-def rigid(step: float) -> ContactSettings:
-    """A free ball in the vessel, its wall a plane that goes with it, and Coulomb's law for any model."""
-    return replace(newcomer(ContactSettings.timestep), coordinates="free", law="rigid", timestep=step)
-
-
 def as_it_comes(step: float) -> ContactSettings:
     """MuJoCo's own parameters for a free ball in a vessel of flat facets, with its own friction cone, the pyramid."""
-    return replace(newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
+    return replace(newcomer(step), scene="facets")
 
 
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
@@ -218,7 +213,7 @@ NEWCOMER = replace(
 COULOMB = replace(
     PLAIN,
     name="mujoco-coulomb",
-    configure=lambda given, p: rigid(given.get("timestep", ContactSettings.timestep)),
+    configure=lambda given, p: ContactSettings.rigid_at(given.get("timestep", ContactSettings.timestep)),
     study=None,
     stream=mjsim.Run,
     title="MuJoCo under a law of friction for any model, in the limit of no time step",

@@ -16,6 +16,8 @@ from model.arrays import Array
 
 ROLLING = states.SMOOTH.replace(omega_0=10.0)
 SLIPPING = states.SLIPPING.p
+TOLERANCE = 1e-12
+"""Of the solver, as mjsim/scene.xml has it."""
 SLIPPING_START = State(omega_c=13.85, slip_x=-4.0, slip_z=10.0)
 """A start close enough to steady slipping to settle within a few seconds."""
 
@@ -112,7 +114,7 @@ def _creep() -> Iterator[Row]:
         settings = _at(1e-3, solimp, impratio=impratio, memory=False)
         run = simulate(ROLLING, (0.0, 0.0, ROLLING.omega_0, 0.0, 0.0, 0.0), 10.0, settings=settings)
         friction = float(np.hypot(run.force_A[-1, 0], run.force_A[-1, 2])) / ROLLING.m
-        creep, stops = float(settings.creep_speed(friction)), float(np.sqrt(settings.tolerance * impratio))
+        creep, stops = float(settings.creep_speed(friction)), float(np.sqrt(TOLERANCE * impratio))
         what = f"creep at A in rolling, d = {solimp:g}, impratio = {impratio:g}"
         yield Row(what, "m s-1", creep, float(run.slip_speed_A[-1]), stops)
 
@@ -126,7 +128,8 @@ def _hover() -> Iterator[Row]:
         settings = [_at(1e-3, solimp, damping, memory=False) for damping in (0.1, 0.2)]
         (_, (first, _)), (last, (second, _)) = (_steady_slipping(each) for each in settings)
         load, slip = last["force_A"][1] / SLIPPING.m, float(last["slip_speed_A"])
-        limit = 0.2 * settings[1].fastest_slip(load, SLIPPING.mu) / slip
+        softer = settings[1].softness * load * (1 + SLIPPING.mu**2 / settings[1].impratio)
+        limit = 0.2 * softer / (SLIPPING.mu * settings[1].b_f * slip)
         what = f"b_f h at which slipping begins to hover, d = {solimp:g}"
         yield Row(what, "1", limit, float(0.1 + 0.1 * first / (first - second)), _turning(1e-3))
 

@@ -64,9 +64,7 @@ def rungs(step: float) -> Ways:
     """From what a newcomer writes to ours, each with one thing more than the one before."""
     theirs = "MuJoCo's defaults"
     return {
-        f"{theirs}, coordinates free, wall prism, cone pyramidal": as_it_comes(step),
-        f"{theirs}, coordinates free, cone pyramidal": replace(as_it_comes(step), wall=newcomer(step).wall),
-        f"{theirs}, coordinates free": replace(newcomer(step), coordinates="free"),
+        f"{theirs}, scene facets": as_it_comes(step),
         theirs: newcomer(step),
         "ours, memory off, servo 0, order 1": ContactSettings.at(step, memory=False, servo=0.0, order=1),
         "ours, memory off, order 1": ContactSettings.at(step, memory=False, order=1),
@@ -79,8 +77,7 @@ def rivals(step: float) -> Ways:
     """Settings whose error is compared with their cost."""
     named = rungs(step)
     chosen = ("ours", "ours, order 1", "ours, memory off, servo 0, order 1", "MuJoCo's defaults")
-    free = ContactSettings.at(step, coordinates="free", memory=False, order=1)
-    return {name: named[name] for name in chosen} | {"ours, memory off, order 1, coordinates free": free}
+    return {name: named[name] for name in chosen}
 
 
 def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
@@ -94,7 +91,7 @@ def landings(step: float) -> Rows:
     That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball rebounds within
     0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of `states.HITTING`.
     """
-    lone, theirs = "MuJoCo's defaults", "coordinates free, wall prism, cone pyramidal"
+    lone = "MuJoCo's defaults"
     bare = plain(step)
     ways: Ways = {
         "ours (mujoco)": ContactSettings.at(step),
@@ -106,9 +103,8 @@ def landings(step: float) -> Rows:
         "mujoco-plain, damping ratio 2, step divided by 10": replace(plain(step / 10), solref=(step / 5, 2.0)),
         "mujoco-plain, step divided by 10": plain(step / 10),
         "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
-        "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
         lone: newcomer(step),
-        f"{lone}, {theirs} (mujoco-defaults)": as_it_comes(step),
+        f"{lone}, scene facets (mujoco-defaults)": as_it_comes(step),
     }
     rows = [["settings", "ω_c 5 ms after a landing", "rebound", "motion with it", "motion that hits the wall"]]
     for name, way in ways.items():
@@ -159,7 +155,7 @@ def _cost(task: Task) -> float:
     What has no batches, as free balls, runs by itself.
     """
     settings = task.settings
-    if not isinstance(settings, ContactSettings) or settings.coordinates != "polar":
+    if not isinstance(settings, ContactSettings) or settings.scene != "joints":
         return states.cost(task)
     given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings), []
     for _ in range(states.REPEATS):

@@ -1,19 +1,18 @@
 """A free ball under Coulomb's law for any model is right in the limit of no step, and wrong where it must be."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import analytic
 import mjsim
-from compare.kit.engines import COULOMB, rigid
-from mjsim import compiled, free
+from compare.kit.engines import COULOMB
+from mjsim import ContactSettings, compiled, free
 from mjsim.contact_settings import FORESEEN
 from mjsim.coulomb.law import Law
-from model import Case, InputError, Parameters, SimulationError, State
+from model import Case, Parameters, SimulationError, State
 
 P = Parameters.named("reference")
+rigid = ContactSettings.rigid_at
 STEPS = np.array([2e-3, 1e-3, 5e-4])
 
 
@@ -83,22 +82,11 @@ def test_compiled_steps_are_those_in_python(request) -> None:
     assert mjsim.simulate(p, x, 0.3, settings=settings).x == pytest.approx(fast.x, rel=1e-7, abs=1e-9)
 
 
-def test_without_the_law_the_state_is_lost() -> None:
-    settings = replace(rigid(5e-4), law="soft")
-    assert abs(omega_c(P.replace(omega_0=12.0), settings)[0] - 1) > 0.05
-
-
 @pytest.mark.usefixtures("plain_python")
 def test_a_ball_flies_through_a_wall_that_is_not_turned(monkeypatch) -> None:
     monkeypatch.setattr(free, "unwrapped", lambda azimuth, last: last)
     with pytest.raises(SimulationError, match="diverged"):
         omega_c(P.replace(omega_0=12.0), rigid(5e-4), 1.0)
-
-
-@pytest.mark.parametrize("change", [{"coordinates": "polar"}, {"servo": 0.1}, {"integrator": "discrete"}])
-def test_settings_that_the_law_cannot_serve(change) -> None:
-    with pytest.raises(InputError, match=r"(law = 'rigid' needs|needs law = 'soft')"):
-        replace(rigid(1e-3), **change)
 
 
 def test_engine_takes_its_steps_from_these_settings() -> None:
