@@ -32,6 +32,8 @@ def test_runs_are_those_of_simulate(way, restitution):
     given = [(p, x0, flow) for p in laws for x0 in STARTS.values() for flow in FLOWS.values()]
     if restitution:
         given = [(p, x0._replace(h=0.02), flow) for p, x0, flow in given if x0.y or x0.h][::5]
+    elif way == "plain":  # is slow: each law, start and flow in some of them
+        given = given[::7]
     sets, x0s, flows = zip(*given, strict=True)
     settings = Settings(restitution=restitution, initial_impact=True)
     many = simulate_many(sets, x0s, 1.0, flows, settings, sample_interval=0.1, threads=2)

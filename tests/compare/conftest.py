@@ -10,7 +10,7 @@ import pytest
 from compare.gallery import FIGURES
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import GapError
-from compare.kit.engines import MUJOCO
+from compare.kit.engines import EVENT
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.report import report
@@ -32,9 +32,9 @@ def few_figures() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
-    """Where protocols run MuJoCo at the quick level."""
+    """Where protocols run the event-driven simulation, the quickest engine, at the quick level."""
     with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
-        yield Lab(campaign, MUJOCO, Level.QUICK)
+        yield Lab(campaign, EVENT, Level.QUICK)
 
 
 @pytest.fixture(scope="module")

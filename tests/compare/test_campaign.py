@@ -53,11 +53,6 @@ def undisturbed(tmp_path_factory):
     return data(directory)
 
 
-def test_workers_and_batches_change_no_bit(tmp_path, undisturbed):
-    assert completed(tmp_path, workers=2, batch=2, asked=reversed(tasks())) == []
-    assert data(tmp_path) == undisturbed
-
-
 def test_what_is_done_is_not_done_again(tmp_path):
     seen = []
     with Campaign(tmp_path, workers=0, report=lambda *now: seen.append(now), doing="it") as campaign:
@@ -214,8 +209,9 @@ def deadly(tasks, *where):
 
 
 def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(tmp_path, undisturbed, monkeypatch):
+    """Workers, batches and the order of tasks change no bit."""
     monkeypatch.setattr("compare.kit.campaign.run_batch", deadly)
-    failures = completed(tmp_path, workers=2, batch=3)
+    failures = completed(tmp_path, workers=2, batch=3, asked=reversed(tasks()))
     assert failures == [Failure(tasks()[2], "its worker died (killed, or out of memory)")]
     stored = data(tmp_path)
     assert len(stored) == 8
@@ -335,32 +331,36 @@ if __name__ == "__main__":
     process.communicate(timeout=60)  # the pipe ends once the worker, which holds it, too, is gone
 
 
-@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGKILL])
-def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_path, by):
-    # Runs of some tenths of a second: however late the signal comes, most of them are still to be done.
-    sweep = f"sweep --vary omega_0=5:10:24 --batch 2 --time 20 -o {tmp_path} --workers".split()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "compare", *sweep, "1"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        # a shell starts what it runs in the background with SIGINT ignored
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    while len(list(tmp_path.glob("*.h5"))) < 2:
-        time.sleep(0.02)
-    (os.killpg if by is signal.SIGKILL else os.kill)(process.pid, by)
-    out, err = process.communicate(timeout=60)
-    kept = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
-    assert 2 <= len(kept) < 12
-    assert len(data(tmp_path)) == 2 * len(kept)
-    if by is not signal.SIGKILL:
-        assert process.returncode == 128 + by
-        assert "the same command goes on from there" in err
-        assert "Traceback" not in out + err
-    else:
-        assert cli.main([*sweep, "0"]) == 0
-        assert len(data(tmp_path)) == 24
-        assert kept.items() <= {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}.items()
+def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_path):
+    """Interrupted once a batch is whole, then killed, then left alone: each time it goes on from there."""
+
+    def stored():
+        return {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
+
+    # Runs of some tenths of a second: however late the signal comes, some of them are still to be done.
+    sweep, kept = f"sweep --vary omega_0=5:10:16 --batch 2 --time 15 -o {tmp_path} --workers".split(), {}
+    for by, send in ((signal.SIGINT, os.kill), (signal.SIGKILL, os.killpg)):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "compare", *sweep, "1"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+            # a shell starts what it runs in the background with SIGINT ignored
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )
+        while len(stored()) == len(kept):
+            time.sleep(0.02)
+        send(process.pid, by)
+        said, _ = process.communicate(timeout=60)
+        assert "Traceback" not in said
+        assert kept.items() < stored().items()
+        kept = stored()
+        assert len(data(tmp_path)) == 2 * len(kept) < 16
+        if by is signal.SIGINT:
+            assert process.returncode == 128 + by
+            assert "the same command goes on from there" in said
+    assert cli.main([*sweep, "0"]) == 0
+    assert len(data(tmp_path)) == 16
+    assert kept.items() <= stored().items()
     assert not list(tmp_path.glob(".*"))

@@ -70,7 +70,7 @@ def sliding(case):
     """
     (surface,), bodies = case.surfaces, case.bodies[::-1]
     normal = np.array(surface.normal)
-    way, h, press = np.array([normal[2], 0.0, -normal[0]]), 4e-5, case.g * normal[2]
+    way, h, press = np.array([normal[2], 0.0, -normal[0]]), 1e-4, case.g * normal[2]
     masses, count = [body.mass for body in bodies], len(bodies)
     bounds = [press * surface.friction * sum(masses), press * case.between * masses[-1]][:count]
     belt, v = float(np.dot(surface.velocity, way)), [float(np.dot(body.velocity, way)) for body in bodies]
@@ -200,9 +200,9 @@ def rolling_on_a_rim(case):
 WAYS = {
     "rolling-disc": (rolling_on_a_rim, 1e-7),
     "tripod-turns": (tripod, 1e-9),
-    "plank": (sliding, 1e-4),
+    "plank": (sliding, 2.5e-4),
     "thousandfold": (sliding, 1e-9),
-    "belt": (sliding, 1e-4),
+    "belt": (sliding, 2.5e-4),
     "dry-joint": (swinging, 1e-6),
     "rocking-block": (rocking, 1e-6),
     "bounce": (bouncing, 1e-6),

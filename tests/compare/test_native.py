@@ -8,10 +8,11 @@ import mujoco
 import pytest
 
 from compare.adapters.mujoco_free import Bodies
-from compare.bench import cases, native
+from compare.bench import native
 from compare.bench.native import Pair
 from compare.commands import cli
 from model import InputError
+from tests.exact_cases import CASES
 
 BALL = '<body name="ball"><freejoint/><geom name="ball" type="sphere" size="0.01"/></body>'
 WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
@@ -33,8 +34,9 @@ def read(tmp_path):
     return read
 
 
-def test_the_league_takes_the_settings_of_a_file(tmp_path, capsys):
+def test_the_league_takes_the_settings_of_a_file(tmp_path, capsys, monkeypatch):
     """A block on a slope creeps as MuJoCo comes and holds with a cone; the step is that of the file."""
+    monkeypatch.setattr("compare.bench.league.cases", lambda: [CASES["block-rests"], CASES["rolls-on-both"]])
     (tmp_path / "mine.xml").write_text(mjcf(FLOOR + BALL, '<option timestep="0.001" cone="elliptic" impratio="100"/>'))
     words = ["--settings", str(tmp_path / "mine.xml"), "--engine", "mujoco-defaults", "-o", str(tmp_path), "--json"]
     assert cli.main(["league", *words]) == 0
@@ -53,9 +55,8 @@ def test_settings_come_through_to_the_engine(read):
     )
     A, B = Pair(solref=(0.005, 0.8), margin=1e-4), Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3))
     given = dataclasses.replace(read(mjcf(FLOOR + WALL + BALL, text)), A=A, B=B)
-    (case,) = (case for case in cases() if case.name == "rolls-on-both")
     body = Bodies("mine", "", tune=given.tune)
-    body.build(case, 0.0015)
+    body.build(CASES["rolls-on-both"], 0.0015)
     option = body.model.opt
     assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
     assert (option.impratio, option.iterations, option.cone) == (7.0, 33, mujoco.mjtCone.mjCONE_ELLIPTIC)

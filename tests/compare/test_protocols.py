@@ -1,4 +1,4 @@
-"""Protocols of motions say what broke down or isn't there, and read each number as it is; formal claims are algebra."""
+"""Protocols of motions say what broke down or isn't there, and read each number as it is."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 
 import analytic
-from compare.claim import Outcome
-from compare.judge import judge
 from compare.kit.lab import Lab
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
 from compare.kit.statistics import COVERAGE
 from compare.subjects.flowmeter import measure as flowmeter
-from compare.subjects.formal import claims as formal
 from compare.subjects.motion.measure import laws, motions
 from compare.subjects.slipping.measure import growth, onset
 from compare.subjects.unsteady import measure as unsteady
@@ -65,12 +62,6 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
     forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / p.eta)}
     run = SimpleNamespace(header=SimpleNamespace(parameters=p), time=time, x=x, **forces)
     assert motions.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
-
-
-def test_formal_claims_are_algebra():
-    for verdict in judge(formal.CLAIMS, Records()):
-        assert verdict.outcome is Outcome.CONFIRMED
-        assert {check.measurement.engine for check in verdict.checks} == {"theory"}
 
 
 # --- a pulsating flow, laws at every instant, tops between samples ----------------------------------------------

@@ -27,7 +27,7 @@ def omega_c(p, settings, lasts=10.0):
 @pytest.mark.parametrize(("omega_0", "order", "off"), [(12.0, 3.0, 1e-6), (25.0, 2.0, 1e-6)])
 def test_stationary_states_are_right_in_the_limit(omega_0, order, off) -> None:
     p = P.replace(omega_0=omega_0)
-    coarse, middle, fine = (omega_c(p, rigid(step), 40.0)[0] - 1 for step in STEPS)
+    coarse, middle, fine = (omega_c(p, rigid(step), 30.0)[0] - 1 for step in STEPS)
     # In sliding a contact may be as deep as `Law.depth` allows, which falls with the square of the step, or less.
     assert np.log2((coarse - middle) / (middle - fine)) == pytest.approx(order, abs=0.6)
     assert (coarse - 6 * middle + 8 * fine) / 3 == pytest.approx(0.0, abs=off)

@@ -279,8 +279,9 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         value = mean - each.p.omega_0
         spread = float(np.abs(turns * each.frequency - usual).max())
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
-        # Slip begins and ends within a coarse step: the mean error is uncertain by half of that part.
-        error = Measured(value, drift + abs(value) / round(task.steps / PERIODS))
+        # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by half of that part.
+        within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
+        error = Measured(value, drift + within)
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
         yield if_found(row, f"{at} is none")
 
