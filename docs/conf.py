@@ -16,8 +16,11 @@ from types import ModuleType
 
 from docutils import nodes
 from docutils.utils.math import MathError, latex2mathml
+from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.util import logging
+
+from compare.kit.pages import typeset
 
 HERE = Path(__file__).parent
 PACKAGES = ("model", "analytic", "mjsim", "compare")
@@ -117,7 +120,7 @@ def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
 
 
 def as_typed(app: Sphinx, tree: nodes.document) -> None:
-    """Cells of shell commands look like a shell, cells that write a file like that file; formulas are checked."""
+    """Cells look like the shell or the file that they are, long values are left out; formulas are checked."""
     for block in tree.findall(nodes.literal_block):
         first, _, rest = block.astext().partition("\n")
         if first.startswith("!"):
@@ -129,11 +132,27 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
         elif first.startswith("%config "):
             block.children = [nodes.Text(rest.lstrip())]
         block.rawsource = block.astext()
+    for said in list(tree.findall(addnodes.desc_annotation)):
+        if said.astext().startswith(" = ") and len(said.astext()) > 100:  # a table, which its module shows better
+            said.parent.remove(said)
     for formula in tree.findall(lambda node: isinstance(node, nodes.math | nodes.math_block)):
         try:
             latex2mathml.tex2mathml(formula.astext())
         except MathError as error:
             log.warning("formula %s: %s", formula.astext(), error, location=formula)
+
+
+_AS_IT_IS = (nodes.FixedTextElement, nodes.literal, nodes.math, nodes.title, nodes.raw, addnodes.desc_signature)
+
+
+def symbols(app: Sphinx, tree: nodes.document) -> None:
+    """Symbols in running text are set as on the pages of results, and look like formulas; code and titles stay."""
+    for text in list(tree.findall(nodes.Text)):
+        up, shown = text.parent, typeset(text.astext())
+        while up and not isinstance(up, _AS_IT_IS):
+            up = up.parent
+        if up is None and "<" in shown and "rhdf5" not in text.parent.astext():  # R is a program there
+            text.parent.replace(text, nodes.raw("", shown, format="html"))
 
 
 def docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
@@ -155,7 +174,9 @@ def signature(
     app: Sphinx, what: str, name: str, obj: object, options: object, arguments: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
     """Aliases of types by their names."""
-    short = [text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in (arguments, returned)]
+    array = "ndarray[tuple[Any, ...], dtype[float64]]"
+    given = [text and text.replace(array, "Array") for text in (arguments, returned)]
+    short = [text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in given]
     return short[0], short[1]
 
 
@@ -165,5 +186,6 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", source_links)
     app.connect("include-read", source_links)
     app.connect("doctree-read", as_typed)
+    app.connect("doctree-read", symbols)
     app.connect("autodoc-process-docstring", docstring)
     app.connect("autodoc-process-signature", signature)

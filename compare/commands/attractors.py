@@ -125,20 +125,22 @@ def _table(data: dict[str, Any]) -> pages.Rows:
 
 def _page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any], table: pages.Rows) -> str:
     """The table in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
-    values = (f"{f.metadata['symbol']} = {getattr(p, f.name):.5g} {f.metadata['unit']}" for f in p.quantities())
-    given = ", ".join(value.removesuffix(" 1") for value in values)
+    symbols = {f.name: f.metadata["symbol"] for f in p.quantities()}
+    units = {f.name: pages.readable(f.metadata["unit"]) for f in p.quantities()}
+    given = ", ".join(f"{symbols[name]} = {getattr(p, name):.5g} {unit}".rstrip() for name, unit in units.items())
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
     lines += ["```sh", shlex.join(words), "```", "", pages.markdown(table)]
     for branch in itertools.chain.from_iterable(each["branches"] for each in data["sets"]):
         name = branch["parameter"]
-        lines += ["", f"## Followed in {name}", ""]
-        lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"]), ""]
-        rows = [[name, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]]
+        symbol = symbols[name]
+        lines += ["", f"## Followed in {symbol}", ""]
+        lines += [*(f"* {p['kind']} at {symbol} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"])]
+        rows = [[symbol, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]]
         for orbit in branch["orbits"]:
             numbers = orbit[name], orbit["period"], orbit["omega_c"], 1e3 * orbit["height"], _largest(orbit)
             rows.append([*(f"{number:.7g}" for number in numbers), "yes" if orbit["stable"] else "no"])
-        lines.append(pages.markdown(rows))
+        lines += ["", pages.markdown(rows)]
     return "\n".join(lines) + "\n"
 
 

@@ -92,7 +92,7 @@ def reading(p: Parameters) -> str:
         return f"the ball goes round with the fluid ({' or '.join(case.name for case in cases)})"
     if len(cases) == 1 and cases[0] not in (Case.SR, Case.NR):
         lag = 1 - attractors[0].state.omega_c / p.omega_0
-        return f"the ball slips ({cases[0].name}) and lags {lag:.1%} behind the fluid"
+        return f"the ball slips ({cases[0].name}) and lags {100 * lag:.1f} % behind the fluid"
     return f"ambiguous: {', '.join(c.name for c in cases)} all attract, the reading depends on the history"
 
 
@@ -142,7 +142,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     if data["fluid_inertia"]:
         shifts = ", ".join(
             f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "
-            f"by {100 * shift:+.2g} %"
+            f"by {float(f'{100 * shift:.2g}'):+g} %"
             for name, shift in data["fluid_inertia"].items()
             if math.isfinite(shift)
         )
@@ -157,6 +157,12 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     return [*first, head, groups, pages.table("Thresholds", limits, justify="left"), shown, *remarks]
 
 
+def _complex(value: complex, shown: Callable[[float, int], str]) -> str:
+    """A complex number and its conjugate; a real part that is round-off is 0."""
+    real = value.real if abs(value.real) > 1e-12 * abs(value) else 0.0
+    return shown(real, 4) + (f" ± {shown(abs(value.imag), 4)}i" if value.imag else "")
+
+
 _ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] = {
     "ω_c (rad/s)": lambda s, shown: shown(s["x"]["omega_c"], 8),
     "ω̃_x (rad/s)": lambda s, shown: shown(s["x"]["slip_x"], 8),
@@ -168,10 +174,7 @@ _ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] =
     "forces admissible": lambda s, _: "yes" if s["exists"] else "no",
     "within the case": lambda s, _: s["stability"].removesuffix(" stable"),
     "against slipping": lambda s, _: "stable" if s["slip_stable"] else "unstable",
-    "rightmost eigenvalue (1/s)": lambda s, shown: (
-        shown(s["eigenvalues"][0].real, 4)
-        + (f" ± {shown(abs(s['eigenvalues'][0].imag), 4)}i" if s["eigenvalues"][0].imag else "")
-    ),
+    "rightmost eigenvalue (1/s)": lambda s, shown: _complex(s["eigenvalues"][0], shown),
     "free": lambda s, _: ", ".join(s["family"]) or "-",
     "Re": lambda s, shown: shown(s["Re"], 4),
 }

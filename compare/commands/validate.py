@@ -15,6 +15,7 @@ from compare.claim import Outcome, Verdict
 from compare.commands import options, running
 from compare.kit import pages, progress
 from compare.kit.levels import Level, sets
+from compare.kit.pages import readable
 from compare.report import results, wording
 
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
@@ -105,12 +106,11 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
 
 def checks(verdict: Verdict) -> Table:
     """Every number of one claim."""
-    rows = [["set", "ω₀ (rad/s)", "quantity", "predicted", "measured", "deviation", "tolerance", ""]]
+    rows = [["set", "ω₀ (rad/s)", "quantity", "predicted", "measured", "deviation", "tolerance", "", "with"]]
     for check in verdict.checks:
         m = check.measurement
         numbers = wording.value(m, check.predicted), wording.value(m, m.value)
         sizes = wording.size(check.deviation, "+"), wording.size(check.tolerance)
-        rows.append(
-            [m.set, f"{m.parameters.omega_0:.6g}", wording.SYMBOLS[m.quantity], *numbers, *sizes, wording.mark(check)]
-        )
+        found = [f"{wording.SYMBOLS[m.quantity]} {readable(m.unit)}".rstrip(), *numbers, *sizes, wording.mark(check)]
+        rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found, wording.conditions(m.conditions)])
     return pages.table(f"{verdict.claim.id}  {verdict.claim.statement}", rows, no_wrap=True)

@@ -38,8 +38,8 @@ def doubts(off: float) -> list[str]:
         return []
     return [
         "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the fluid's torque on "
-        f"the spinning ball, changes its numbers by up to {off:.0%}, more than {real_fluid.LIMIT:.0%}: all that "
-        "follows may be off by as much."
+        f"the spinning ball, changes its numbers by up to {100 * off:.0f} %, more than {100 * real_fluid.LIMIT:g} %: "
+        "all that follows may be off by as much."
     ]
 
 
@@ -47,14 +47,14 @@ def torque(p: Parameters) -> str:
     """What the fluid's torque does to the ball that rolls at both points, by Stokes and by its boundary layer."""
     laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
     stokes_told, layer_told = (
-        f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({law.shift:+.0%}), and "
+        f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({100 * law.shift:+.0f} %), and "
         f"it would need {law.friction:#.2g} times the friction that there is"
         for law in laws
     )
     how = "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
     said = f"At ω₀ = {p.omega_0:g} rad/s the fluid's torque, which is left out, brakes the spin {how} = {stokes_told}"
     if layer.Re > 8 and not p.fluid_torque:
-        said += f"; with a boundary layer, as for the spin's Re = {layer.Re:.2g}, at {layer_told}"
+        said += f"; with a boundary layer, as for the spin's Re = {rounded(layer.Re, most=2)}, at {layer_told}"
     if max(stokes.friction, layer.friction) > 1:
         said += ". With more than 1 it can't roll at both points"
     known = p.nu_f or p.fluid_torque
@@ -80,7 +80,7 @@ def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
     if off:
         size = abs(value)
         left = min(most, max(3, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1))
-    return f"{float(f'{value:.{left}g}'):.{most}g}"
+    return f"{float(f'{value:.{left}g}'):.{max(most, 6)}g}"
 
 
 def sentences(made: Design) -> list[str]:

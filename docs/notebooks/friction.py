@@ -159,7 +159,7 @@ plt.show()
 SLIDE = SLOPE.replace("0 15 0", "0 30 0").replace("0.6", "0.25")
 SLIDE = SLIDE.replace('pos="0.013 0 0.0485"', 'pos="0.025 0 0.0433"')
 exact = 9.81 * (np.sin(np.radians(30)) - 0.25 * np.cos(np.radians(30)))
-figure, (loads, speeds) = plt.subplots(1, 2)
+figure, (loads, speeds) = plt.subplots(1, 2, layout="constrained")
 for name, color in {"plain": "#D55E00", "Coulomb's law": "#0072B2"}.items():
     model = mujoco.MjModel.from_xml_string(SLIDE)
     data, coulomb = mujoco.MjData(model), Coulomb(model)
@@ -177,8 +177,7 @@ for name, color in {"plain": "#D55E00", "Coulomb's law": "#0072B2"}.items():
     print(f"{name}: without contact in {lost:.0%} of the steps after 0.2 s")
 loads.set(xlabel="time (s)", ylabel="normal force (N)", ylim=(0, 40))
 speeds.set(xlabel="time (s)", ylabel="speed less exact speed (m/s)")
-loads.legend()
-figure.tight_layout()
+figure.legend(*loads.get_legend_handles_labels(), loc="outside upper center", ncols=2)
 plt.show()
 
 # %% [markdown]

@@ -65,8 +65,8 @@ def page(*searches: Searched) -> str:
     """The page on searches: how often the ball hops for ever in each part of the box."""
     text = [
         "# Where the ball hops for ever",
-        "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are "
-        "the friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). An attractor with a small basin is "
+        "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: μ and η are "
+        "the friction of floor and wall, κ = c√(R/g) and Ω₀ = ω₀√(R/g). An attractor with a small basin is "
         "missed by a few starts. `python -m docs.studies.figures` writes this page from what "
         "`python -m docs.studies.search --save` kept.",
         "What is kept was screened by time stepping; the search now screens by event-driven simulation, in a fifth of "
@@ -74,7 +74,7 @@ def page(*searches: Searched) -> str:
     ]
     for record in searches:
         least, most = record.search.box["kappa"]
-        text += [f"## Drag from kappa = {least:.3g} to {most:.3g}", summary(record), pages.markdown(table(record))]
+        text += [f"## Drag from κ = {least:.3g} to {most:.3g}", summary(record), pages.markdown(table(record))]
     return "\n\n".join(text) + "\n"
 
 

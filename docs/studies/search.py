@@ -48,6 +48,8 @@ BOX = {
     "Omega_0": (0.3, 6.0),
 }
 """The box that is searched, unless another one is named."""
+SYMBOLS = {"mu": "μ", "eta": "η", "kappa": "κ", "Omega_0": "Ω₀"}
+"""How groups are written whose names are not their symbols."""
 LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""
 
@@ -175,11 +177,12 @@ def table(record: Searched) -> pages.Rows:
     points, rows = record.search.points(record.sets), []
     for k, name in enumerate(BOX):
         edges = (np.geomspace if name in LOGARITHMIC else np.linspace)(*record.search.box[name], 7)
+        symbol = SYMBOLS.get(name, name)
         sets, _ = np.histogram(points[:, k], edges)
         hopping, _ = np.histogram([row[name] for row in record.confirmed], edges)
         for low, high, n, hits in zip(edges, edges[1:], sets.tolist(), hopping.tolist(), strict=False):
             part, least, most = (f"{value:.2f}" for value in share(hits, n))
-            rows.append([name, f"{low:.3g}", f"{high:.3g}", str(n), str(hits), part, f"{least} … {most}"])
+            rows.append([symbol, f"{low:.3g}", f"{high:.3g}", str(n), str(hits), part, f"{least} … {most}"])
     return [["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *rows]
 
 
@@ -188,7 +191,7 @@ def summary(record: Searched) -> str:
     count, broken = len(record.confirmed), f" {record.failed} runs broke down." if record.failed else ""
     periods = Counter(row["confirmed"]["landings"] for row in record.confirmed)
     kinds = [f"{periods[n]} with {n or 'no period found'}" for n in sorted(periods, key=lambda n: (n == 0, n))]
-    box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in record.search.box.items())
+    box = ", ".join(f"{SYMBOLS.get(name, name)} {a:.3g} to {b:.3g}" for name, (a, b) in record.search.box.items())
     return (
         f"The box is {box}. In {count} of {record.sets} sets some of {record.search.starts} random starts lead to "
         "hopping that the event-driven simulation confirms: {:.2f} %, or {:.2f} to {:.2f} % with 95 % confidence. "

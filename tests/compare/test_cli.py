@@ -54,9 +54,9 @@ def test_predict_doubts_the_model_before_any_threshold(capsys: pytest.CaptureFix
     assert cli.main(["predict", "--set", "plastic-in-oil"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert shown.startswith("Warning: the paper's model doesn't hold for this fluid.")
-    assert "changes its numbers by up to 60%" in shown
+    assert "changes its numbers by up to 60 %" in shown
     assert "ω₀₁ 9.73 rad/s two-point rolling" in shown
-    assert "would be 3.63 rad/s (-55%)" in shown
+    assert "would be 3.63 rad/s (-55 %)" in shown
     assert cli.main(["predict", "--set", "plastic-in-oil", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["model_holds"] is False

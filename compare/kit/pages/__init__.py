@@ -40,7 +40,7 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
     return "".join(shown), error.end
 
 
-_SYMBOL = re.compile(
+_SYMBOL = (  # compiled where it is first needed
     r"((?:(?<![\w.])[A-Za-z]|[Α-ω])\u0303?)(?:_([A-Za-z0-9]{1,3})(?![A-Za-z0-9_(])|([₀-₉]+))"  # with an index
     r"|([Α-ω](?![ms]\b|[a-z]{2})"  # alone
     r"|(?<![A-Za-z_.'’])(?<!\d )(?!RR|cm|m(?![gRrcjΑ-ω·]| =))[mgRrcj]+(?![A-Za-z'’_])"  # alone, or a product
@@ -62,7 +62,7 @@ def typeset(text: str) -> str:
         index = f"<sub>{name or digits.translate(_DIGITS)}</sub>" if letter else ""
         return f"<i>{letter or alone}</i>{index}"
 
-    return markupsafe.Markup(_SYMBOL.sub(symbol, str(markupsafe.escape(text))))
+    return markupsafe.Markup(re.sub(_SYMBOL, symbol, str(markupsafe.escape(text))))
 
 
 def render(package: str, template: str, **values: Any) -> str:
@@ -104,7 +104,7 @@ def table(
 ) -> Table:
     """A table for the terminal; with `no_wrap` only its head and first column may take several lines.
 
-    `justify` is for all columns but the first.
+    `justify` is for all columns but the first, and those of words.
     """
     from rich import box
     from rich.table import Table
@@ -113,7 +113,8 @@ def table(
     usual: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "caption_justify": "left"}
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):
-        shown.add_column(name, justify=justify if k else "left")
+        words = rows[1:] and all(str(row[k])[:1].isalpha() for row in rows[1:])
+        shown.add_column(name, justify="left" if k == 0 or words else justify)
     for row in rows[1:]:
         texts = (Text(cell, no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell for k, cell in enumerate(row))
         shown.add_row(*texts)
