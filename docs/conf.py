@@ -124,13 +124,13 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
     for block in tree.findall(nodes.literal_block):
         first, _, rest = block.astext().partition("\n")
         if first.startswith("!"):
-            block.children = [nodes.Text(re.sub(r"^!", "$ ", block.astext(), flags=re.MULTILINE))]
+            block[:] = [nodes.Text(re.sub(r"^!", "$ ", block.astext(), flags=re.MULTILINE))]
             block["language"] = "console"
         elif first.startswith("%%writefile "):
-            block.children = [nodes.Text(rest)]
+            block[:] = [nodes.Text(rest)]
             block["language"] = first.rpartition(".")[2]
         elif first.startswith("%config "):
-            block.children = [nodes.Text(rest.lstrip())]
+            block[:] = [nodes.Text(rest.lstrip())]
         block.rawsource = block.astext()
     for said in list(tree.findall(addnodes.desc_annotation)):
         if said.astext().startswith(" = ") and len(said.astext()) > 100:  # a table, which its module shows better
@@ -146,7 +146,9 @@ _AS_IT_IS = (nodes.FixedTextElement, nodes.literal, nodes.math, nodes.title, nod
 
 
 def symbols(app: Sphinx, tree: nodes.document) -> None:
-    """Symbols in running text are set as on the pages of results, and look like formulas; code and titles stay."""
+    """Symbols in running text are set as on the pages of results; code, titles and docstrings stay as they are."""
+    if app.env.docname.startswith("api/"):
+        return
     for text in list(tree.findall(nodes.Text)):
         up, shown = text.parent, typeset(text.astext())
         while up and not isinstance(up, _AS_IT_IS):
