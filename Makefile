@@ -2,6 +2,7 @@
 # make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (two hours or more)
 # make test       set everything up and run the tests
 # make test-all   the slow tests, too
+# make benchmarks the figures of speed, as ratios in one run: writes the tables of docs/speed.md and docs/campaigns.md
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
 # make check      what CI runs: wheel, docs, lint, types, import contracts and a small league, two at a time; a quick
@@ -15,7 +16,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 RESULTS ?= results
 
-.PHONY: help validate mutants verdicts league test test-all docs wheel check lint lock clean
+.PHONY: help validate mutants verdicts league test test-all benchmarks docs wheel check lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
@@ -34,6 +35,9 @@ test: $(VENV)/installed-dev
 
 test-all: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist worksteal -m "slow or not slow"
+
+benchmarks: $(VENV)/installed-dev
+	$(BIN)/python -m tests.benchmarks
 
 verdicts: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)

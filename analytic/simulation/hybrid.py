@@ -73,7 +73,7 @@ class Kept(NamedTuple):
     path: Array
     """Azimuth, directions of slip, work, and omega_0 (n, 5); none where nobody wants them."""
     z: Array
-    """Coordinates of samples that are not kept yet (n, MOST)."""
+    """For coordinates of samples that are not kept yet (n * MOST,)."""
     events: Array
     """Times, cases before and after, impulses (m, 9), from the last look on; none where nobody wants them."""
     taken: npt.NDArray[np.int64]
@@ -86,7 +86,7 @@ class Kept(NamedTuple):
     def of(cls, times: Array, x: Array, case: Any, landings: Any, stop: Stop, whole: bool) -> Self:
         """Those of a run that begins, with paths and events if it is to be kept as a `whole`."""
         n, events = (len(times), 3 * STRIDES) if whole else (0, 0)
-        path, z, reached = np.empty((n, 5)), np.empty((len(times), charts.MOST)), [0.0, _still(0.0, times, stop.quiet)]
+        path, z, reached = np.empty((n, 5)), np.empty(len(times) * charts.MOST), [0.0, _still(0.0, times, stop.quiet)]
         landings[:] = 0
         taken = np.zeros(2, np.int64)
         return cls(times, x, case, landings, path, z, np.empty((events, 9)), taken, np.array(reached), stop)
@@ -147,7 +147,7 @@ def follow(case: int, at: Moment, until: float, k: Motion, run: Kept, steps: int
     pace = first_pace(at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0)
     if run.taken[0] == 0:
         _sample(at, k, run)
-    of = Stretch(k, until, z, scale, run.times, run.z[:, :n], arm, level)
+    of = Stretch(k, until, z, scale, run.times, run.z[: n * len(run.times)].reshape(-1, n), arm, level)
     why, pace, guard, taken = stretch(of, pace, run.taken[0], steps)
     near = keep(of, at, taken, run)
     now = until if why == DONE else max(pace[0] + pace[1], run.times[taken - 1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,9 +31,6 @@ SLIDES = 4.0
 """A contact slides on through a step if it takes more than this many times the load of the step to stop it."""
 ZERO_SLIP = 1e-9
 """Sliding speed relative to sqrt(g R) up to which a contact is called rolling: above what iterations leave."""
-
-
-compiled = compiling.compiled(compiling.read(contact_problem, drag, rigid_body))
 
 
 class Constants(NamedTuple):
@@ -143,7 +141,6 @@ class Solved(NamedTuple):
     residual: float
 
 
-@compiled
 def solve(at: At, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants) -> Solved:
     """Velocities after dt, 0 for an impact, with closed contacts.
 
@@ -207,7 +204,6 @@ def solve(at: At, dt: float, omega_0: float, touching: Touching, start: Forces, 
     return Solved(new, P, work, spin, 0.0 if converged else _worse(change, residual))
 
 
-@compiled
 def _sliding(at: At, dt: float, p: Constants) -> tuple[tuple[float, float], tuple[float, float]]:
     """Old slip at floor and wall, m s-1, that is added to the new, since friction opposes the mean of both where a
     contact slides on. None where it may stop within the step: friction then opposes the final slip, so that it can't
@@ -224,7 +220,6 @@ def _sliding(at: At, dt: float, p: Constants) -> tuple[tuple[float, float], tupl
     return slip_A, slip_B
 
 
-@compiled
 def _guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impulse]:
     """The impulses per mass from which a solution is looked for; none at an open contact."""
     A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
@@ -235,17 +230,14 @@ def _guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impuls
     return A, B
 
 
-@compiled
 def _size(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)  # several times as fast as math.hypot
 
 
-@compiled
 def _sum(a: Forces, b: Forces) -> Forces:
     return Forces(a.A_x + b.A_x, a.A_y + b.A_y, a.A_z + b.A_z, a.B_x + b.B_x, a.B_y + b.B_y, a.B_z + b.B_z)
 
 
-@compiled
 def _moved(at: At, dt: float, s: Solved, touching: Touching, R: float) -> At:
     """Where the ball comes within dt; a closed contact that carries load stays, or is now, closed."""
     u, new = mean(at.u, s.new), s.new
@@ -261,7 +253,6 @@ def _moved(at: At, dt: float, s: Solved, touching: Touching, R: float) -> At:
     return At(at.theta + math.atan2(x_k, -x_i), y, R - rho, turned)
 
 
-@compiled
 def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
     """When a gap that is `end` after dt passes zero, by the parabola through that and the start."""
     bend = 2 * (end - gap - rate * dt) / (dt * dt)
@@ -270,7 +261,6 @@ def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
     return min(max(time, 0.0), dt)
 
 
-@compiled
 def _stretch(
     at: At, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants
 ) -> tuple[At, Solved, float]:
@@ -295,7 +285,6 @@ def _stretch(
     return At(after.theta, 0.0 if floor else after.y, after.h if floor else 0.0, after.u), s, time
 
 
-@compiled
 def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     """The ball a step of dt later, with omega_0 from the middle of the step."""
     nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -326,7 +315,6 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     return Ball(at, P, impact, case, work, landings, residual)
 
 
-@compiled
 def _hit(at: At, dt: float, in_A: bool, in_B: bool, p: Constants) -> Solved:
     """An impact, with Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
     nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -338,7 +326,6 @@ def _hit(at: At, dt: float, in_A: bool, in_B: bool, p: Constants) -> Solved:
     return hit
 
 
-@compiled
 def _told(s: Solved, touching: Touching, p: Constants) -> int:
     """The case as a solution tells it: a contact is open if it leaves with a velocity, and rolls if nothing slides."""
     (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, AWAY, AWAY
@@ -350,10 +337,27 @@ def _told(s: Solved, touching: Touching, p: Constants) -> int:
     return 3 * A + B
 
 
-@compiled
 def _worse(new: float, residual: float) -> float:
     """The larger one, or nan."""
     return new if new > residual or math.isnan(new) else residual
+
+
+def _fluid(flow: FlowArrays, time: float) -> float:
+    """`model.Flow` at a time."""
+    k = 0
+    if len(flow.start) > 1:
+        k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
+    omega_0 = flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0)
+    for n in range(len(flow.waves)):
+        omega_0 += flow.waves[n, 0] * math.sin(2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2])
+    return float(omega_0)
+
+
+TEXT = (
+    solve, _sliding, _guess, _size, _sum, _moved, _crossing, _stretch, step, _hit, _told, _worse, _fluid,
+)  # fmt: skip
+"""What is compiled where numba is installed, with the two loops below."""
+compiled = compiling.compiled(compiling.read(contact_problem, drag, rigid_body, sys.modules[__name__]))
 
 
 @compiled
@@ -407,15 +411,3 @@ def follow(ball: Ball, stretches: Stretches, quiet: float, flow: FlowArrays, p: 
                 case[row:] = case[row - 1]
                 return now
     return now
-
-
-@compiled
-def _fluid(flow: FlowArrays, time: float) -> float:
-    """`model.Flow` at a time."""
-    k = 0
-    if len(flow.start) > 1:
-        k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
-    omega_0 = flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0)
-    for n in range(len(flow.waves)):
-        omega_0 += flow.waves[n, 0] * math.sin(2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2])
-    return float(omega_0)

@@ -1,12 +1,7 @@
-"""Write the tables on speed: ``python -m docs.studies.speed docs/speed.md``.
-
-The table "before" is measured with ``--before DIRECTORY``, a checkout of an earlier commit: c8dc858 is the last one
-before anything was compiled. Its runs and those of this checkout take turns.
-"""
+"""What theory costs: the tables of docs/speed.md."""
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import statistics
@@ -32,11 +27,10 @@ from analytic.simulation.integrator import DONE, FIRED, STUCK, Pace, Stretch
 from analytic.stationary.solutions import solution
 from compare.kit.engines import engine
 from compare.kit.pages import Rows
-from docs.studies.benchmarks import two_processes
-from docs.studies.tables import write
 from model import Case, Flow, Parameters, SimulationError, State
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ, TURNING
+from tests.benchmarks.program import two_processes
 
 REPEATS, BEST = 5, 1e-13
 """Runs of which the quickest counts, and the tolerance of the one that others are held against."""
@@ -154,29 +148,31 @@ def deviation(x: Any, right: Any) -> float:
 def event_driven() -> Rows:
     """What event-driven simulation costs and how exact it is, and `solve_ivp` at no greater error."""
     rows = [["", "compiled, ms", "error", "plain Python, ms", "error"]]
-    rows[0] += [cell for method in METHODS for cell in (f"solve_ivp with {method}, ms", "error")]
+    rows[0] += [cell for method in METHODS for cell in (f"solve_ivp with {method}, ms", "by compiled", "error")]
     for name, motion in MOTIONS.items():
-        right, row, worst = run(motion, BEST).x, [name], 0.0
+        right, row, worst, spent = run(motion, BEST).x, [name], 0.0, list[float]()
         for way in (run, plainly):
             error = deviation(way(motion).x, right)
             worst = max(worst, error)
-            row += [f"{1e3 * seconds(lambda way=way, motion=motion: way(motion)):.2f}", f"{error:.1e}"]  # type: ignore[misc]
+            spent.append(seconds(lambda way=way, motion=motion: way(motion)))  # type: ignore[misc]
+            row += [f"{1e3 * spent[-1]:.2f}", f"{error:.1e}"]
         for method in METHODS:
-            row += _no_worse(motion, method, worst, right)
+            row += _no_worse(motion, method, worst, right, spent[0])
         rows.append(row)
     return rows
 
 
-def _no_worse(motion: Motion, method: str, worst: float, right: Array) -> list[str]:
-    """Time and error of `solve_ivp` at the first of the tolerances that errs by no more than `worst`."""
+def _no_worse(motion: Motion, method: str, worst: float, right: Array, compiled: float) -> list[str]:
+    """Time, that divided by a compiled run's, and error of `solve_ivp` at the first of the tolerances that errs by no
+    more than `worst`."""
     for rtol in TOLERANCES:
         try:
             error = deviation(by_scipy(motion, method, rtol).x, right)
         except SimulationError:
-            return ["fails", "–"]
+            return ["fails", "–", "–"]
         if error <= worst or rtol == TOLERANCES[-1]:
             spent = seconds(lambda rtol=rtol: by_scipy(motion, method, rtol), 2)  # type: ignore[misc]
-            return [f"{1e3 * spent:.1f}", f"{error:.1e}"]
+            return [f"{1e3 * spent:.1f}", f"{spent / compiled:.1f}", f"{error:.1e}"]
     raise AssertionError
 
 
@@ -318,26 +314,3 @@ def _answer(process: subprocess.Popen[str], question: str) -> float:
     process.stdin.write(question)
     process.stdin.flush()
     return float(process.stdout.readline())
-
-
-def main() -> int:
-    """Measure and write the tables of the page."""
-    parser = argparse.ArgumentParser(description="Write the tables on speed.")
-    parser.add_argument("page", type=Path, metavar="FILE", help="docs/speed.md")
-    parser.add_argument("--before", type=Path, metavar="DIRECTORY", help="the table of a checkout of an earlier commit")
-    parser.add_argument("--siconos", action="store_true", help="the table with Siconos alone")
-    parser.add_argument("--many", action="store_true", help="the table of many runs alone")
-    args = parser.parse_args()
-    if args.before:
-        write(args.page, "before", before(args.before))
-    elif args.siconos:
-        write(args.page, "siconos", stepped())
-    elif args.many:
-        write(args.page, "many", many())
-    else:
-        write(args.page, "event-driven", event_driven())
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

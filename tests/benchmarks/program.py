@@ -1,12 +1,7 @@
-"""``python -m docs.studies.benchmarks``: speed, as ratios within one run: they depend less on the machine than times.
-
-With ``--page docs/campaigns.md`` they are written there; and with ``--growth`` the table of sweeps of 1000 to 100 000
-runs, which takes some minutes.
-"""
+"""What runs of MuJoCo, campaigns and commands cost: the tables of docs/campaigns.md."""
 
 from __future__ import annotations
 
-import argparse
 import functools
 import importlib.util
 import math
@@ -23,18 +18,15 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from rich.console import Console
 
 import mjsim
 from analytic import stable_solutions
-from compare.kit import pages
 from compare.kit.campaign import Campaign, Storing, run_batch
 from compare.kit.engines import MUJOCO
 from compare.kit.pages import Rows
 from compare.kit.sweep import MOST
 from compare.kit.tasks import Task, carry_out
 from compare.kit.workers import Workers, dask, processes
-from docs.studies.tables import write
 from mjsim import scene
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
@@ -49,36 +41,23 @@ SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 """Slipping at both points: both contacts closed, and friction on its cone."""
 
 
-def main() -> None:
-    """Measure; show the tables, or write them into a page."""
-    parser = argparse.ArgumentParser(description="Measure speed, as ratios within one run.")
-    parser.add_argument("--page", type=Path, metavar="FILE", help="write the tables there")
-    parser.add_argument("--growth", action="store_true", help="also sweeps of up to 100 000 runs")
-    parser.add_argument("--results", type=Path, metavar="DIR", help="also judge and figures of a validation")
-    parser.add_argument("--only", metavar="NAME", help="one table of costs, start, growth, study")
-    args = parser.parse_args()
-    measured = {"costs": costs, "start": start_up} | ({"growth": growth} if args.growth else {})
-    if args.results:
-        measured["study"] = functools.partial(study, args.results)
-    for name, rows in measured.items():
-        if args.only not in (None, name):
-            continue
-        if args.page:
-            write(args.page, name, rows())
-        else:
-            Console().print(pages.table(name, rows()))
-
-
-def study(results: Path) -> Rows:
-    """Processor time and memory of what is made of stored measurements, twice: at first theory may be compiled."""
+def study(before: Path | None = None) -> Rows:
+    """A quick validation, and what is made of its measurements: processor time and memory; and how many times as long
+    that takes by the sources in a directory."""
+    rows = [["", "processor time", "by import mujoco", "memory", *(["before, divided by now"] if before else [])]]
+    unit = min(_spent([sys.executable, "-c", "import mujoco"])[0] for _ in range(REPEATS))
     with tempfile.TemporaryDirectory() as directory:
-        asked = {"dualball judge": ["judge", str(results)], "dualball figures": ["figures", "--results", str(results)]}
-        rows = [["", "processor time", "by import mujoco", "memory"]]
-        unit = min(_spent([sys.executable, "-c", "import mujoco"])[0] for _ in range(REPEATS))
-        for name, words in asked.items():
-            more = ["-o", directory] if name == "dualball figures" else []
-            spent, held = min(_spent([sys.executable, "-m", "compare", *words, *more]) for _ in range(2))
-            rows.append([name, f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"])
+        for name in ("validate --quick --quiet -o {0}", "judge {0}", "figures --results {0} -o {0}/figures"):
+            taken = list[tuple[float, float]]()
+            for place in filter(None, (Path.cwd(), before)):
+                words = name.format(Path(directory) / str(len(taken))).split()
+                taken.append(_spent([sys.executable, "-m", "compare", *words], place))
+            spent, held = taken[0]
+            row = [
+                "dualball " + name.split(" -o")[0].split(" {")[0].removesuffix(" --results").removesuffix(" --quiet")
+            ]
+            row += [f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"]
+            rows.append([*row, *(f"{more / spent:.2f}" for more, _ in taken[1:])])
     return rows
 
 
@@ -171,11 +150,13 @@ def growth() -> Rows:
     return rows
 
 
-def _spent(words: list[str]) -> tuple[float, float]:
-    """Processor time, s, and largest memory, MB, of a program."""
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+def _spent(words: list[str], place: Path = Path()) -> tuple[float, float]:
+    """Processor time of a program and its workers, s, and its largest memory, MB, by the sources in a directory."""
+    own = os.environ | {"PYTHONPATH": str(place.resolve())}
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, cwd=place, env=own)
     _, status, usage = os.wait4(process.pid, 0)
-    assert status == 0, words
+    if status:
+        sys.exit(f"ends with {os.waitstatus_to_exitcode(status)}: {' '.join(words)}")
     return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
@@ -301,7 +282,3 @@ def resuming() -> float:
             storage.save_batch({task.key: run for task in tasks[k : k + BATCH]}, Path(directory) / f"runs-{k:024x}.h5")
         with Campaign(Path(directory), workers=0) as campaign:
             return _seconds(functools.partial(campaign.complete, tasks))
-
-
-if __name__ == "__main__":
-    main()
