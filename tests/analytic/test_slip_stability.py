@@ -153,18 +153,6 @@ def test_definition_3(eta):
     assert slip.stability(Case.SS, p) is slip.stability(Case.NS, p) is SlipStability.STABLE
 
 
-@pytest.mark.parametrize("trial", range(40))
-def test_rolling_is_stable_where_slip_dies_out(trial):
-    """By `slip_margin`, which creep determines, at stationary orbits; also from omega_03 to omega_01, for mu > 1."""
-    rng = np.random.default_rng(trial)
-    p = P.replace(mu=rng.uniform(0.05, 2.5), eta=rng.uniform(0.02, 1), j=rng.uniform(0.2, 0.66))
-    t = thresholds(p)
-    for omega_0 in rng.uniform(0.3, 1.3, 5) * (t.omega_01 if p.eta < p.j else t.omega_03):
-        p = p.replace(omega_0=float(omega_0))
-        dies_out = bool(rolling_forces.slip_margin(p.omega_0, p) > 0)
-        assert (slip.stability(Case.RR, p) is slip.SlipStability.STABLE) == dies_out
-
-
 def test_both_consistent_between_73_and_the_cone():
     """Off the stationary point the floor's cone allows more drag than gamma of (73), by 1/sqrt(1 - mu^2)."""
     p, omega_c = P.replace(mu=0.9, eta=1e6), 9.0

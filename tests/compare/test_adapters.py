@@ -9,7 +9,6 @@ import pytest
 from compare.adapters.scene import upright
 from compare.bench import run
 from compare.bench.runner import EngineProcess
-from model import InputError
 from model.kinematics import rotated
 from tests.exact_cases import CASES
 
@@ -51,11 +50,6 @@ def test_landings_are_late_by_a_part_of_a_step():
 def test_engines_on_warp(engine):
     pytest.importorskip("warp")
     assert run(CASES["sphere-slips-down"], f"{OWN}.{engine}", steps=(2e-3,), limit=600).passed
-
-
-def test_engines_that_are_not_installed():
-    with pytest.raises(InputError, match="No module named 'nosuchengine'"):
-        run(CASES["block-rests"], "nosuchengine")
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])

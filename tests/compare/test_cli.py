@@ -77,12 +77,8 @@ def test_a_foreign_model_is_named(tmp_path: Path, package: str) -> None:
     failed = subprocess.run(command, env=where, cwd=tmp_path, capture_output=True, text=True)
     last = failed.stderr.splitlines()[-1]
     assert last.startswith(f"ImportError: {tmp_path / 'model.py'} hides the package model of dualball: rename that")
-
-
-def test_the_program_runs_beside_a_foreign_model(tmp_path: Path) -> None:
-    (tmp_path / "model.py").touch()
-    command = [sys.executable, "-m", "compare", "predict", "--omega-0", "25"]
-    subprocess.run(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=tmp_path, capture_output=True, check=True)
+    program = [sys.executable, "-m", "compare", "--version"]  # which finds its own beside it
+    subprocess.run(program, env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=tmp_path, capture_output=True, check=True)
 
 
 @pytest.mark.parametrize(("law", "covered"), [("stokes", False), ("schiller-naumann", True)])
@@ -130,20 +126,6 @@ def test_flows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flow: list[str],
     assert cli.main(["simulate", "--time", "0.3", *flow, "-o", "run.h5"]) == 0
     trajectory = storage.load("run.h5")
     assert trajectory.header.flow(0.3) == pytest.approx(last)
-
-
-def test_sweep_and_collect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    where = ["-o", str(tmp_path / "runs"), "--workers", "0", "--time", "0.2"]
-    assert cli.main(["sweep", "--vary", "omega_0=5:10:3", "--vary", "eta=0.1,0.3", *where]) == 0
-    assert cli.main(["collect", str(tmp_path / "runs"), "-o", str(tmp_path / "all.h5")]) == 0
-    with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
-        assert dict(data.sizes) == {"omega_0": 3, "eta": 2}
-        assert all(data[name].long_name for name in data.variables)
-    capsys.readouterr()
-    assert "holds another sweep (vary = " in refused(capsys, "sweep", "--vary", "eta=0.1:0.5", "--random", "3", *where)
-    where[1] += "-random"
-    assert cli.main(["sweep", "--vary", "eta=0.1:0.5", "--random", "3", "--json", *where]) == 0
-    assert json.loads(capsys.readouterr().out)["whole"] == 3
 
 
 @pytest.mark.parametrize("design", [["--vary", "eta=0.1,0.5"], ["--vary", "eta=0.1:0.5", "--random", "2"]])
@@ -236,12 +218,6 @@ def test_a_long_description_is_that_of_its_parts(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("compare.view.motions.PART", 7)
     assert cli.main(["inspect", run, "--json"]) == 0
     assert capsys.readouterr().out == whole
-
-
-def test_claims_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["validate", "--list"]) == 0
-    shown = capsys.readouterr().out
-    assert all(name in shown for name in ("prop-1", "prop-4"))
 
 
 def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_example(

@@ -43,6 +43,7 @@ def test_the_varied_parameters_of_a_grid_are_dimensions(grid, tmp_path):
         assert dict(data.sizes) == {"eta": 2, "omega_0": 3}
         assert data.omega_c.dims == ("eta", "omega_0")
         assert data.omega_0.units == "rad s-1"
+        assert all(data[name].long_name for name in data.variables)
         np.testing.assert_array_equal(data.omega_0, OMEGAS)
         np.testing.assert_array_equal(data.eta, ETAS)
         file, _, key = str(data.run.sel(eta=ETAS[1], omega_0=OMEGAS[0]).values).partition("/")

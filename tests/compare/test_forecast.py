@@ -88,6 +88,16 @@ def settled(text, limit=10.0):
     return model, data, forecast.forecast(model, data, settle(model, data, limit))
 
 
+@pytest.fixture
+def unadvised(monkeypatch):
+    """Forecasts without advice, whose search takes most of the time."""
+    monkeypatch.setattr(forecast.advice, "best_change", lambda *scene: (None, {"creep": np.zeros(1)}))
+
+
+UNADVISED = pytest.mark.usefixtures("unadvised")
+
+
+@UNADVISED
 @pytest.mark.parametrize("scene", SCENES)
 def test_depth_creep_and_turning_are_as_predicted(scene):
     _, _, found = settled(SCENES[scene])
@@ -113,6 +123,7 @@ SLIDING = {
 }
 
 
+@UNADVISED
 @pytest.mark.parametrize("name", SLIDING)
 def test_contact_is_lost_from_the_predicted_speed_on(name):
     option, geom, shape = SLIDING[name]
@@ -147,6 +158,7 @@ STEPS = {
 }
 
 
+@UNADVISED
 @pytest.mark.parametrize("scene", STEPS)
 def test_small_motions_grow_from_the_predicted_step_on(scene):
     model, data, found = settled(STEPS[scene])
@@ -221,6 +233,7 @@ def test_what_has_no_forecast_gets_one_line(text, tmp_path, capsys, monkeypatch)
     assert [each.name for each in tmp_path.iterdir()] == ["scene.xml"]
 
 
+@UNADVISED
 def test_a_keyframe_that_does_not_exist_and_one_that_does(tmp_path, capsys):
     path = tmp_path / "scene.xml"
     path.write_text(SCENES["gripper"])
@@ -243,6 +256,7 @@ def test_the_page_the_json_and_what_the_engine_replaces(tmp_path, capsys):
     assert "To paste: MJCF" in page.read_text("utf-8")
 
 
+@UNADVISED
 def test_eighty_contacts_stay_readable():
     """A line says what the engine replaces at all of them."""
     boxes = "".join(box(f"{k / 5} 0 .0499", "0 0 0", f"box{k}") for k in range(20))
@@ -254,6 +268,7 @@ def test_eighty_contacts_stay_readable():
     assert re.match("MuJoCo replaces solref of two geoms at floor / box.*, and at 19 more: .*0.025 1 is taken", line)
 
 
+@UNADVISED
 def test_a_pair_that_no_joint_can_part_has_a_forecast_nevertheless():
     turning = f'<body pos="0 0 .0499"><joint axis="0 0 1"/><geom name="box" {BLOCK} mass="1"/></body>'
     across = turning.replace("<joint ", '<joint type="slide" ').replace("0 0 1", "1 0 0")
@@ -275,6 +290,7 @@ def test_what_rattles_is_measured_by_means_and_ends_with_1(tmp_path, capsys):
     assert pair["creep_measured"] < STILL
 
 
+@UNADVISED
 def test_what_sleeps_is_forecast_awake():
     sleepy = mjcf(ON_SLOPE, 'cone="elliptic" sleep_tolerance=".01"', flag='<flag sleep="enable"/>')
     _, _, found = settled(sleepy)
@@ -291,6 +307,7 @@ POLE = (
 HIP = '<actuator><motor name="hip" joint="hip" ctrlrange="-9 9"/></actuator>'
 
 
+@UNADVISED
 def test_a_robot_that_falls_is_said_to_and_one_that_its_controller_holds_is_not():
     def hold(model, data):
         data.ctrl[0] = -50 * data.qpos[0] - 5 * data.qvel[0]
@@ -306,6 +323,7 @@ def test_a_robot_that_falls_is_said_to_and_one_that_its_controller_holds_is_not(
     assert [pair.name for pair in held.pairs] == ["floor / box"]
 
 
+@UNADVISED
 def test_controls_come_by_number_or_name_and_bad_ones_get_one_line(tmp_path, capsys):
     path = tmp_path / "scene.xml"
     path.write_text(SCENES["gripper"].replace("<motor joint", '<motor name="{}" joint').format("l", "r"))
@@ -329,6 +347,7 @@ def test_controls_come_by_number_or_name_and_bad_ones_get_one_line(tmp_path, cap
         assert error.count("\n") == 1
 
 
+@UNADVISED
 def test_a_contact_counts_from_a_thousandth_of_the_lighter_bodys_weight():
     wall = '<geom name="wall" type="plane" size="1 1 .1" euler="0 90 0"/>'
     leaning = (

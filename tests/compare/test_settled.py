@@ -10,14 +10,13 @@ from compare.judge import judge
 from compare.kit import levels, settling
 from compare.kit.lab import time_unit
 from compare.kit.levels import Level, sets
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Missing, Records
 from compare.subjects.flowmeter import claims as flowmeter
 from compare.subjects.flowmeter import measure as characteristic
 from compare.subjects.stationary import claims as stationary
 from compare.subjects.stationary import measure as settled
-from compare.subjects.thresholds.measure import basins
 from model import Case, Parameters
-from tests.measured import measured, thresholds
+from tests.measured import measured
 
 THICK = Parameters.named("reference").replace(c=10.0)
 
@@ -106,21 +105,3 @@ def test_a_slope_of_a_state_that_theory_does_not_know_is_a_refutation():
 
 def test_no_loop_without_a_change_from_slipping_to_riding(lab):
     assert [type(row) for row in characteristic.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
-
-
-def test_the_jump_is_looked_for_where_slipping_was_seen_to_begin(lab):
-    known = thresholds("thick", THICK, "omega_01")
-    (only,) = characteristic.slope(lab, {"thick": THICK}, known)
-    assert isinstance(only, Measurement)
-    assert _outcomes(Records((only,)))["slope-jump"] is Outcome.CONFIRMED
-
-
-def test_a_few_points_of_a_plane_are_measured(lab, monkeypatch):
-    monkeypatch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, plane_spread=2, plane_added=()))
-    monkeypatch.setattr(basins, "DRAG", 10.0)
-    rows = list(basins.planes(lab, {"reference": THICK}, Records()))
-    masks = [row for row in rows if isinstance(row, Measurement)]
-    assert {m.conditions["figure"] for m in masks} <= set(basins.FIGURES)
-    assert len(masks) + sum(isinstance(row, Missing) for row in rows) >= 2
-    for m in masks:
-        assert int(m.value) & (1 << Case.NR | 1 << Case.NS)  # what starts on the wall stays or sinks
