@@ -95,30 +95,18 @@ def _grooves() -> list[Case]:
     source = "Newton and Euler; by symmetry both planes carry m g cos/sqrt(2)"
     return [
         closed(
-            "groove-rolls",
-            "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
-            sphere(),
-            planes(gentle, 0.5),
-            partial(descends, angle=gentle, size=0.1),
-            {"on one point, 5/7 g sin": {"lever": 0.4}, "a hollow sphere": {"lever": 4 / 3}},
-            until=1.0,
-            scales=(1.0, 2.0, 30.0),
-            contacts=lambda t: "RR",
-            source=source,
-        ),
+            "groove-rolls", "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
+            sphere(), planes(gentle, 0.5), partial(descends, angle=gentle, size=0.1),
+            wrong={"on one point, 5/7 g sin": {"lever": 0.4}, "a hollow sphere": {"lever": 4 / 3}},
+            until=1.0, scales=(1.0, 2.0, 30.0), contacts=("RR",), source=source),
         closed(
             "groove-rests",
             "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
-            cube | {"orientation": orientation},
-            planes(steep, 0.5),
+            cube | {"orientation": orientation}, planes(steep, 0.5),
             partial(descends, angle=steep, size=0.1, lever=math.inf),
-            {"a threshold as on a plane": {"mu": 0.5 * half}, "at 0.85 of Coulomb's": {"mu": 0.425}},
-            until=2.0,
-            scales=SPEED_ALONE,
-            contacts=lambda t: "RR",
-            source=source,
-        ),
-    ]
+            wrong={"a threshold as on a plane": {"mu": 0.5 * half}, "at 0.85 of Coulomb's": {"mu": 0.425}},
+            until=2.0, scales=SPEED_ALONE, contacts=("RR",), source=source),
+    ]  # fmt: skip
 
 
 def _vessel() -> list[Case]:

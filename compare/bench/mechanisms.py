@@ -15,10 +15,9 @@ from scipy.special import ellipj, ellipk, ellipkinc
 
 from compare.adapters.scene import Surface
 from compare.bench.case import Case
-from compare.bench.one_contact import SPEED_ALONE, G, along, block, closed, slope, sphere
+from compare.bench.one_contact import SPEED_ALONE, UP, WAY, G, along, block, closed, slope, sphere
 from model.arrays import Array
 
-_UP, _WAY = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 _Motion = tuple[Array, ...]
 
 
@@ -57,24 +56,17 @@ def _tripod() -> Case:
         x, y, _, v_x, v_y, turning = found.sol(t)
         none = 0 * t
         place = np.stack([x, y, none + foot + down], axis=1)
-        return place, np.stack([v_x, v_y, none], axis=1), np.outer(turning, _UP)
+        return place, np.stack([v_x, v_y, none], axis=1), np.outer(turning, UP)
 
     return closed(
         "tripod-turns",
         "three legs that slide and turn: each bears what keeps it from tilting, and slows it along its own slip",
-        {"shape": "tripod", "size": size, "mass": mass, "inertia": moments},
-        (Surface("floor", mu),),
-        courses,
-        {
-            "each leg bears a third": {"share": 0.0},
-            "friction 5 % too weak": {"mu": 0.95 * mu},
-            "a centre twice as high": {"height": 2 * (foot + down)},
-        },
-        until=0.3,
-        scales=(0.1, 0.5, 5.0),
-        contacts=lambda t: "S",
+        {"shape": "tripod", "size": size, "mass": mass, "inertia": moments}, (Surface("floor", mu),), courses,
+        wrong={"each leg bears a third": {"share": 0.0}, "friction 5 % too weak": {"mu": 0.95 * mu},
+               "a centre twice as high": {"height": 2 * (foot + down)}},
+        until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",),
         source="Newton and Euler in the plane, loads from the balance of moments, integrated to 1e-13",
-    )
+    )  # fmt: skip
 
 
 PLANK = (0.6, 0.2, 0.02)
@@ -104,31 +96,22 @@ def _plank() -> Case:
         ours = speed * early - above * G * early**2 / 2
         theirs, after = a * early**2 / 2, common * late - brake * late**2 / 2
         v, w = speed - above * G * early - brake * late, a * early - brake * late
-        height = PLANK[2] * _UP
-        up = 2 * height + block()["size"][2] * _UP
-        return *along(_WAY, ours + after, v, 0 * t, up - 0.3 * _WAY), *along(_WAY, theirs + after, w, 0 * t, height)
+        height = PLANK[2] * UP
+        up = 2 * height + block()["size"][2] * UP
+        return *along(WAY, ours + after, v, 0 * t, up - 0.3 * WAY), *along(WAY, theirs + after, w, 0 * t, height)
 
     meet = speed / (above * G + (above - below * (mass + 1)) * G / mass)
     stop = meet + (speed - above * G * meet) / (below * G)
 
     return closed(
-        "plank",
-        "a block that is pushed off on a plank draws it along, until both go together and stop on the floor",
-        block(),
-        (Surface("floor", below),),
-        dragged,
-        {
-            "the floor doesn't feel the block": {"load": 0.0},
-            "friction between them 5 % too weak": {"above": 0.95 * above},
-            "the plank is held": {"below": above},
-        },
-        until=1.2,
-        scales=(0.2, 0.5, math.inf),
-        contacts=lambda t: "SS" if t < meet else "SR" if t < stop else "RR",
+        "plank", "a block that is pushed off on a plank draws it along, until both go together and stop on the floor",
+        block(), (Surface("floor", below),), dragged,
+        wrong={"the floor doesn't feel the block": {"load": 0.0},
+               "friction between them 5 % too weak": {"above": 0.95 * above}, "the plank is held": {"below": above}},
+        until=1.2, scales=(0.2, 0.5, math.inf), contacts=("SS", meet, "SR", stop, "RR"),
         source="Coulomb's law and Newton's third: m mu g drives the plank, mu' (m + M) g brakes it",
-        under=plate(mass),
-        between=above,
-    )
+        under=plate(mass), between=above,
+    )  # fmt: skip
 
 
 def _thousandfold() -> Case:
@@ -144,17 +127,12 @@ def _thousandfold() -> Case:
     return closed(
         "thousandfold",
         "a block of 1000 kg on one of 1 kg on a slope whose tangent is 0.9 of their friction: neither must move",
-        plate(1000.0, tilt, (0.2, 0.2, 0.2)),
-        (Surface("slope", 0.5, normal=slope(tilt)[1]),),
-        stays,
-        {"a threshold at 0.85 of Coulomb's": {"mu": 0.425}},
-        until=2.0,
-        scales=SPEED_ALONE,
-        contacts=lambda t: "RR",
+        plate(1000.0, tilt, (0.2, 0.2, 0.2)), (Surface("slope", 0.5, normal=slope(tilt)[1]),), stays,
+        wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.425}},
+        until=2.0, scales=SPEED_ALONE, contacts=("RR",),
         source="Coulomb's law: whatever the masses, tan < mu holds both",
-        under=plate(1.0, tilt, (0.2, 0.2, 0.1)),
-        between=0.5,
-    )
+        under=plate(1.0, tilt, (0.2, 0.2, 0.1)), between=0.5,
+    )  # fmt: skip
 
 
 def _belt() -> Case:
@@ -170,17 +148,12 @@ def _belt() -> Case:
 
     caught = (speed + belt) / (G * (mu * math.cos(tilt) - math.sin(tilt)))
     return closed(
-        "belt",
-        "a block slides down an inclined belt that runs up, stops and is carried off by it",
-        block(tilt),
-        (Surface("belt", mu, normal=normal, velocity=tuple((-belt * way).tolist())),),
-        rides,
-        {"the belt stands": {"belt": 1e-9}, "friction 5 % too strong": {"mu": 1.05 * mu}},
-        until=2.0,
-        scales=(0.5, 0.5, math.inf),
-        contacts=lambda t: "S" if t < caught else "R",
+        "belt", "a block slides down an inclined belt that runs up, stops and is carried off by it",
+        block(tilt), (Surface("belt", mu, normal=normal, velocity=tuple((-belt * way).tolist())),), rides,
+        wrong={"the belt stands": {"belt": 1e-9}, "friction 5 % too strong": {"mu": 1.05 * mu}},
+        until=2.0, scales=(0.5, 0.5, math.inf), contacts=("S", caught, "R"),
         source="Coulomb's law against the slip on the belt, integrated by hand",
-    )
+    )  # fmt: skip
 
 
 def _joint() -> Case:
@@ -195,23 +168,16 @@ def _joint() -> Case:
         width = start - (2 * np.minimum(half, last) + 1) * shift
         phase = rate * t - math.pi * half
         s = side * (shift + width * np.cos(np.where(stopped, 0.0, phase)))
-        return along(_WAY, s, np.where(stopped, 0.0, -side * width * rate * np.sin(phase)), 0 * t, _UP)
+        return along(WAY, s, np.where(stopped, 0.0, -side * width * rate * np.sin(phase)), 0 * t, UP)
 
     return closed(
         "dry-joint",
         "a mass on a spring and a slide with dry friction: each half swing is shorter by 2 F/k, then it sticks",
-        sphere(),
-        (),
-        swings,
-        {"friction 5 % too weak": {"dry": 0.95 * dry}, "none": {"dry": 0.0}},
-        until=1.6,
-        scales=(0.3, 3.0, math.inf),
-        contacts=lambda t: "S" if t < 4 * math.pi / 10 else "R",
+        sphere(), (), swings, wrong={"friction 5 % too weak": {"dry": 0.95 * dry}, "none": {"dry": 0.0}},
+        until=1.6, scales=(0.3, 3.0, math.inf), contacts=("S", 4 * math.pi / 10, "R"),
         source="m x'' = -k x -+ F: half circles in the phase plane about -+ F/k",
-        spring=stiffness,
-        joint=(1.0, 0.0, 0.0),
-        dry=dry,
-    )
+        spring=stiffness, joint=(1.0, 0.0, 0.0), dry=dry,
+    )  # fmt: skip
 
 
 def _rocking() -> Case:
@@ -250,17 +216,12 @@ def _rocking() -> Case:
         return place, velocity, np.outer(rate, [0.0, 1.0, 0.0])
 
     return closed(
-        "rocking-block",
-        "a block rocks from edge to edge, and loses the same share of its speed at every blow",
-        body,
-        (Surface("floor", 1.0),),
-        rocks,
-        {"nothing is lost in a blow": {"kept": 1.0}, "inertia of a point": {"moment": arm**2}},
-        until=0.8,
-        scales=(0.2, 1.0, 1.0),
-        contacts=lambda t: "T",
+        "rocking-block", "a block rocks from edge to edge, and loses the same share of its speed at every blow",
+        body, (Surface("floor", 1.0),), rocks,
+        wrong={"nothing is lost in a blow": {"kept": 1.0}, "inertia of a point": {"moment": arm**2}},
+        until=0.8, scales=(0.2, 1.0, 1.0), contacts=("T",),
         source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, momentum about the new edge",
-    )
+    )  # fmt: skip
 
 
 def _bounce() -> Case:
@@ -279,17 +240,12 @@ def _bounce() -> Case:
         return np.stack([none, none, 0.1 + z], axis=1), np.stack([none, none, v], axis=1), np.zeros((len(t), 3))
 
     return closed(
-        "bounce",
-        "a ball that falls on a floor leaves it with 0.7 of its speed, again and again",
-        sphere(),
-        (Surface("floor", 0.5, restitution=share),),
-        bounces,
-        {"0.65 of it": {"share": 0.65}, "all of it": {"share": 1.0}},
-        until=2.0,
-        scales=(1.0, 6.0, 10.0),
-        contacts=lambda t: "N",
+        "bounce", "a ball that falls on a floor leaves it with 0.7 of its speed, again and again",
+        sphere(), (Surface("floor", 0.5, restitution=share),), bounces,
+        wrong={"0.65 of it": {"share": 0.65}, "all of it": {"share": 1.0}},
+        until=2.0, scales=(1.0, 6.0, 10.0), contacts=("N",),
         source="Newton's law of restitution, parabolas between",
-    )
+    )  # fmt: skip
 
 
 def _disc() -> Case:
@@ -313,24 +269,17 @@ def _disc() -> Case:
         rho, none = fixed + by_spin * s, 0 * t
         out = np.stack([np.cos(turning * t), np.sin(turning * t), none], axis=1)
         along = np.stack([-out[:, 1], out[:, 0], none], axis=1)
-        return rho * out - c_z * _UP, turning * rho * along, s * sin * out + (turning + s * cos) * _UP
+        return rho * out - c_z * UP, turning * rho * along, s * sin * out + (turning + s * cos) * UP
 
     across = mass * (radius**2 / 4 + thickness**2 / 3)
     return closed(
-        "rolling-disc",
-        "a disc that leans rolls on its rim, round and round",
-        {
-            "shape": "disc",
-            "size": (radius, thickness),
-            "mass": mass,
-            "inertia": (across, across, mass * radius**2 / 2),
-            "orientation": (math.cos(lean / 2), 0.0, math.sin(lean / 2), 0.0),
-        },
-        (Surface("floor", 0.5),),
-        rolls,
-        {"inertia of a ring": {"ring": 1.0}, "no thickness": {"half": 0.0}, "no gyroscopic moment": {"share": 0.0}},
-        until=1.2,
-        scales=(2.0, 1.0, 5.0),
-        contacts=lambda t: "T",
+        "rolling-disc", "a disc that leans rolls on its rim, round and round",
+        {"shape": "disc", "size": (radius, thickness), "mass": mass,
+         "inertia": (across, across, mass * radius**2 / 2),
+         "orientation": (math.cos(lean / 2), 0.0, math.sin(lean / 2), 0.0)},
+        (Surface("floor", 0.5),), rolls,
+        wrong={"inertia of a ring": {"ring": 1.0}, "no thickness": {"half": 0.0},
+               "no gyroscopic moment": {"share": 0.0}},
+        until=1.2, scales=(2.0, 1.0, 5.0), contacts=("T",),
         source="balances of momentum and angular momentum in axes that go round with the disc",
-    )
+    )  # fmt: skip
