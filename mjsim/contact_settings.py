@@ -82,9 +82,11 @@ class ContactSettings:
     """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
     scene: str = _choice("joints", "facets", "rigid")
     """``joints``: azimuth, radius and height as joints, the wall a plane that is turned to the ball. ``facets``: a free
-    ball in `scene.FACETS` fixed planes, friction of the pyramidal cone, as MuJoCo comes. ``rigid``: a free ball whose
-    contacts obey `mjsim.Coulomb`, for which no parameter of soft ones decides anything."""
-    integrator: str = _choice("Euler", "implicit")
+    ball in `scene.FACETS` fixed planes, as MuJoCo comes. ``rigid``: a free ball whose contacts obey `mjsim.Coulomb`,
+    for which no parameter of soft ones decides anything."""
+    cone: str = _choice("elliptic", "pyramidal")
+    integrator: str = _choice("Euler", "implicit", "implicitfast", "discrete")
+    noslip_iterations: int = _number(0, "1", Range(0, whole=True))
 
     def __post_init__(self) -> None:
         if len(self.solref) != 2:
@@ -98,6 +100,8 @@ class ContactSettings:
                 check_choice(field.name, getattr(self, field.name), field.metadata["known"])
         if self.scene != "joints" and (self.memory or self.servo or self.order == 2):
             raise InputError(f"scene = {self.scene!r} needs memory = False, servo = 0, order = 1: it has no joints")
+        if self.memory and self.cone == "pyramidal":
+            raise InputError("cone = 'pyramidal' needs memory = False: rows of the pyramid mix normal and friction")
         if self.timestep > self.largest_timestep * (1 + 1e-12):
             raise InputError(
                 f"timestep = {self.timestep:g} s is too large for the contact settings: solref {self.solref[0]:g} s, "
@@ -192,7 +196,8 @@ class ContactSettings:
     @property
     def friction_lag(self) -> float:
         """How far in steps past the middle of a step friction takes its direction by itself, 1/(b_f h) - 1/2."""
-        return 1 / (self.b_f * self.timestep) - 0.5 if self.order == 2 else 0.0
+        corrected = self.order == 2 and self.cone == "elliptic"
+        return 1 / (self.b_f * self.timestep) - 0.5 if corrected else 0.0
 
     @property
     def shifts_surfaces(self) -> bool:

@@ -29,8 +29,9 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     spec = mujoco.MjSpec.from_string(SCENE.read_text("utf-8"))
     option, body, wall, height = spec.option, spec.body("ball"), spec.geom("wall"), 2 * p.r
     option.gravity = (0.0, 0.0, -p.g)
-    for name in ("timestep", "impratio"):
+    for name in ("timestep", "impratio", "noslip_iterations"):
         setattr(option, name, getattr(settings, name))
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     body.pos, body.mass, body.inertia = (p.R, 0.0, p.r), p.m, (p.j * p.m * p.r**2,) * 3
     spec.joint("azimuth").pos = (p.R, -p.r, 0.0)
@@ -55,7 +56,7 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         part = moving.add_geom(name="wall", type=box, size=[half] * 3, pos=(p.R + p.r + half, 0, 0), rgba=rgba)
         part.mass, part.contype, part.conaffinity = p.m / _HEAVY, 0, 0
     if settings.scene == "facets":  # fixed planes, tangent to the vessel's cylinder
-        option.cone, sensor = mujoco.mjtCone.mjCONE_PYRAMIDAL, spec.sensor("B")
+        sensor = spec.sensor("B")
         for facet in range(FACETS):
             azimuth = 2 * math.pi * facet / FACETS
             outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])

@@ -132,7 +132,7 @@ def newcomer(step: float) -> ContactSettings:
 
 def as_it_comes(step: float) -> ContactSettings:
     """MuJoCo's own parameters for a free ball in a vessel of flat facets, with its own friction cone, the pyramid."""
-    return replace(newcomer(step), scene="facets")
+    return replace(newcomer(step), scene="facets", cone="pyramidal")
 
 
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:

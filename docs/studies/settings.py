@@ -64,7 +64,7 @@ def rungs(step: float) -> Ways:
     """From what a newcomer writes to ours, each with one thing more than the one before."""
     theirs = "MuJoCo's defaults"
     return {
-        f"{theirs}, scene facets": as_it_comes(step),
+        f"{theirs}, scene facets, cone pyramidal": as_it_comes(step),
         theirs: newcomer(step),
         "ours, memory off, servo 0, order 1": ContactSettings.at(step, memory=False, servo=0.0, order=1),
         "ours, memory off, order 1": ContactSettings.at(step, memory=False, order=1),
@@ -103,8 +103,9 @@ def landings(step: float) -> Rows:
         "mujoco-plain, damping ratio 2, step divided by 10": replace(plain(step / 10), solref=(step / 5, 2.0)),
         "mujoco-plain, step divided by 10": plain(step / 10),
         "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
+        "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
         lone: newcomer(step),
-        f"{lone}, scene facets (mujoco-defaults)": as_it_comes(step),
+        f"{lone}, scene facets, cone pyramidal (mujoco-defaults)": as_it_comes(step),
     }
     rows = [["settings", "ω_c 5 ms after a landing", "rebound", "motion with it", "motion that hits the wall"]]
     for name, way in ways.items():

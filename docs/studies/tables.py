@@ -14,6 +14,7 @@ import pickle
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -21,9 +22,11 @@ from compare.bench import league
 from compare.bench.runner import Result
 from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
+from compare.kit.engines import newcomer
 from compare.kit.pages import Rows
 from docs.studies import accuracy, confirmation, extrapolation, gains, settings, states, witnesses
 from docs.studies.states import Entry
+from mjsim import ContactSettings
 from model import InputError
 from model.files import write_text
 from model.parameters import check_choice, check_names
@@ -56,6 +59,24 @@ def _of_settings(entries: Sequence[Entry]) -> Rows:
     return [["settings", *head], *([name, *cells] for name, _, *cells in body)]
 
 
+def variants(step: float) -> settings.Ways:
+    """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction rows."""
+    firm = {"solimp": 0.1, "solreffriction": 2 * step / 0.1}
+    firmly = f"ours, solreffriction {firm['solreffriction']:g}, solimp 0.1"
+    alone, pyramids = {"memory": False, "order": 1}, "memory off, order 1, cone pyramidal"
+    return {
+        "MuJoCo's defaults, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
+        f"{firmly}, {pyramids}": ContactSettings.at(step, **firm, **alone, cone="pyramidal"),
+        "ours, integrator implicit": ContactSettings.at(step, integrator="implicit"),
+        "ours, integrator implicitfast": ContactSettings.at(step, integrator="implicitfast"),
+        f"{firmly}, integrator discrete": ContactSettings.at(step, **firm, integrator="discrete"),
+        "ours, integrator discrete": ContactSettings.at(step, integrator="discrete"),
+        "ours, memory off, noslip_iterations 10": ContactSettings.at(step, memory=False, noslip_iterations=10),
+        "ours, memory off": ContactSettings.at(step, memory=False),
+        "ours": ContactSettings.at(step),
+    }
+
+
 TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "witnesses": lambda campaign: witnesses.counted(campaign.directory.parent),
     "limits": lambda campaign: witnesses.limits(campaign.directory.parent),
@@ -71,6 +92,7 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "split": accuracy.force_split,
     "ablation": lambda campaign: _of_settings(settings.reached(campaign, settings.rungs(settings.STEP))),
     "frontier": lambda campaign: states.rows(settings.frontier(campaign, settings.STEPS)),
+    "variants": lambda campaign: _of_settings(settings.reached(campaign, variants(settings.STEP))),
 }
 """The tables by name."""
 

@@ -20,6 +20,8 @@ from model import Case, InputError, Parameters
         ({"solimp": 1.0}, r"solimp = 1 is out of range"),
         ({"impratio": 1e9}, r"impratio = 1e\+09"),
         ({"solref": (0.1,)}, r"solref = .* must be two numbers"),
+        ({"cone": "eliptic"}, r"cone = 'eliptic' must be one of .*did you mean 'elliptic'"),
+        ({"cone": "pyramidal"}, "cone = 'pyramidal' needs memory = False"),
         ({"scene": "joint"}, r"scene = 'joint' must be one of .*did you mean 'joints'"),
         ({"integrator": "RK4"}, r"integrator = 'RK4' must be one of"),
         ({"order": 3}, "order = 3 must be one of 2, 1"),
