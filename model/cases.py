@@ -57,16 +57,11 @@ class CaseTraits:
     """One row of Tables 3 and 4, extended to motion away from the wall.
 
     ``constraints`` are expressions in the variables of `model.kinematics.VARIABLES` that vanish in the case;
-    ``active`` are the independent variables left, whose number is ``dimension``.
+    ``active`` are the independent variables left, as many as the third number of each panel of Fig. 2 says.
     """
 
     constraints: tuple[str, ...]
     active: tuple[str, ...]
-
-    @property
-    def dimension(self) -> int:
-        """Dimension of the state space (third number of each panel of Fig. 2, with y and h counted)."""
-        return len(self.active)
 
 
 TRAITS: dict[Case, CaseTraits] = {

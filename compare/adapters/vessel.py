@@ -98,19 +98,8 @@ class _Band:
         return np.full(np.shape(load), self.resolution)
 
 
-def simulate(
-    name: str,
-    library: Library,
-    member: str,
-    p: Parameters,
-    x0: npt.ArrayLike,
-    t_end: float,
-    flow: Flow,
-    settings: Settings,
-    sample_interval: float | None,
-    progress: Callable[[float], None],
-) -> Trajectory:
-    """One run of the engine of a name with one of the adapters of its library.
+def simulate(library: Library, member: str, task: Any, progress: Callable[[float], None]) -> Trajectory:
+    """One run, a `compare.kit.tasks.Task`, with one of the adapters of an engine's library.
 
     Where it breaks down, the header says why. Where its adapter doesn't tell what contacts carry, forces are nan, and
     cases are told by gaps and slip alone.
@@ -122,19 +111,21 @@ def simulate(
     InputError
         If the library is not installed, an argument out of range, or the time step too large for the problem.
     """
-    h = settings.timestep
-    every, count = limits.sampling(t_end, h, sample_interval)
+    p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep
+    every, count = limits.sampling(t_end, h, task.sample_interval)
     limits.check_timestep(h, p, flow, t_end)
     if p.fluid_torque:
-        raise InputError(f"fluid_torque = {p.fluid_torque:g} s-1: {name} doesn't take it; mujoco, time-stepping do")
-    x = State.one(x0)
+        raise InputError(
+            f"fluid_torque = {p.fluid_torque:g} s-1: {task.engine} leaves it out; mujoco, time-stepping don't"
+        )
+    x = State.one(task.x0)
     limits.check_place(x, p, p.r / 10)
     total, failure = (count - 1) * every + 1, ""  # of the last sample only forces are needed
     with closing(library.load(member)) as engine:
         try:
             engine.build(Vessel.of(p, x, flow), h)
         except RuntimeError as error:
-            raise InputError(f"{name} can't build the vessel: {' '.join(str(error).split())[:80]}") from error
+            raise InputError(f"{task.engine} can't build the vessel: {' '.join(str(error).split())[:80]}") from error
         # A wall that moves along for a step is a cylinder to (Omega h)^2.
         fastest = max(abs(x.omega_c), float(np.abs(flow(np.linspace(0.0, t_end, NOTED))).max()))
         steps = _Steps(engine, h, p, every, p.R * fastest * (fastest * h) ** 2 / 4)
@@ -154,7 +145,7 @@ def simulate(
     given |= {"t_end": float(t_end), "sample_interval": every * h}
     given |= {"x0": list(x), "theta_0": 0.0, "event_times": EVENT_TIMES}
     versions = {**current_versions(), library.name: library.version}
-    header = Header(name, p, flow, given, failure=failure, versions=versions)
+    header = Header(task.engine, p, flow, given, failure=failure, versions=versions)
     block = np.concatenate(steps.kept)
     block["case"] = steps.classifier.cases(0, np.arange(len(block)) * every)
     return Trajectory.from_blocks(header, [block], steps.classifier.events(0))

@@ -19,7 +19,7 @@ import mjsim
 from compare.adapters import KNOWN, siconos, vessel
 from compare.adapters.free import Library
 from mjsim import ContactSettings
-from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
+from model import InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.errors import suggestion
 from model.versions import version
@@ -37,9 +37,8 @@ class Role(Enum):
 
 AnySettings = ContactSettings | analytic.Settings | vessel.Settings
 """Numerical settings of any engine."""
-Simulate = Callable[[Parameters, State, float, Flow, Any, float | None, Callable[[float], None]], Trajectory]
-"""One whole run from parameters, start, duration, flow, settings and sample interval; the function is called with the
-fraction done, from time to time."""
+Simulate = Callable[[Any, Callable[[float], None]], Trajectory]
+"""One whole run of a `compare.kit.tasks.Task`; the function is called with the fraction done, from time to time."""
 Stream = Callable[..., mjsim.Run]
 """Runs that hand out their samples as they come; called as `mjsim.Run`."""
 
@@ -141,15 +140,14 @@ def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
         return mjsim.Run(*given, **more)
 
 
-def _theory(method: str, *task: Any) -> Trajectory:
-    """A run by a method of theory, as far as it came; arguments of `Simulate`."""
-    p, x0, t_end, flow, settings, interval, progress = task
+def _theory(method: str, task: Any, progress: Callable[[float], None]) -> Trajectory:
+    """A run by a method of theory, as far as it came."""
+    run, settings = (task.parameters, task.x0, task.t_end, task.fluid), replace(task.settings, method=method)
     try:
-        settings = replace(settings, method=method)
-        return analytic.simulate(p, x0, t_end, flow, settings, sample_interval=interval, progress=progress)
+        return analytic.simulate(*run, settings, sample_interval=task.sample_interval, progress=progress)
     except SimulationError as error:
-        run: Trajectory = error.trajectory
-        return run
+        there: Trajectory = error.trajectory
+        return there
 
 
 def _adapted(library: Library, marks: str) -> list[Engine]:
@@ -160,16 +158,15 @@ def _adapted(library: Library, marks: str) -> list[Engine]:
         settings=vessel.Settings,
         options=("timestep",),
         configure=lambda given, p: vessel.Settings(**given),
-        simulate=partial(vessel.simulate, name, library, "best"),
+        simulate=partial(vessel.simulate, library, "best"),
         sources=("model", "mjsim", "compare.adapters"),
         stands_on=("numpy",),
         needs=library,
         refine=(1, 2, 4),  # a free body's errors are of first or second order in the step
         mark=marks[0],
     )
-    own = f"{name}-defaults"
-    theirs = partial(vessel.simulate, own, library, "defaults")
-    return [best, *(replace(best, name=own, simulate=theirs, mark=mark) for mark in marks[1:])]
+    theirs = partial(vessel.simulate, library, "defaults")
+    return [best, *(replace(best, name=f"{name}-defaults", simulate=theirs, mark=mark) for mark in marks[1:])]
 
 
 MUJOCO = Engine(

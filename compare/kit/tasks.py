@@ -124,13 +124,7 @@ def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -
     A run that breaks down comes back with its failure in the header.
     """
     if simulate := tasks[0].simulator.simulate:
-        return [
-            simulate(
-                *(task.parameters, State.one(task.x0), task.t_end, task.fluid),
-                *(task.settings, task.sample_interval, lambda done: check()),
-            )
-            for task in tasks
-        ]
+        return [simulate(task, lambda done: check()) for task in tasks]
     return _begun(tasks, progress=lambda done: check()).trajectories()
 
 

@@ -123,7 +123,7 @@ def draw_6() -> Figure:
         _arrow(axes, inner, outer, ":")
     for case, (x, y) in _PLACES.items():
         box = {"boxstyle": "round,pad=0.45", "fc": "white", "ec": style.COLOURS[case], "lw": 2.2}
-        text = f"{case.name}\ndim {TRAITS[case].dimension}"
+        text = f"{case.name}\ndim {len(TRAITS[case].active)}"
         axes.text(x, y, text, ha="center", va="center", fontsize=11, linespacing=1.3, bbox=box)
     for line, text in (("-", "slip begins at A"), ("--", "slip begins at B"), (":", "leaves the floor at A")):
         axes.plot([], [], color="black", ls=line, lw=1.4, label=text)

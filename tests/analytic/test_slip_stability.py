@@ -119,7 +119,7 @@ def test_normal_forces_while_a_slip_is_slight():
 
 def test_arrows_of_figure_6():
     for inner, outer in slip.SLIP_ARROWS:
-        assert len(slip.normals(inner, outer)) == TRAITS[outer].dimension - TRAITS[inner].dimension
+        assert len(slip.normals(inner, outer)) == len(TRAITS[outer].active) - len(TRAITS[inner].active)
     for inner, outer in slip.LIFT_ARROWS:
         assert inner.B is outer.B
         assert outer.A.name == "N"

@@ -27,7 +27,8 @@ from analytic.simulation.integrator import DONE, FIRED, STUCK, Pace, Stretch
 from analytic.stationary.solutions import solution
 from compare.kit.engines import engine
 from compare.kit.pages import Rows
-from model import Case, Flow, Parameters, SimulationError, State
+from compare.kit.tasks import Task, carry_out
+from model import Case, Flow, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ, TURNING
 from tests.benchmarks.program import two_processes
@@ -201,15 +202,20 @@ def stepped() -> Rows:
 
     if siconos.missing:
         sys.exit(siconos.missing)
-    assert siconos.simulate
-    step_by_step, take = partial(simulate, *given, method="time-stepping"), partial(siconos.simulate, *given)
+    step_by_step = partial(simulate, *given, method="time-stepping")
+
+    def take(step: float) -> Trajectory:
+        way: dict[str, Any] = {"settings": siconos.at(step, motion.p), "sample_interval": motion.t_end / 1000}
+        task = Task(engine=siconos.name, parameters=motion.p, x0=motion.x, t_end=motion.t_end, flow=motion.flow, **way)
+        return carry_out([task])[0]
+
     step_by_step(timestep=STEPPED[0])  # which compiles it
     error, spent = deviation(run(motion).x * turning, right), seconds(lambda: run(motion))
     return [
         ["", "time step, ms", "error", "processor time, ms", "of which its own process"],
         ["event-driven, compiled", "–", f"{error:.1e}", f"{1e3 * spent:.1f}", "–"],
         longest("Moreau-Jean, compiled", lambda step: step_by_step(timestep=step)),
-        longest("Siconos", lambda step: take(siconos.at(step, motion.p), motion.t_end / 1000, lambda done: None)),
+        longest("Siconos", take),
     ]
 
 

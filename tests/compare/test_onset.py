@@ -16,7 +16,7 @@ from compare.kit.levels import Level, sets
 from compare.kit.record import Missing, Records
 from compare.kit.settling import PRESSES
 from compare.kit.statistics import Measured, turning, zero_and_slope
-from compare.subjects.thresholds.measure import thresholds
+from compare.subjects.thresholds.measure import answers, thresholds
 from model import Case, Parameters, State
 from tests.measured import measured
 
@@ -67,7 +67,7 @@ def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(et
     t = analytic.thresholds(p)
     p = p.replace(omega_0=1.002 * (t.omega_03 if lost else t.omega_01))
     run = analytic.simulate(p, State(omega_c=p.omega_0), 2.0)
-    assert thresholds.lifts(Bracket(0.0, 1.0, (None, run))) is lost
+    assert answers.lifts(Bracket(0.0, 1.0, (None, run))) is lost
     assert run.force_A[-1, 1] < PRESSES * p.m * p.g
 
 

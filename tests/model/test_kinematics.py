@@ -111,6 +111,6 @@ def test_a_state_of_many_keeps_its_columns():
 def test_cases():
     """Active variables and constraints fill the state space; a case is its two contacts."""
     for case in Case:
-        assert len(TRAITS[case].constraints) + TRAITS[case].dimension == 8
+        assert len(TRAITS[case].constraints) + len(TRAITS[case].active) == 8
         assert Case.of(case.A, case.B) is case
     assert (Case.NS.A, Case.NS.B) == (Contact.N, Contact.S)

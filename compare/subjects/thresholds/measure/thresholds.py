@@ -5,10 +5,6 @@
   floor, goes back to rolling on both; the largest flow at which a slipping ball settles.
 * Extrapolated from settled states on one side: the flow at which their lag behind the fluid, their sinking or the force
   of the floor would vanish, or at which omega_0 along the branch has its maximum.
-
-And the critical drag: below it slipping at both points ends in a fold, above it passes to the wall without a jump. At
-the end of the branch the floor carries nothing; the sign of the slope of omega_0 over the floor's force there decides
-whether the branch turns back. States are settled in stronger drag than that, where they last up to the end.
 """
 
 from __future__ import annotations
@@ -21,12 +17,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from compare.kit.brackets import Answer, Attempt, Bracket, Search, narrow
+from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.engines import sliding_speeds
-from compare.kit.lab import Lab, coarse_step, time_unit
-from compare.kit.record import Measurement, Missing, Records, if_found, measurement
+from compare.kit.lab import Lab, coarse_step
+from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.settling import (
-    PRESSES,
     Patience,
     Settled,
     lasting,
@@ -36,19 +31,10 @@ from compare.kit.settling import (
     settle_groups,
     settled_cases,
 )
-from compare.kit.statistics import (
-    COVERAGE,
-    POINTS,
-    Measured,
-    initial_slope,
-    settled_case,
-    straight_line,
-    tail,
-    turning,
-    vanishing,
-)
+from compare.kit.statistics import COVERAGE, POINTS, Measured, turning, vanishing
 from compare.kit.tasks import Task
-from model import Case, Contact, Parameters, State, Trajectory
+from compare.subjects.thresholds.measure.answers import ASKED, lifts, slip
+from model import Case, Parameters, State
 from model.arrays import Array
 
 PROTOCOL = "thresholds"
@@ -60,19 +46,13 @@ TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
 """The same below a fold, where slip goes like the root of the distance; in parts of the range of slipping."""
 RIDES: Array = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
 """The same of the states that are continued to where a ball rides the wall as slowly as it can."""
-SLIPPING_SPEED = 3e-8
-"""Slip speed, divided by sqrt(g R), that counts as slip: contacts are solved to 1e-12, and a ball whose friction falls
-short by a millionth reaches it within a run."""
-CREEPS = 100.0
-"""Slip, in units of that, at which a ball may creep while it comes to rest jammed between floor and wall."""
-
 FOUND = {"rolling": ("omega_01", "omega_03"), "sinking": ("omega_02",), "slipping": ("omega_04",)}
 """The thresholds at which each ends or begins."""
 AWAY = 0.03
 """Relative distance from there at which an engine beside the one on trial looks for the end of rolling."""
 
-From = str | Array | Callable[[Parameters], Array]
-"""How a ball starts: a name that `settling.named_start` knows, a state, or a function of the parameters for it."""
+From = Callable[[Parameters], Array]
+"""The state in which a ball starts, by its parameters."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -122,9 +102,8 @@ class Findings:
 
         def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
             q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
-            x0 = last.x[-1] if last else named_start("", q, start).x0 if isinstance(start, str) else start
             t_end = lasting(q, units * time * attempt.time)
-            return self.lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / attempt.refine)
+            return self.lab.task(q, last.x[-1] if last else start(q), t_end, coarse_step(q) / attempt.refine)
 
         return kind, Search(around, task, answer, width)
 
@@ -206,17 +185,17 @@ def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
     """The largest flow at which a ball that rolls on both goes on so."""
     if change := each.changes.get("rolling"):
         width = each.lab.effort.thresholds_width * change.high
-        yield each.search("rolling", change, "with the fluid", width)
+        yield each.search("rolling", change, _begun("with the fluid"), width)
 
 
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
     """Roughly, up to which flow the wall doesn't hold a ball, and a slipping one settles on the floor."""
     if change := each.changes.get("sinking"):
-        yield each.search("sinking", change, "on the wall", COARSE * change.low)
+        yield each.search("sinking", change, _begun("on the wall"), COARSE * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
     if change and end and not lifts(end) and end.high < change.high:
         change = replace(change, low=max(change.low, end.high))
-        yield each.search("slipping", change, "rest", COARSE * change.low)
+        yield each.search("slipping", change, _begun("rest"), COARSE * change.low)
 
 
 def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
@@ -306,8 +285,8 @@ def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
     if top and each.lab.effort.slow:
         narrowest = each.lab.effort.thresholds_fold
         half = max(narrowest, 5.0 * top.uncertainty / top.value)
-        change, start = Bracket(top.value * (1 - half), top.value * (1 + half)), each.states["turning"][0].mean
-        yield each.search("fold", change, start, narrowest * top.value, 1 / math.sqrt(narrowest))
+        change, nearest = Bracket(top.value * (1 - half), top.value * (1 + half)), each.states["turning"][0]
+        yield each.search("fold", change, lambda _: nearest.mean, narrowest * top.value, 1 / math.sqrt(narrowest))
 
 
 NONE = "no flow that was tried, up to twice the fastest of the settled states,"
@@ -372,7 +351,12 @@ def _ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
     return sum(bool(before) and after is False for before, after in pairwise(settles))
 
 
-def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> Callable[[Parameters], Array]:
+def _begun(how: str) -> From:
+    """As `settling.named_start` says."""
+    return lambda p: named_start("", p, how).x0
+
+
+def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> From:
     """A state that rides the wall at a height, continued in omega_0 from settled states, with less spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
     fit = np.polynomial.Polynomial.fit(omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1)
@@ -383,91 +367,6 @@ def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> Callab
         return State(y=height, omega_c=p.omega_0, slip_x=slip_x - less * wall_spin).stacked()
 
     return ride
-
-
-def lifts(end: Bracket) -> bool:
-    """Whether two-point rolling ends by lifting off: the floor carries no more than what hovers, and the wall holds.
-
-    Just below omega_03 the floor carries as little, but rolling may end there by slip at both contacts, which is as
-    fast at one as at the other, and lasts. A ball that lifts off slips on the floor alone before, or rolls on the wall
-    in the end.
-    """
-    if (run := end.runs[1]) is None:
-        return False
-    p = run.header.parameters
-    unloaded = bool(run.force_A[tail(run), 1].mean() < PRESSES * p.m * p.g)
-    lifted = [case.A is Contact.N for case in run.cases]
-    on = slice(0, lifted.index(True) if any(lifted) else None)
-    floor, wall = sliding_speeds(run)
-    return unloaded and bool(slip(wall, run) < 1 or wall[on].max(initial=0.0) <= floor[on].max(initial=0.0) / 2)
-
-
-def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
-    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPPING_SPEED` sqrt(g R)."""
-    p = run.header.parameters
-    return float(speeds[tail(run, share)].max() / (SLIPPING_SPEED * math.sqrt(p.g * p.R)))
-
-
-def stays_rolling(run: Trajectory) -> bool | None:
-    """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
-
-    None, too, while it touches the floor now and then: where friction alone could hold it, it may come to rest there.
-    Slip dies out that has fallen below 0.6 of what it was in the second half (moved from 0.9 after results had been
-    seen); slip below a hundredth of what counts is none. On a floor that carries next to nothing slip up to `CREEPS`
-    shows nothing (chosen after a set with mu eta = 0.8 had crept so below its threshold).
-    """
-    if not presses(run):
-        return None if np.any(run.force_A[tail(run), 1] > 0) else False
-    speeds, _ = sliding_speeds(run)
-    last, before = slip(speeds, run), slip(speeds[len(speeds) // 2 :], run, share=1.0)
-    if last >= 1:
-        m, g = run.header.parameters.m, run.header.parameters.g
-        creeps = last < CREEPS and run.force_A[tail(run), 1].mean() < PRESSES * m * g
-        return False if last > 0.6 * before and not creeps else None
-    return True if last < 1e-2 else None
-
-
-def may_settle(run: Trajectory) -> bool | None:
-    """Whether a ball settles on the floor, or may after four times 10/c; None where a run of 10/c doesn't show it.
-
-    Other motions still die out in a short run: with the usual share of change a ball just above a fold seemed to
-    settle on some sets. (A tenth of it was chosen after that had been seen; a hundredth gives the same brackets.)
-    """
-    brief = run.time[-1] * run.header.parameters.c < 20
-    return settles(run, 0.02) if brief else settles(run) is not False
-
-
-def presses(run: Trajectory) -> bool:
-    """Whether the floor carries something all the time in the end."""
-    return bool(np.all(run.force_A[tail(run), 1] > 0))
-
-
-def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
-    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the run is too short.
-
-    In the last tenth its speed must change by less than a share `slowed` of what it does in the tenth before the
-    middle. On the way past a fold that it has missed the change falls at most like 1/time^2, from one to the other to
-    0.22; after that it rises.
-    """
-    if settled_case(run).A is Contact.N or settled_case(run) is Case.SR or not presses(run):
-        return False
-    middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
-    slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
-    return False if slowing > 1 else True if slowing < slowed else None
-
-
-ASKED: dict[str, tuple[float, Answer]] = {
-    "rolling": (5, stays_rolling),
-    "sinking": (20, lambda run: physical_case(settled_case(run)) is not Case.NR),
-    "slipping": (10, may_settle),
-    "riding": (5, lambda run: slip(sliding_speeds(run)[1], run) > 1),
-    "leaning": (20, lambda run: presses(run) and settled_case(run) is Case.RR),
-    "fold": (1.4, settles),
-}
-"""How long a run takes, in units of 1/c, and what is asked of it: yes below a threshold, no above.
-
-The ball still rolls; the wall doesn't hold it; it settles on the floor, or may; it begins to slip on the wall; pressed
-to the floor it rolls on both again; it settles on the floor."""
 
 
 def extrapolated(
@@ -482,65 +381,3 @@ def extrapolated(
         values = [Measured(flow - orbit.value, orbit.uncertainty) for flow, orbit in zip(flows, values, strict=True)]
     place = to(np.array(flows), values)
     return place if math.isfinite(place.uncertainty) else None
-
-
-FIRST_DRAGS, NEARER_DRAGS = (2.0, 4.0), (1.6, 2.6)
-"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), then multiples of the drag extrapolated
-from those two, so far off that states still settle soon."""
-BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
-"""Distances of the states from omega_02 there, in parts of the range of slipping."""
-
-
-@dataclass(frozen=True, eq=False)
-class BranchEnd:
-    """How the branch of slipping ends in one drag."""
-
-    lag: float
-    """1/c, s, to which the lag by a force is proportional."""
-    slope: Measured
-    """Of omega_0 as a function of the floor's force where that vanishes."""
-    tasks: list[Task]
-
-
-def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The drag at which omega_0 as a function of the floor's force has no slope where that vanishes.
-
-    The zero of the straight line through the slopes as a function of 1/c.
-    """
-    ranges = {}
-    for name in sets:
-        begins, ends = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
-        if begins and ends and begins.value < ends.value:
-            ranges[name] = begins.value, ends.value
-    found: dict[str, list[BranchEnd]] = {name: [] for name in ranges}
-    lags: dict[str, Measured] = {}
-    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
-    for _ in (FIRST_DRAGS, NEARER_DRAGS):
-        starts = [
-            [
-                named_start(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest")
-                for part in BEFORE_END
-            ]
-            for name, c in drags
-            for low, high in [ranges[name]]
-        ]
-        for (name, c), states in zip(drags, settle_groups(lab, starts), strict=True):
-            if not any(state.failure or state.case is not Case.SS for state in states):
-                flows = np.array([state.start.p.omega_0 for state in states])
-                slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
-                found[name].append(BranchEnd(1 / c, slope, [state.task for state in states]))
-        for name, own in found.items():
-            if len(own) >= len(FIRST_DRAGS):
-                values, noise = zip(*((end.slope.value, end.slope.uncertainty) for end in own), strict=True)
-                lags[name], _ = straight_line([end.lag for end in own], values, noise)
-        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in NEARER_DRAGS]
-    for name, p in sets.items():
-        if name not in ranges:
-            yield Missing("birth", name, "there is no range of slipping at both points that ends at the wall")
-        elif len(found[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
-            yield Missing("birth", name, "too few states of slipping at both points settle near the end of the branch")
-        else:
-            drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)
-            tasks = [task for end in found[name] for task in end.tasks]
-            row = measurement(lab, "birth", name, p, "critical_drag", drag, tasks)
-            yield if_found(row, "no drag gives birth to a fold")
