@@ -7,7 +7,7 @@ results of a search are held against closed forms, and the two ways to compute a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
 
@@ -31,8 +31,38 @@ FORMAL = Parameters.named("reference").replace(eta=0.43)
 """eta so little above j that the branch of SS is whole once (12) is released."""
 ROUND_OFF = 1e-12
 """Relative: some thousand operations, each to the last digit."""
+CLAIMS: list[Claim] = []
+"""In the order of the report: each stands at the algebra that decides it."""
 
 
+def _formal(id: str, source: str, statement: str, reason: str) -> Callable[[Callable[[], Iterator[Check]]], None]:
+    """A decorator that makes a claim of the algebra that decides it; the reason why it is formal only."""
+    return lambda algebra: CLAIMS.append(Claim(id, source, statement, algebra=algebra, reason=reason))
+
+
+def _check(quantity: str, what: str, value: float, predicted: float, error: float = 0.0, unit: float = 0.0) -> Check:
+    """A number found another way, with its standard uncertainty, in units of the predicted one, of `unit` or of 1."""
+    scale = unit or abs(predicted) or 1.0
+    own = max(error, ROUND_OFF * scale)
+    algebra = Measurement(
+        protocol="algebra",
+        quantity=quantity,
+        value=value,
+        uncertainty=own,
+        engine="theory",
+        set="reference",
+        parameters=FORMAL,
+        conditions={"by": what},
+    )
+    return Check(measurement=algebra, predicted=predicted, tolerance=COVERAGE * own, scale=scale)
+
+
+@_formal(
+    "fig-12",
+    "Fig. 12",
+    "If floor and wall could pull, (12) released, all bifurcations of Table 5 would appear for η > j as well.",
+    reason="The floor would have to pull: no ball and no engine does this.",
+)
 def _figure_12() -> Iterator[Check]:
     """The branch with A_y < 0 solves the equations and joins the thresholds as drawn."""
     p, unit = FORMAL, math.sqrt(FORMAL.g / FORMAL.R)
@@ -72,6 +102,12 @@ def _figure_12() -> Iterator[Check]:
     yield _check("law", "H: real part of its pair divided by the imaginary one", sum(turning), 0.0, 1e-9)
 
 
+@_formal(
+    "eq-83-rough",
+    "(82), (83), end of section 4.3",
+    "(83) is a bound for η > 1 only, and contradicts (12) there; (82) contradicts (12) unless η < j.",
+    reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",
+)
 def _pulling() -> Iterator[Check]:
     """The normal forces of slip at its onset, on either bound and a grid of friction coefficients."""
     grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 13) for eta in np.geomspace(0.05, 3.0, 13)]
@@ -89,6 +125,13 @@ def _pulling() -> Iterator[Check]:
     yield _check("law", "(83): friction with a bound and η ≤ 1", smooth, 0.0)
 
 
+@_formal(
+    "section-5.2-virtual",
+    "(73), section 5.2",
+    "For η > j and ω₀ > ω₀₃ slip at the floor grows out of rolling at both points on either side, up to ω₀₁ and "
+    "beyond: RR is unstable to SR from all directions; below, it dies out on either.",
+    reason="The floor would have to pull: a ball lifts off there.",
+)
 def _on_all_sides() -> Iterator[Check]:
     """Signs of gamma of a slip at A out of RR, on either side and of any other direction, over a grid with eta > j."""
     grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 7) for eta in np.geomspace(0.42, 3.0, 7)]
@@ -104,6 +147,12 @@ def _on_all_sides() -> Iterator[Check]:
     yield _check("law", "(73): flows below at which it grows", below, 0.0)
 
 
+@_formal(
+    "eq-69-edge",
+    "after (69)",
+    "The share δ is between 0 and 1 exactly where slip at the wall dies out on either side, (64).",
+    reason="Where it does not, no ball rolls at both points: δ is measured in between, by eq-69.",
+)
 def _sliding() -> Iterator[Check]:
     """Where the share of (69) is between 0 and 1, and where slip at the wall dies out on both sides, (64)."""
     wrong = 0
@@ -114,27 +163,39 @@ def _sliding() -> Iterator[Check]:
     yield _check("law", "(69), (64): states of which one says stable and the other unstable", wrong, 0.0)
 
 
-def _with_inertia() -> Iterator[Check]:
-    """Flows at which floor and wall can just hold a ball in a fluid with inertia, by its forces themselves."""
-    for eta, ratio in product((0.1, 0.25, 0.6, 1.2), (0.1, 0.3, 0.6)):
-        p = FORMAL.replace(eta=eta, density_ratio=ratio)
-        expected = bifurcation.thresholds_with_inertia(p)
-        carried = (1 - ratio) * p.m * p.R  # the swirl's pressure carries what the displaced fluid would take
+@_formal(
+    "design-sensitivities",
+    "(84)-(86)",
+    "A design's sensitivities are the logarithmic derivatives of thresholds by friction, inertia, size, gravity.",
+    reason="Derivatives of the closed forms, which thresholds themselves are measured against.",
+)
+def _slopes() -> Iterator[Check]:
+    """Logarithmic derivatives of the thresholds by hand (docs/design.md), and as a design gives them."""
+    p = FORMAL.replace(eta=0.25)
+    mu, eta, j = p.mu, p.eta, p.j
+    D = mu * eta * (1 + j) + j - eta
+    exact = {
+        ("omega_01", "mu"): (j - eta) / (2 * D),
+        ("omega_01", "eta"): eta * (1 + j) * (1 - mu) / (2 * (1 + eta) * D),
+        ("omega_01", "j"): -j * (1 + mu * eta) / (2 * D),
+        ("omega_01", "R"): -0.5,
+        ("omega_02", "eta"): -0.5,
+        ("omega_02", "mu"): 0.0,
+        ("omega_03", "j"): -0.5,
+        ("omega_03", "g"): 0.5,
+    }
+    given = design.sensitivities(p.replace, {name: getattr(p, name) for name in ("mu", "eta", "j", "R", "g")})
+    for (threshold, name), slope in exact.items():
+        of = given[threshold][name]
+        yield _check("law", f"d ln {threshold}/d ln {name}, off by", of.value - slope, 0.0, max(of.error, 1e-9))
 
-        def slack(omega_0: float, p: Parameters = p, carried: float = carried) -> float:
-            """What B_y the wall can give less what the floor needs, N; A_x = B_y - turns, B_x = the load less B_y."""
-            turns = p.j * p.m * p.R * omega_0**2
-            most = p.eta * (carried * omega_0**2 + turns) / (1 + p.eta)
-            return most - (turns - p.mu * p.m * p.g) / (1 - p.mu)
 
-        low, high = 1e-3 * expected["omega_02"], expected["omega_02"]
-        if not math.isnan(expected["omega_01"]):
-            onset = brentq(slack, low, 3 * high, rtol=1e-14)
-            yield _check("omega_01", "forces of rolling", onset, expected["omega_01"])
-        hangs = math.sqrt(p.m * p.g / (p.eta * carried))
-        yield _check("omega_02", "weight on the wall", hangs, expected["omega_02"])
-
-
+@_formal(
+    "ramp-law",
+    "(88), docs/theory.md, 11",
+    "A flow that rises slowly at a rate ρ passes the fold by K ρ^(2/3) before the ball lifts off.",
+    reason="A limit: at rates that an engine can be asked for, terms ρ ln ρ and ρ are 1 to 30 % of it (ramp-fold).",
+)
 def _past_the_fold() -> Iterator[Check]:
     """The delay of a slow ramp by the normal form at the fold itself, q' = a (omega_0 - omega_04) + b q^2.
 
@@ -162,27 +223,40 @@ def _past_the_fold() -> Iterator[Check]:
         yield _check("ramp_end", "K of K ρ^(2/3), by the normal form", delay, coefficient, 1e-4 * delay)
 
 
-def _slopes() -> Iterator[Check]:
-    """Logarithmic derivatives of the thresholds by hand (docs/design.md), and as a design gives them."""
-    p = FORMAL.replace(eta=0.25)
-    mu, eta, j = p.mu, p.eta, p.j
-    D = mu * eta * (1 + j) + j - eta
-    exact = {
-        ("omega_01", "mu"): (j - eta) / (2 * D),
-        ("omega_01", "eta"): eta * (1 + j) * (1 - mu) / (2 * (1 + eta) * D),
-        ("omega_01", "j"): -j * (1 + mu * eta) / (2 * D),
-        ("omega_01", "R"): -0.5,
-        ("omega_02", "eta"): -0.5,
-        ("omega_02", "mu"): 0.0,
-        ("omega_03", "j"): -0.5,
-        ("omega_03", "g"): 0.5,
-    }
-    given = design.sensitivities(p.replace, {name: getattr(p, name) for name in ("mu", "eta", "j", "R", "g")})
-    for (threshold, name), slope in exact.items():
-        of = given[threshold][name]
-        yield _check("law", f"d ln {threshold}/d ln {name}, off by", of.value - slope, 0.0, max(of.error, 1e-9))
+@_formal(
+    "fluid-inertia",
+    "extension",
+    "A fluid with inertia shifts ω₀₁ and ω₀₂ as if mass, inertia and gravity were others; ω₀₃ stays.",
+    reason="The paper and all simulators leave added mass and the pressure of the swirl out.",
+)
+def _with_inertia() -> Iterator[Check]:
+    """Flows at which floor and wall can just hold a ball in a fluid with inertia, by its forces themselves."""
+    for eta, ratio in product((0.1, 0.25, 0.6, 1.2), (0.1, 0.3, 0.6)):
+        p = FORMAL.replace(eta=eta, density_ratio=ratio)
+        expected = bifurcation.thresholds_with_inertia(p)
+        carried = (1 - ratio) * p.m * p.R  # the swirl's pressure carries what the displaced fluid would take
+
+        def slack(omega_0: float, p: Parameters = p, carried: float = carried) -> float:
+            """What B_y the wall can give less what the floor needs, N; A_x = B_y - turns, B_x = the load less B_y."""
+            turns = p.j * p.m * p.R * omega_0**2
+            most = p.eta * (carried * omega_0**2 + turns) / (1 + p.eta)
+            return most - (turns - p.mu * p.m * p.g) / (1 - p.mu)
+
+        low, high = 1e-3 * expected["omega_02"], expected["omega_02"]
+        if not math.isnan(expected["omega_01"]):
+            onset = brentq(slack, low, 3 * high, rtol=1e-14)
+            yield _check("omega_01", "forces of rolling", onset, expected["omega_01"])
+        hangs = math.sqrt(p.m * p.g / (p.eta * carried))
+        yield _check("omega_02", "weight on the wall", hangs, expected["omega_02"])
 
 
+@_formal(
+    "pulsation-extremes",
+    "(66), (67), (73)",
+    "The amplitude at which a pulsation makes the ball slip tends to a limit as the pulsation becomes slow, and to "
+    "another as it becomes fast.",
+    reason="So slow or so fast, no engine could follow it; frequencies in between are measured (pulsation-slip).",
+)
 def _pulsating() -> Iterator[Check]:
     """The amplitude at which slip begins in a very slow and a very fast pulsation, against their limits."""
     for eta, mu, law in product((0.1, 0.25, 0.35, 0.6), (0.1, 0.6), (drag.STOKES, drag.SCHILLER_NAUMANN)):
@@ -199,6 +273,13 @@ def _pulsating() -> Iterator[Check]:
         yield _check("slip_amplitude", what, 2 * closer - onset, pulsation.slow_onset(slow), abs(closer - onset))
 
 
+@_formal(
+    "two-methods",
+    "Definitions 1-3",
+    "The event-driven simulation and time stepping, extrapolated to no step, end in the same state, also where "
+    "landings rebound.",
+    reason="Two ways to compute theory's motions; motion and runs hold the first against MuJoCo.",
+)
 def _both_ways() -> Iterator[Check]:
     """Motions by time stepping, extrapolated from steps h and h/2, where the event-driven simulation has them."""
     p, flow = FORMAL.replace(eta=0.6), Flow.sines(12.0, [(3.0, 4.0, 1.0)])
@@ -227,6 +308,12 @@ def _both_ways() -> Iterator[Check]:
             yield _check(f"end_{variable}", what, 2 * fine[k] - coarse[k], exact[k], error, units[k])
 
 
+@_formal(
+    "fluid-torque-friction",
+    "extension",
+    "A fluid that resists the ball's spin leaves less of the friction for rolling, by a known share.",
+    reason="Of engines only the lag is measured (fluid-torque).",
+)
 def _with_torque() -> Iterator[Check]:
     """The least friction with which a ball rolls in a fluid that resists its spin, by time stepping."""
     for eta, torque, flow in ((0.25, 2.0, 4.0), (0.6, 3.0, 5.0), (0.2, 0.5, 4.0)):
@@ -244,6 +331,13 @@ def _with_torque() -> Iterator[Check]:
         yield _check("law_in_motion", what, rolls - 1, 0.0, 1 / 4000)
 
 
+@_formal(
+    "design-best",
+    "(84), (86), docs/design.md",
+    "The flowmeter with the longest range has η = j, whatever the friction of the floor; among equals a design "
+    "takes the quickest ball, the smallest.",
+    reason="A search over closed forms.",
+)
 def _best() -> Iterator[Check]:
     """The friction of the wall and the radius that a search chooses, where the best is known."""
     fluid, fastest = {"nu_f": 1e-4, "rho_f": 1000.0}, 10.0
@@ -259,104 +353,4 @@ def _best() -> Iterator[Check]:
         )
 
 
-def _check(quantity: str, what: str, value: float, predicted: float, error: float = 0.0, unit: float = 0.0) -> Check:
-    """A number found another way, with its standard uncertainty, in units of the predicted one, of `unit` or of 1."""
-    scale = unit or abs(predicted) or 1.0
-    own = max(error, ROUND_OFF * scale)
-    algebra = Measurement(
-        protocol="algebra",
-        quantity=quantity,
-        value=value,
-        uncertainty=own,
-        engine="theory",
-        set="reference",
-        parameters=FORMAL,
-        conditions={"by": what},
-    )
-    return Check(measurement=algebra, predicted=predicted, tolerance=COVERAGE * own, scale=scale)
-
-
-CLAIMS = (
-    Claim(
-        "fig-12",
-        "Fig. 12",
-        "If floor and wall could pull, (12) released, all bifurcations of Table 5 would appear for η > j as well.",
-        algebra=_figure_12,
-        reason="The floor would have to pull: no ball and no engine does this.",
-    ),
-    Claim(
-        "eq-83-rough",
-        "(82), (83), end of section 4.3",
-        "(83) is a bound for η > 1 only, and contradicts (12) there; (82) contradicts (12) unless η < j.",
-        algebra=_pulling,
-        reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",
-    ),
-    Claim(
-        "section-5.2-virtual",
-        "(73), section 5.2",
-        "For η > j and ω₀ > ω₀₃ slip at the floor grows out of rolling at both points on either side, up to ω₀₁ and "
-        "beyond: RR is unstable to SR from all directions; below, it dies out on either.",
-        algebra=_on_all_sides,
-        reason="The floor would have to pull: a ball lifts off there.",
-    ),
-    Claim(
-        "eq-69-edge",
-        "after (69)",
-        "The share δ is between 0 and 1 exactly where slip at the wall dies out on either side, (64).",
-        algebra=_sliding,
-        reason="Where it does not, no ball rolls at both points: δ is measured in between, by eq-69.",
-    ),
-    Claim(
-        "design-sensitivities",
-        "(84)-(86)",
-        "A design's sensitivities are the logarithmic derivatives of thresholds by friction, inertia, size, gravity.",
-        algebra=_slopes,
-        reason="Derivatives of the closed forms, which thresholds themselves are measured against.",
-    ),
-    Claim(
-        "ramp-law",
-        "(88), docs/theory.md, 11",
-        "A flow that rises slowly at a rate ρ passes the fold by K ρ^(2/3) before the ball lifts off.",
-        algebra=_past_the_fold,
-        reason="A limit: at rates that an engine can be asked for, terms ρ ln ρ and ρ are 1 to 30 % of it (ramp-fold).",
-    ),
-    Claim(
-        "fluid-inertia",
-        "extension",
-        "A fluid with inertia shifts ω₀₁ and ω₀₂ as if mass, inertia and gravity were others; ω₀₃ stays.",
-        algebra=_with_inertia,
-        reason="The paper and all simulators leave added mass and the pressure of the swirl out.",
-    ),
-    Claim(
-        "pulsation-extremes",
-        "(66), (67), (73)",
-        "The amplitude at which a pulsation makes the ball slip tends to a limit as the pulsation becomes slow, and to "
-        "another as it becomes fast.",
-        algebra=_pulsating,
-        reason="So slow or so fast, no engine could follow it; frequencies in between are measured (pulsation-slip).",
-    ),
-    Claim(
-        "two-methods",
-        "Definitions 1-3",
-        "The event-driven simulation and time stepping, extrapolated to no step, end in the same state, also where "
-        "landings rebound.",
-        algebra=_both_ways,
-        reason="Two ways to compute theory's motions; motion and runs hold the first against MuJoCo.",
-    ),
-    Claim(
-        "fluid-torque-friction",
-        "extension",
-        "A fluid that resists the ball's spin leaves less of the friction for rolling, by a known share.",
-        algebra=_with_torque,
-        reason="Of engines only the lag is measured (fluid-torque).",
-    ),
-    Claim(
-        "design-best",
-        "(84), (86), docs/design.md",
-        "The flowmeter with the longest range has η = j, whatever the friction of the floor; among equals a design "
-        "takes the quickest ball, the smallest.",
-        algebra=_best,
-        reason="A search over closed forms.",
-    ),
-)
 SECTIONS = {"Formal": CLAIMS}
