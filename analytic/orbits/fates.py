@@ -3,28 +3,28 @@
 A run is followed window by window until it repeats what it did; any simulator may carry it out. A recurrent motion is
 closed to an orbit by theory (`orbits`). One for which no stable orbit is found is chaotic if neighbours of it part
 exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with its last window.
-
-Whether a ball hops for ever is decided faster: a screen of many runs (`screen`), of which each that hops on is then
-looked at (`confirm`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
 from analytic.orbits import periodic as orbits
-from analytic.orbits.periodic import NoOrbitError, Orbit, active_variables, extent, landings
-from analytic.simulation.ensemble import interval, random_starts, simulate_many
+from analytic.orbits.periodic import NoOrbitError, Orbit, active_variables, extent
+from analytic.simulation.ensemble import interval, random_starts
 from analytic.simulation.motion import natural_units
 from analytic.simulation.simulator import simulate
 from analytic.stationary.solutions import StationarySolution, stable_solutions
-from model import InputError, Parameters, SimulationError, State, Trajectory
+from model import InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.errors import check_type
@@ -45,17 +45,12 @@ GROWING = 400.0
 """Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
 APART = 1e-6
 """Distance in natural units of the two motions whose growing apart is the Lyapunov exponent."""
-DURATION = 60.0
-"""How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but near folds."""
-QUIET, LOOKS = 3.0, 12
-"""Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this time."""
-SEEN, SEEN_SAMPLES = 25.0, 4000
-"""How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for; and samples."""
-CONFIRMING = 12.0
-"""How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it counts."""
+SIDE_BY_SIDE = 16
+"""Runs that are followed at once: their windows take some 20 MB."""
 
-Run = Callable[[Parameters, Array, float, float], Trajectory]
-"""A simulator: parameters, start (8,), duration in s, sample interval in s. Raises `SimulationError`."""
+Runs = Callable[[Parameters, Array, float, float], Sequence[Trajectory]]
+"""A simulator: parameters, starts (n, 8), duration in s, sample interval in s; of a run that breaks down what there is,
+with the reason in its header."""
 
 
 class Kind(StrEnum):
@@ -121,9 +116,18 @@ class Attractor:
         return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
 
 
-def event_driven(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
-    """The event-driven simulation as a `Run`."""
-    return simulate(p, x0, duration, sample_interval=interval, initial_impact=True)
+def event_driven(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
+    """Event-driven simulations as `Runs`: where numba is installed each is a compiled call, on all cores."""
+
+    def motion(x0: Array) -> Trajectory:
+        try:
+            return simulate(p, x0, duration, sample_interval=interval, initial_impact=True)
+        except SimulationError as error:
+            run: Trajectory = error.trajectory
+            return run
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(motion, x0s))
 
 
 def attractors(
@@ -132,7 +136,7 @@ def attractors(
     *,
     seed: int = 0,
     lasting: float | None = None,
-    run: Run = event_driven,
+    run: Runs = event_driven,
 ) -> list[Attractor]:
     """The attractors that balls approach from many starts, the most frequent first.
 
@@ -149,33 +153,36 @@ def attractors(
     if lasting is None and p.c == 0:
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
-    groups: list[list[Fate]] = []
-    for x in states:
-        fate = settle(p, x, duration, run, [group[0] for group in groups])
-        group = next((group for group in groups if group[0].same(fate)), None)
-        if group is None:
-            groups.append(group := [])
-        group.append(fate)
+    groups, following = list[list[Fate]](), dict[Generator[Array, Trajectory, Fate], Array]()
+    window, todo = WINDOW * natural_units(p)[0], (_settling(p, x, duration, run, groups) for x in states)
+    while following := following | {each: next(each) for each in islice(todo, SIDE_BY_SIDE - len(following))}:
+        windows = run(p, np.array(list(following.values())), window, window / WINDOW_SAMPLES)
+        for each, seen in zip(list(following), windows, strict=True):
+            try:
+                following[each] = each.send(seen)
+            except StopIteration as settled:
+                del following[each]
+                fate: Fate = settled.value
+                group = next((group for group in groups if group[0].same(fate)), None)
+                if group is None:
+                    groups.append(group := [])
+                group.append(fate)
     groups.sort(key=len, reverse=True)
     return [Attractor(group[0], len(group), len(states)) for group in groups]
 
 
-def settle(
-    p: Parameters, x0: npt.ArrayLike, lasting: float, run: Run = event_driven, known: Sequence[Fate] = ()
-) -> Fate:
-    """The attractor that the motion from x0 approaches within `lasting` seconds; `known` fates are simply recognised.
+def _settling(
+    p: Parameters, x: Array, lasting: float, run: Runs, known: Sequence[Sequence[Fate]]
+) -> Generator[Array, Trajectory, Fate]:
+    """The attractor that the motion from x approaches within `lasting` seconds: asks for windows from states.
 
-    It is followed in windows. Stationary is what hardly moves, and less than before. Where two windows are alike the
-    motion is recurrent: it has one of the known fates, or closes; if it does neither, its largest Lyapunov exponent
-    decides.
+    Stationary is what hardly moves, and less than before. Where two windows are alike the motion is recurrent: it has
+    the fate of one of the `known` groups, or closes; if it does neither, its largest Lyapunov exponent decides.
     """
-    solutions, x, unit = stable_solutions(p), full_state(x0), natural_units(p)[0]
-    window, seen, recurrent = WINDOW * unit, list[Trajectory](), False
-    for _ in range(math.ceil(lasting / window)):
-        try:
-            now = run(p, x, window, window / WINDOW_SAMPLES)
-        except SimulationError as error:
-            return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
+    solutions, unit = stable_solutions(p), natural_units(p)[0]
+    seen, recurrent = list[Trajectory](), False
+    for _ in range(math.ceil(lasting / (WINDOW * unit))):
+        now = yield x
         if now.header.failure:
             return Fate(Kind.UNDECIDED, now, failure=now.header.failure)
         x, seen = now.x[-1], [*seen[-1:], now]
@@ -185,7 +192,7 @@ def settle(
         if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
             return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
         if recurrent := _alike(before, now):
-            same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
+            same = (fate for fate, *_ in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
             if fate := next(same, None) or periodic(now):
                 return fate
     if not recurrent:
@@ -250,22 +257,25 @@ def _state(last: Trajectory) -> Array:
 
 
 def lyapunov(
-    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, run: Run = event_driven
+    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, run: Runs = event_driven
 ) -> tuple[float, float]:
     """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
 
     A second motion starts beside the first, a distance `APART` away in natural units, and is brought back to that
     distance every `renewed` seconds, as soon as both are in one case; the mean growth between is the exponent
-    (Benettin's method). The error is that of the mean of ten parts of the duration.
+    (Benettin's method). The error is that of the mean of ten parts of the duration. Raises `SimulationError` if a
+    motion breaks down.
     """
     first = full_state(x)
-    case = run(p, first, renewed, renewed).cases[0]
-    active, push = active_variables(case), np.zeros(8)
+    active, push = active_variables(run(p, first[None], renewed, renewed)[0].cases[0]), np.zeros(8)
     push[active] = np.random.default_rng(0).normal(size=len(active))
     second = first + push * state_units(p) * APART / np.linalg.norm(push)
     growth, before = [], APART
     for _ in range(math.ceil(duration / renewed)):
-        runs = [run(p, each, renewed, renewed) for each in (first, second)]
+        runs = run(p, np.array([first, second]), renewed, renewed)
+        for each in runs:
+            if each.header.failure:
+                raise SimulationError(each.header.failure, each)
         first, second = (each.x[-1] for each in runs)
         apart = second - first
         distance = float(np.linalg.norm(apart / state_units(p)))
@@ -277,57 +287,3 @@ def lyapunov(
             second, before = first + apart * APART / distance, APART
     parts = np.array([part.mean() for part in np.array_split(np.array(growth), 10)]) / renewed
     return float(np.mean(growth)) / renewed, float(parts.std(ddof=1) / math.sqrt(len(parts)))
-
-
-def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Array, int]:
-    """Which of the starts (n, 8) still hop after 60/c; their states then (n, 8); how many runs failed.
-
-    One thread; p.c must be positive.
-    """
-    lasts, quiet = DURATION / p.c, QUIET / p.c
-    runs = simulate_many(p, x0s, lasts, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
-    failed = np.array([bool(each) for each in runs.failure])
-    hops = np.any(runs.landings[:, -LOOKS:] > 0, axis=1) & ~failed
-    return hops, runs.x[:, -1], int(failed.sum())
-
-
-@dataclass(frozen=True)
-class Hopping:
-    """A motion that hops on, in natural units."""
-
-    landings: int
-    """Landings on the floor in a period; 0 if no periodic motion was found near it."""
-    period: float
-    """In sqrt(R/g); with no period found the mean time between landings."""
-    omega_c: float
-    """Mean omega_c/omega_0."""
-    height: float
-    """Greatest height y/R."""
-    multiplier: float | None = None
-    """Largest modulus of the Floquet multipliers; None without a period."""
-
-
-def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
-    """The hopping that a state leads to by the event-driven simulation; None if it ends.
-
-    That is a stable periodic motion near it if there is one; else the ball is followed for `CONFIRMING`.
-    Raises `SimulationError` if the simulation can't go on.
-    """
-    unit = math.sqrt(p.R / p.g)
-    seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
-    if not any(landings(zip(seen.events.from_case, seen.events.to_case, strict=True))):
-        return None
-    fate = periodic(seen)
-    if fate and fate.orbit and (count := sum(landings(fate.orbit.changes))):
-        orbit = fate.orbit
-        omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
-        return Hopping(int(count), orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
-    lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
-    run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SEEN_SAMPLES)
-    last = run.time > run.time[-1] * 2 / 3
-    times = run.events.time[landings(zip(run.events.from_case, run.events.to_case, strict=True))]
-    times = times[times > run.time[-1] * 2 / 3]
-    if len(times) < 3 or run.time[-1] - times[-1] > 3 * np.max(np.diff(times)):
-        return None
-    between, omega_c = float(np.mean(np.diff(times))), float(np.mean(run.omega_c[last]))
-    return Hopping(0, between / unit, omega_c / p.omega_0, float(run.y[last].max()) / p.R)

@@ -34,8 +34,9 @@ def run(args: argparse.Namespace) -> int:
     ranges = {way.name: way.ends for way in ways}
     starts = np.array([running.start(args)]) if args.start else args.random
 
-    def simulate(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
-        return carry_out([running.task(args, p, x0=State.of(x0), t_end=duration, sample_interval=interval)])[0]
+    def simulate(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
+        lasting = {"t_end": duration, "sample_interval": interval}
+        return carry_out([running.task(args, p, x0=State.of(x0), **lasting) for x0 in x0s])
 
     rows = []
     for p in grid(options.parameters(args), axes):

@@ -22,8 +22,11 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
-from analytic.orbits import fates
+from analytic import simulate, simulate_many
+from analytic.orbits.fates import periodic
+from analytic.orbits.periodic import landings
 from analytic.simulation.ensemble import interval
 from compare.kit import pages, progress
 from compare.kit.engines import EVENT
@@ -53,6 +56,15 @@ SYMBOLS = {"mu": "μ", "eta": "η", "kappa": "κ", "Omega_0": "Ω₀"}
 LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""
 
+DURATION = 60.0
+"""How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but near folds."""
+QUIET, LOOKS = 3.0, 12
+"""Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this time."""
+SEEN, SEEN_SAMPLES = 25.0, 4000
+"""How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for; and samples."""
+CONFIRMING = 12.0
+"""How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it counts."""
+
 
 @dataclass(frozen=True)
 class AttractorSearch:
@@ -64,7 +76,8 @@ class AttractorSearch:
 
     def key(self, chunk: int) -> str:
         """Hash of all that determines a chunk: the search, and the sources of screen and confirmation."""
-        text = json.dumps([dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, sources(*EVENT.sources)])
+        own = Path(__file__).read_text("utf-8")
+        text = json.dumps([dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, own, sources(*EVENT.sources)])
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
     def points(self, count: int) -> Array:
@@ -83,7 +96,7 @@ class Searched:
     search: AttractorSearch
     sets: int
     rows: tuple[Mapping[str, Any], ...]
-    """The groups of each; "hops", how many starts do; "confirmed", the fields of `fates.Hopping` or None."""
+    """The groups of each; "hops", how many starts do; "confirmed", the fields of `Hopping` or None."""
     failed: int
     """Runs that broke down."""
 
@@ -123,6 +136,60 @@ def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
     return State(y, 0.0, omega_c, *slips.T).stacked()
 
 
+def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Array, int]:
+    """Which of the starts (n, 8) still hop after 60/c; their states then (n, 8); how many runs failed.
+
+    One thread; p.c must be positive.
+    """
+    lasts, quiet = DURATION / p.c, QUIET / p.c
+    runs = simulate_many(p, x0s, lasts, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
+    failed = np.array([bool(each) for each in runs.failure])
+    hops = np.any(runs.landings[:, -LOOKS:] > 0, axis=1) & ~failed
+    return hops, runs.x[:, -1], int(failed.sum())
+
+
+@dataclass(frozen=True)
+class Hopping:
+    """A motion that hops on, in natural units."""
+
+    landings: int
+    """Landings on the floor in a period; 0 if no periodic motion was found near it."""
+    period: float
+    """In sqrt(R/g); with no period found the mean time between landings."""
+    omega_c: float
+    """Mean omega_c/omega_0."""
+    height: float
+    """Greatest height y/R."""
+    multiplier: float | None = None
+    """Largest modulus of the Floquet multipliers; None without a period."""
+
+
+def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
+    """The hopping that a state leads to by the event-driven simulation; None if it ends.
+
+    That is a stable periodic motion near it if there is one; else the ball is followed for `CONFIRMING`.
+    Raises `SimulationError` if the simulation can't go on.
+    """
+    unit = math.sqrt(p.R / p.g)
+    seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
+    if not any(landings(zip(seen.events.from_case, seen.events.to_case, strict=True))):
+        return None
+    fate = periodic(seen)
+    if fate and fate.orbit and (count := sum(landings(fate.orbit.changes))):
+        orbit = fate.orbit
+        omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
+        return Hopping(int(count), orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
+    lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
+    run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SEEN_SAMPLES)
+    last = run.time > run.time[-1] * 2 / 3
+    times = run.events.time[landings(zip(run.events.from_case, run.events.to_case, strict=True))]
+    times = times[times > run.time[-1] * 2 / 3]
+    if len(times) < 3 or run.time[-1] - times[-1] > 3 * np.max(np.diff(times)):
+        return None
+    between, omega_c = float(np.mean(np.diff(times))), float(np.mean(run.omega_c[last]))
+    return Hopping(0, between / unit, omega_c / p.omega_0, float(run.y[last].max()) / p.R)
+
+
 def carry_out(search: AttractorSearch, chunk: int, points: Array, path: Path) -> None:
     """Search the sets of a chunk and write its file.
 
@@ -131,13 +198,13 @@ def carry_out(search: AttractorSearch, chunk: int, points: Array, path: Path) ->
     rows = []
     for k, point in enumerate(points):
         p = parameters(point)
-        hop, x, failed = fates.screen(p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k]))
+        hop, x, failed = screen(p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k]))
         row: dict[str, Any] = {"hops": int(hop.sum()), "failed": failed}
         if hop.any():
             row |= {"x": x[hop][0].tolist(), "confirmed": None, "broken": ""}
         for state in x[hop]:
             try:
-                if confirmed := fates.confirm(p, state):
+                if confirmed := confirm(p, state):
                     row["confirmed"] = dataclasses.asdict(confirmed)
                     del row["broken"]
                     break

@@ -174,8 +174,11 @@ def test_lyapunov_exponent_of_an_orbit_is_zero(hop):
 def test_lyapunov_exponent_of_a_known_growth():
     """Neighbours part by a factor of e every 1/0.3 s."""
 
-    def run(p, x, duration, interval):
-        return SimpleNamespace(x=np.array([x, x * np.exp(0.3 * duration)]), case=[Case.NN], cases=[Case.NN])
+    def run(p, x0s, duration, interval):
+        whole, growth = SimpleNamespace(failure=""), np.exp(0.3 * duration)
+        return [
+            SimpleNamespace(x=np.array([x, x * growth]), case=[Case.NN], cases=[Case.NN], header=whole) for x in x0s
+        ]
 
     assert fates.lyapunov(HOPPING, np.zeros(8), 20.0, 0.5, run) == pytest.approx((0.3, 0.0), abs=1e-6)
 
@@ -194,7 +197,10 @@ def lorenz(time, z):
 def slipping_by(rates):
     """A simulator of a ball that slips at both points, with omega_c and slips of these rates in natural units."""
 
-    def run(p, x0, duration, interval):
+    def run(p, x0s, duration, interval):
+        return [one(p, x0, duration, interval) for x0 in x0s]
+
+    def one(p, x0, duration, interval):
         size, unit = state_units(p)[2:6], (p.R / p.g) ** 0.5
         time = np.arange(round(duration / interval) + 1) * interval
         z = solve_ivp(rates, (0, time[-1] / unit), x0[2:6] / size, "DOP853", time / unit, rtol=1e-10, atol=1e-12).y

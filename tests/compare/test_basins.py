@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from analytic import stable_solutions
-from analytic.orbits import fates
 from analytic.simulation.ensemble import interval
 from compare.commands import cli
 from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
 from compare.subjects.attractors.basins import FATES, Basins, basins
 from docs.studies.figures import SEARCHES
-from docs.studies.search import BOX, Searched, parameters, random_starts
+from docs.studies.search import BOX, Searched, confirm, parameters, random_starts, screen
 from model import InputError, Parameters, StorageError, storage
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
@@ -21,17 +20,17 @@ def test_screen_and_confirmation_tell_hopping_from_rest():
     """A ball hops on in a kept set with drag enough; in the reference set it rests whatever it starts with."""
     row = next(r for r in Searched.load(SEARCHES[0]).confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
     p = parameters(np.array([row[name] for name in BOX]))
-    hops, x, failed = fates.screen(p, random_starts(p, 20, [0]))
+    hops, x, failed = screen(p, random_starts(p, 20, [0]))
     assert failed == 0
     assert hops.any()
-    record = fates.confirm(p, x[hops][0])
+    record = confirm(p, x[hops][0])
     assert record is not None
     assert record.period == pytest.approx(row["confirmed"]["period"], rel=1e-3)
     assert 0 < (record.multiplier or 0) < 1
     still = Parameters.named("reference").replace(omega_0=25.0)
-    hops, x, _ = fates.screen(still, random_starts(still, 3, [0]))
+    hops, x, _ = screen(still, random_starts(still, 3, [0]))
     assert not hops.any()
-    assert fates.confirm(still, x[0]) is None
+    assert confirm(still, x[0]) is None
 
 
 def test_intervals_of_shares():
