@@ -32,7 +32,7 @@ def test_undecided_with_what_it_did_last(capsys, tmp_path):
         assert only["low"]["omega_c"] <= only["mean"]["omega_c"] <= only["high"]["omega_c"]
     head = page.read_text("utf-8").split("| omega_0", 1)[0]
     command = f"dualball attractors {' '.join(given)} --json"
-    for words in ("μ = 0.45554, η = 0.072543", "ω₀ = 69.211 rad s-1", command):
+    for words in ("μ = 0.45554, η = 0.072543", "ω₀ = 69.211 rad/s", command):
         assert words in head
     rows = [line for line in page.read_text("utf-8").splitlines() if line.startswith("|")]
     assert len(rows) == 2 + 2
