@@ -133,7 +133,7 @@ def reading(path: str | Path, remedy: str = "", sealed: bool = True) -> Iterator
     """
     try:
         if not Path(path).is_file():
-            raise StorageError("there is no such file")
+            raise StorageError("it is a directory" if Path(path).is_dir() else "there is no such file")
         with Path(path).open("rb") as content:
             if content.read(len(_SIGNATURE)) != _SIGNATURE:
                 raise StorageError("it is not an HDF5 file")

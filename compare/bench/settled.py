@@ -70,7 +70,8 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     data, names = mujoco.MjData(model), [model.key(k).name or str(k) for k in range(model.nkey)]
     if keyframe is not None:
         if keyframe not in names and keyframe not in map(str, range(model.nkey)):
-            raise InputError(f"{path} has no keyframe {keyframe!r}, but {', '.join(names) or 'none at all'}")
+            others = f", but {', '.join(names)}" if names else ""
+            raise InputError(f"{path} has no keyframe {keyframe!r}{others}")
         mujoco.mj_resetDataKeyframe(model, data, names.index(keyframe) if keyframe in names else int(keyframe))
     return model, data
 

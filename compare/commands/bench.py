@@ -115,6 +115,8 @@ def listed(args: argparse.Namespace) -> int:
         known = json.loads((resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8"))
         options.show(None, False, _table(known["version"], known["cases"]))
         return 0
+    if args.name and args.output:
+        raise InputError(f"-o writes all cases: {args.name!r} has no effect beside it")
     from compare.bench import exact
     from compare.bench.case import VERSION
 

@@ -74,5 +74,7 @@ def start(args: argparse.Namespace) -> State:
     for item in args.start:
         name, _, value = item.partition("=")
         check_names([name], VARIABLES, "state variable")
+        if name in values:
+            raise InputError(f"--start names {name} twice")
         values[name] = parse_number(name, value, units[name], REACH)
     return State(**values)

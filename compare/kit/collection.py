@@ -59,7 +59,8 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     """
     check_writable(output)
     if not directory.is_dir():
-        raise StorageError(f"cannot read {directory}: there is no such directory")
+        why = "it is no directory" if directory.exists() else "there is no such directory"
+        raise StorageError(f"cannot read {directory}: {why}")
     files = [
         file for file in sorted(directory.rglob("*.h5")) if file.parent.suffix != ".journal"
     ]  # of a run that goes on

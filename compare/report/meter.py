@@ -48,7 +48,8 @@ def torque(p: Parameters) -> str:
     laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
     stokes_told, layer_told = (
         f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({100 * law.shift:+.0f} %), and "
-        f"it would need {law.friction:#.2g} times the friction that there is"
+        f"it would need {f'{law.friction:#.2g} times' if math.isfinite(law.friction) else 'more than'} "
+        "the friction that there is"
         for law in laws
     )
     how = "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
