@@ -29,7 +29,7 @@ import numpy as np
 import numpy.typing as npt
 
 from model import InputError, Parameters
-from model.arrays import Array
+from model.arrays import Array, Real
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
 FORESEEN = 0.01
@@ -150,18 +150,10 @@ class ContactSettings:
         """R/A of the normal rows, (1 - d)/d."""
         return (1 - self.solimp) / self.solimp
 
-    def margin(self, load: float, friction: float = 0.0, slip_speed: float = 0.0) -> float:
-        """Margin less gap (m) of a steady contact: the margin that leaves no gap, or else how deep the ball sinks.
-
-        `load` is the normal force over the mass (m s-2), `friction` the coefficient, `slip_speed` in m s-1. The value
-        is negative where the contact can't be continuous. With memory slip lifts nothing.
-        """
-        lifted = 0.0 if self.memory else self.hover_number(load, friction, slip_speed)
-        return self.softness * load * (1 - lifted) / self.k
-
-    def held(self, gap: float, load: float, friction: float, slip_speed: float) -> float:
-        """Margin (m) of a contact with such a gap that bears a `load`, m s-2."""
-        return max(gap + self.margin(load, friction, slip_speed), 0.0) if load > 0 else 0.0
+    def margin(self, load: Real) -> Real:
+        """Margin less gap (m) of a contact that bears a steady load (force over the mass, m s-2), if slip doesn't lift
+        it: the margin that leaves no gap, or else how deep the ball sinks."""
+        return self.softness * load / self.k
 
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
         """mu |w| / (R f), `load` > 0: without memory sliding contact is continuous below 1."""
@@ -219,7 +211,7 @@ class ContactSettings:
 
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching: twice the depth to which gravity presses it."""
-        return 0.0 if self.rigid else 2 * self.margin(g)
+        return 0.0 if self.rigid else 2 * float(self.margin(g))
 
     def slowest_fall(self, g: float) -> float:
         """Speed (m s-1) from which on a ball comes down with an impact; below, the contacts stop it softly.

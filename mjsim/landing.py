@@ -2,7 +2,7 @@
 
 `mjsim.free` takes it through the step in shorter ones, with the rigid law that serves any model, and no axis. From what
 comes out the ball goes on upon its joints: places, velocities, accelerations, and the forces of its contacts, from
-which the margins follow (`ContactSettings.held`).
+which the margins follow.
 """
 
 from __future__ import annotations

@@ -29,7 +29,6 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import BEGINS, GOES_ON, LANDS, NOT, Ball, Velocity, ball_of, near_axis
 from model import Parameters, State
 from model.arrays import Array
-from model.kinematics import slip_speeds
 
 if TYPE_CHECKING:
     from mjsim.landing import Fine, Landed
@@ -134,8 +133,10 @@ class Polar:
 
         The contacts get margins with which they bear their forces.
         """
-        p, (_, h, y), v = self._parameters[run], landed.place, landed.velocity
-        near = near_axis(p.R - h, Velocity(*v), ball_of(self._arguments[0], run)) and landed.forces[7] == 0
+        p, v = self._parameters[run], landed.velocity
+        near = (
+            near_axis(p.R - landed.place[1], Velocity(*v), ball_of(self._arguments[0], run)) and landed.forces[7] == 0
+        )
         pace = max(abs(v[0]), math.sqrt(p.g / p.R))
         most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(landed.forces[[1, 2]]).max())
         fast = landed.change > _CHANGE * self._h * pace * most and not calm
@@ -143,9 +144,8 @@ class Polar:
         self._forces[:, run] = landed.forces
         self._set(run, landed.place, v, landed.rates * (not near))
         if self._settings.servo:
-            slips = slip_speeds(recorder.state(landed.place, v, p).stacked(), p)
-            given = zip((y, h), landed.forces[6:] / p.m, (p.mu, p.eta), slips, strict=True)
-            self.margins[:, run] = [self._settings.held(*map(float, each)) for each in given]
+            loads = landed.forces[6:] / p.m
+            self.margins[:, run] = np.maximum(landed.place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""

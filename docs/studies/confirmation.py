@@ -82,7 +82,9 @@ def _depths() -> Iterator[Row]:
         given = float(run.force_A[-1, 1]) / SLIPPING.m, SLIPPING.mu, float(run.slip_speed_A[-1])
         # What slip would take from the load is given back as it is foreseen, but for the turning.
         tolerance = _turning(timestep) * (1 + settings.hover_number(*given))
-        yield Row(f"depth at A in slipping, {setting}", "m", settings.margin(*given), -float(run.gap_A[-1]), tolerance)
+        yield Row(
+            f"depth at A in slipping, {setting}", "m", settings.margin(given[0]), -float(run.gap_A[-1]), tolerance
+        )
 
 
 def _margins() -> Iterator[Row]:
@@ -93,7 +95,7 @@ def _margins() -> Iterator[Row]:
         for k, (contact, axis, friction) in enumerate((("A", 1, SLIPPING.mu), ("B", 0, SLIPPING.eta))):
             load, slip = last[f"force_{contact}"][axis] / SLIPPING.m, float(last[f"slip_speed_{contact}"])
             what = f"margin at {contact} in slipping, d = {solimp:g}{'' if memory else ', no memory'}"
-            margin = settings.margin(load, friction, slip)
+            margin = settings.margin(load) * (1 - (0.0 if memory else settings.hover_number(load, friction, slip)))
             yield Row(what, "m", margin, float(margins[k]), _turning(settings.timestep))
 
 

@@ -272,25 +272,26 @@ def _value(struct: int, name: int) -> float:
 
 # -- what a simulation remembers ---------------------------------------------------------------------------------------
 
-KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, SCRATCH, CHAINS, FREE, SPINS = range(0, 26, 2)
+KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, NOW, SCRATCH, CHAINS, FREE, SPINS = range(0, 28, 2)
 """Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their
 axes in those of both bodies, friction and regular friction (24); their places (4); rows (`ROW`); Jacobians and their
-columns; what dry friction bore; poses at which these were taken; a contact; contacts by their geoms (`_chain`); bodies
-that nothing joins to others (`law.free_bodies`), and of each how much angular momentum other moments than gyroscopic
-ones gave it in the last step, in world axes, and the one that it would have without them now, in its own, N m s."""
+columns; what dry friction bore; poses at which these were taken, and those now (`_poses`); a contact; contacts by their
+geoms (`_chain`); bodies that nothing joins to others (`law.free_bodies`), and of each how much angular momentum other
+moments than gyroscopic ones gave it in the last step, in world axes, and the one that it would have without them now,
+in its own, N m s."""
 (
     COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, COUNT_FREE, TURNED, PENDING, RESETS,
     SOLVES,
-) = range(26, 38)  # fmt: skip
+) = range(28, 40)  # fmt: skip
 """Counts: contacts now and before, rows, dry rows now and before, contacts and rows of the engine, free bodies; whether
 contacts have their forces in the axes of bodies; whether forces are still to be found; resets by the engine; solutions.
 """
-MOMENT, LASTED, LEAST, CALLED = range(38, 42)
+MOMENT, LASTED, LEAST, CALLED = range(40, 44)
 """Time and time step of the step under way, s; distance by which contacts must move for points to be put back, m; time
 of the last call, s."""
-RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED, FAST = range(42, 54)
+RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, DEPTH, CALM, NEAR, FIXED, FAST = range(44, 56)
 """The numbers of a `law.Law`, in its order."""
-HEAD = 54
+HEAD, POSE = 56, 16
 INDEX, FIRST, LENGTH, AT = range(4)
 """Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
 SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
@@ -433,49 +434,42 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
 
 
 @compiled
-def _same(d: int, offset: int, length: int, poses: Any, at: int) -> bool:
-    """Whether an array of `mjData` is as it was."""
-    now = _real(_int64(d + offset)[0])
-    for i in range(length):  # noqa: SIM110
-        if not abs(now[i] - poses[at + i]) < law.STILL:
-            return False
-    return True
+def _poses(m: int, d: int, head: int, block: int) -> int:
+    """What axes and Jacobians depend on, `POSE` numbers of each contact; points of flush faces shift by µm."""
+    ngeom, ncon, contact, size = _number(m, NGEOM), _number(d, NCON), _int64(d + _at(CONTACT))[0], _at(SIZE)
+    xpos, xmat, poses = _array(d, XPOS), _array(d, XMAT), _room(head, block, 12 * ngeom + POSE * ncon)
+    for i in range(3 * ngeom):
+        poses[i] = xpos[i]
+    for i in range(9 * ngeom):
+        poses[3 * ngeom + i] = xmat[i]
+    at = _at(POS), _at(FRAME), _at(FRICTION), _at(GEOM), _at(DIM), _at(ADDRESS)
+    for i in range(ncon):
+        c, first = contact + i * size, 12 * ngeom + POSE * i
+        pos, frame, friction, geom = _real(c + at[0]), _real(c + at[1]), _real(c + at[2]), _int32(c + at[3])
+        for j in range(3):
+            poses[first + j], poses[first + 9 + j] = 1e-3 * pos[j], friction[j]
+        for j in range(6):
+            poses[first + 3 + j] = frame[j]
+        poses[first + 12], poses[first + 13] = geom[0], geom[1]
+        poses[first + 14], poses[first + 15] = _int32(c + at[4])[0], _int32(c + at[5])[0]
+    return int(12 * ngeom + POSE * ncon)
 
 
 @compiled
 def _still(m: int, d: int, head: int) -> bool:
     """Whether bodies and contacts are where their axes and Jacobians were taken last."""
-    counts, poses, ngeom, ncon = _int64(head), _block(head, POSES), _number(m, NGEOM), _number(d, NCON)
-    if counts[COUNT_FOUND] != ncon or counts[COUNT_DRY] != _number(d, NF) or counts[COUNT_ALL] != _number(d, NEFC):
+    counts, kept, contact = _int64(head), _block(head, KEPT), _int64(d + _at(CONTACT))[0]
+    if counts[COUNT_FOUND] != _number(d, NCON) or counts[COUNT_ALL] != _number(d, NEFC):
         return False
-    if not _same(d, _at(XPOS), 3 * ngeom, poses, 0) or not _same(d, _at(XMAT), 9 * ngeom, poses, 3 * ngeom):
+    if counts[COUNT_DRY] != _number(d, NF):
         return False
-    contact, size, at, kept = _int64(d + _at(CONTACT))[0], _at(SIZE), 12 * ngeom, _block(head, KEPT)
-    place, frame, gap, numbers = _at(POS), _at(FRAME), _at(DIST), _at(DIM)
-    address, geom, friction, used = _at(ADDRESS), _at(GEOM), _at(FRICTION), 0
-    places = _int64(counts[PLACES])
-    for i in range(ncon):
-        c, first = contact + i * size, at + 20 * i
-        pos, axes, geoms, slide = _real(c + place), _real(c + frame), _int32(c + geom), _real(c + friction)
-        if (
-            geoms[0] != poses[first + 12]
-            or geoms[1] != poses[first + 13]
-            or _int32(c + numbers)[0] != poses[first + 14]
-            or _int32(c + address)[0] != poses[first + 15]
-        ):
+    count = _poses(m, d, head, NOW)
+    now, then, places = _block(head, NOW), _block(head, POSES), _int64(counts[PLACES])
+    for i in range(count):
+        if not abs(now[i] - then[i]) < law.STILL:
             return False
-        for j in range(3):  # points of flush faces shift by µm
-            if not abs(pos[j] - poses[first + j]) < 1e3 * law.STILL:
-                return False
-        for j in range(6):
-            if not abs(axes[j] - poses[first + 3 + j]) < law.STILL:
-                return False
-        for j in range(3):
-            if slide[j] != poses[first + 9 + j]:
-                return False
-        if used < counts[COUNT] and places[4 * used + INDEX] == i:
-            kept[W * used + law.GAP] = _real(c + gap)[0]
-            used += 1
+    for i in range(counts[COUNT]):
+        kept[W * i + law.GAP] = _value(contact + places[4 * i + INDEX] * _at(SIZE), DIST)
     return True
 
 
@@ -526,7 +520,7 @@ def carry_on(m: int, d: int, head: int) -> None:
     counts, edges, ngeom, speeds = _int64(head), not _elliptic(m), _number(m, NGEOM), _array(d, QVEL)
     kept, axes, poses, places = _block(head, KEPT), _block(head, AXES), _block(head, POSES), _int64(counts[PLACES])
     for i in range(counts[COUNT]):
-        k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT], 12 * ngeom + 20 * places[4 * i + INDEX] + 3
+        k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT], 12 * ngeom + POSE * places[4 * i + INDEX] + 3
         for j in range(3):
             kept[k + j] = 0.0
         for t in range(2 if places[4 * i + LENGTH] > 1 else 0):
@@ -576,25 +570,16 @@ def _turn(m: int, d: int, head: int, elapsed: float) -> None:
 @compiled
 def _find(m: int, d: int, head: int) -> None:
     """Contacts, their places on both bodies and their rows."""
-    counts, elliptic, rigid, ngeom = _int64(head), _elliptic(m), _real(head)[RIGID] > 0, _number(m, NGEOM)
+    counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
     xpos, xmat, contact, kbip = _array(d, XPOS), _array(d, XMAT), _int64(d + _at(CONTACT))[0], _array(d, KBIP)
     ncon, count, rows, size = _number(d, NCON), 0, 0, _at(SIZE)
     kept, axes, places = _room(head, KEPT, ncon * W), _room(head, AXES, 24 * ncon), _integers(head, PLACES, 4 * ncon)
-    poses = _room(head, POSES, 12 * ngeom + 20 * ncon)
-    for i in range(3 * ngeom):
-        poses[i] = xpos[i]
-    for i in range(9 * ngeom):
-        poses[3 * ngeom + i] = xmat[i]
+    _poses(m, d, head, POSES)
     at = _at(POS), _at(FRAME), _at(FRICTION), _at(GEOM), _at(DIM), _at(ADDRESS), _at(DIST), _at(MU)
     for i in range(ncon):
-        c, first = contact + i * size, 12 * ngeom + 20 * i
+        c = contact + i * size
         pos, frame, friction = _real(c + at[0]), _real(c + at[1]), _real(c + at[2])
         geom, dim, address = _int32(c + at[3]), _int32(c + at[4])[0], _int32(c + at[5])[0]
-        for j in range(3):
-            poses[first + j], poses[first + 9 + j] = pos[j], friction[j]
-        for j in range(6):
-            poses[first + 3 + j] = frame[j]
-        poses[first + 12], poses[first + 13], poses[first + 14], poses[first + 15] = geom[0], geom[1], dim, address
         if address < 0 or geom[0] < 0 or geom[1] < 0:
             continue
         if not rigid and (dim == 1 or kbip[4 * (address + 1) + 1] <= 0):
