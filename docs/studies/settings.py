@@ -65,6 +65,7 @@ def rungs(step: float) -> Ways:
     theirs = "MuJoCo's defaults"
     return {
         f"{theirs}, scene facets, cone pyramidal": as_it_comes(step),
+        f"{theirs}, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
         theirs: newcomer(step),
         "ours, memory off, servo 0, order 1": ContactSettings.at(step, memory=False, servo=0.0, order=1),
         "ours, memory off, order 1": ContactSettings.at(step, memory=False, order=1),
