@@ -32,22 +32,12 @@ def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
     return [float(bifurcation.wall_spin(analytic.solution(q, case, formal=True).state, q)) for q in sets]
 
 
-def going_round(
-    axes: Axes,
-    p: Parameters,
-    quantity: Drawn,
-    cases: Case | tuple[Case, ...],
-    begin: float,
-    end: float,
-    text: str = "RR",
-    place: Place = (0.5, (-5, 5)),
-    line: style.Line = style.STABLE,
-) -> None:
-    """A branch on which the ball goes round with the fluid, RR, SR, NR or NS, from one flow to another; its name."""
-    flows, case = np.linspace(begin, end, 200), cases if isinstance(cases, Case) else cases[0]
+def going_round(p: Parameters, case: Case, begin: float, end: float) -> tuple[Array, Array]:
+    """slip_x and omega_c (n,) from one flow to another of RR, SR, NR or NS: the ball goes round with the fluid."""
+    flows = np.linspace(begin, end, 200)
     rolls = p.R / p.r * flows
-    slip_x = np.asarray(rolls if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)) - rolls
-    style.curve(axes, cases, flows, quantity(slip_x, flows), text, place, line)
+    spun = rolls if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)
+    return np.asarray(spun) - rolls, flows
 
 
 def ends(p: Parameters) -> tuple[float, float]:
@@ -79,7 +69,7 @@ def slipping(
     values = quantity(x.slip_x, x.omega_c)
     for part, line, text, place in ((~grows, "-", "SS", stable), (grows, UNSTABLE, "SS, unstable", unstable)):
         if part.any():
-            style.curve(axes, Case.SS, omega_0, np.where(part, values, np.nan), text, place, line)
+            style.curve(axes, Case.SS, omega_0, np.where(part, values, np.nan), (text, place), line)
 
 
 def lifted(omega_0: float, p: Parameters) -> float:

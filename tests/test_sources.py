@@ -53,8 +53,8 @@ EXCEPTIONS = {
     "mjsim/world_axes.py:driven",
     # what an exact case is made of
     "compare/bench/one_contact.py:closed",
-    # all that a measured number, a drawn line or a page is made of
-    *("compare/kit/record.py:measurement", "compare/kit/style.py:curve", "compare/branches.py:going_round"),
+    # all that a measured number is made of
+    "compare/kit/record.py:measurement",
 }
 SAME = {
     # what every subject, file format, adapter or page has

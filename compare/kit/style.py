@@ -46,6 +46,8 @@ _TURN = 4.0
 """How long each colour of a line of several cases is, in widths of the line."""
 Place = tuple[float, tuple[float, float]]
 """Where the name of a curve stands: at a share of its length, with an offset in points."""
+Name = tuple[str, Place | None]
+"""What a curve is called, and where that stands if anywhere."""
 GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
 """Lines that only help the eye."""
 POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none", "zorder": 5}
@@ -157,14 +159,14 @@ def curve(
     cases: Case | tuple[Case, ...],
     x: npt.ArrayLike,
     y: npt.ArrayLike,
-    text: str = "",
-    place: Place | None = None,
+    name: Name = ("", None),
     line: Line = STABLE,
 ) -> None:
     """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place.
 
     Of several cases that lie on it the colours take turns.
     """
+    text, place = name
     cases = cases if isinstance(cases, tuple) else (cases,)
     label = f"_{text or ', '.join(case.name for case in cases)}"
     for k, case in enumerate(cases):
@@ -178,16 +180,16 @@ def curve(
             return
         k = int(np.searchsorted(way, at * way[-1]))
         here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (points[k + 1] - points[k])
-        name(axes, here_x, here_y, text, offset, COLOURS[cases[-1]]).set_label(label)
+        beside(axes, here_x, here_y, text, offset, COLOURS[cases[-1]]).set_label(label)
 
 
 def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float]) -> None:
     """A black dot with its name beside it, `offset` in points."""
     axes.plot([x], [y], **POINT)
-    name(axes, x, y, text, offset)
+    beside(axes, x, y, text, offset)
 
 
-def name(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> Text:
+def beside(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> Text:
     """A name beside a point or a curve, `offset` in points; one that is far off has a line to it."""
     leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1} if math.hypot(*offset) > 16 else None
     ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"

@@ -90,16 +90,18 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
         for stable, text in ((True, "SS"), (False, "SS, unstable")):
             end = analytic.solution(fast, Case.SS, stable=stable).state
             height = float(quantity(end.slip_x, end.omega_c))
-            style.name(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
-        going_round(axes, p, quantity, (Case.SR, Case.NR), edge, top, "SR, NR", (0.6, rides))
-        going_round(axes, p, quantity, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge, "NS", (0.5, (-3, 9)))
+            style.beside(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
+        slip_x, flows = going_round(p, Case.NR, edge, top)
+        style.curve(axes, (Case.SR, Case.NR), flows, quantity(slip_x, flows), ("SR, NR", (0.6, rides)))
+        slip_x, flows = going_round(p, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge)
+        style.curve(axes, Case.NS, flows, quantity(slip_x, flows), ("NS", (0.5, (-3, 9))))
         cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
         mean = quantity(means.slip_x, means.omega_c)
         low, high = [c.min() for c in cycles], [c.max() for c in cycles]
         axes.fill_between(branch.values, low, high, color=style.HOPPING, alpha=0.25, lw=0)
         for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
             axes.plot(branch.values, np.where(part, mean, np.nan), color=style.HOPPING, ls=line, lw=2)
-        style.name(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, style.HOPPING)
+        style.beside(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, style.HOPPING)
         for special in branch.places:
             if special.kind is Bifurcation.BIRTH:
                 born = State(*special.orbit.mean)
@@ -190,7 +192,9 @@ def draw_walls(of: Diagram) -> tuple[Figure, str]:
         for kind, row in places:
             axes.plot(row["eta"], unit * row[quantity], **style.POINT)
             if kind not in named | {_UNNAMED}:
-                style.name(axes, row["eta"], unit * row[quantity], _SHORT.get(kind, str(kind)), text.get(kind, (8, 4)))
+                style.beside(
+                    axes, row["eta"], unit * row[quantity], _SHORT.get(kind, str(kind)), text.get(kind, (8, 4))
+                )
             named.add(kind)
         for m in of.states:
             low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty

@@ -142,7 +142,7 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     else:
         spans.append(((Case.RR, Case.NR), (t.omega_02, rolls), 0.5))
     for cases, span, at in spans:
-        style.curve(axes, cases, span, span, ", ".join(case.name for case in cases), (at, (-5, 5)))
+        style.curve(axes, cases, span, span, (", ".join(case.name for case in cases), (at, (-5, 5))))
     axes.set_xlim(0, fastest)
     style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))})
     return t

@@ -24,7 +24,7 @@ from compare.branches import check_thresholds, fold_state, going_round, lifted, 
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, only_where
 from compare.kit.record import Check
-from compare.kit.style import UNSTABLE
+from compare.kit.style import STABLE, UNSTABLE, Line, Place
 from model import Case, Parameters, State
 from model.arrays import Array
 
@@ -146,7 +146,7 @@ def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, 
             at: dict[str, Any] = {"xytext": (0.31, 0.97), "textcoords": "axes fraction", "va": "top"}
             axes.annotate(f"{text}\nbistable", here, **at, **look, fontsize=9, zorder=6)
         elif room[row, column] > 7:
-            style.name(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
+            style.beside(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
 
 
 def _places(checks: Sequence[Check]) -> Array:
@@ -195,7 +195,13 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     """One diagram, with both scales."""
     figure, p = style.figure(5.8, 4.1), of.p
     axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
-    draw = partial(going_round, axes, p, partial(spin, p))
+
+    def draw(
+        case: Case, begin: float, end: float, text: str = "RR", place: Place = (0.5, (-5, 5)), line: Line = STABLE
+    ) -> None:
+        slip_x, flows = going_round(p, case, begin, end)
+        style.curve(axes, case, flows, spin(p, slip_x, flows), (text, place), line)
+
     guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
     bottom, top = 0.0, 2 * t.omega_02
     if of.figure == "fig-9":

@@ -102,12 +102,12 @@ def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
         style.curve(gain, case, f, np.abs(ratio))
         style.curve(phase, case, f, -np.degrees(np.unwrap(np.angle(ratio))))
         k = 330 if case is Case.RR else 60
-        style.name(gain, f[k], abs(ratio[k]), case.name, (0, -8), style.COLOURS[case])
+        style.beside(gain, f[k], abs(ratio[k]), case.name, (0, -8), style.COLOURS[case])
     style.curve(onset, Case.RR, frequencies, onsets)
     limits = (pulsation.slow_onset(p), "slow", f[225], 3), (pulsation.fast_onset(p), "fast", f[75], -3)
     for limit, way, at, shift in limits:
         onset.axhline(limit, **style.GUIDE)
-        style.name(onset, at, limit, f"limit of {way} pulsations", (0, shift))
+        style.beside(onset, at, limit, f"limit of {way} pulsations", (0, shift))
     error.plot(frequencies, errors, ".-", color=style.COLOURS[Case.SS], lw=1.5, ms=5)
     error.axhline(0, **style.GUIDE)
     panels = {"gain": gain, "phase_lag": phase, "slip_amplitude": onset, "mean_error": error}
@@ -159,7 +159,7 @@ def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
         passed.append(caught_up(run) - fold)
         ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=f"rising by {rate:.2g} rad/s²")
     beyond = np.array([p.omega_0, last])
-    style.curve(ramp, Case.NR, beyond, beyond, "NR", (0.9, (-5, 5)))
+    style.curve(ramp, Case.NR, beyond, beyond, ("NR", (0.9, (-5, 5))))
     ramp.set(xlim=beyond, ylim=(0.7 * start.state.omega_c, 1.1 * last), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(ramp, {"omega_04": fold})
     law.loglog(rates, response.ramp_coefficient(of.p) * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
