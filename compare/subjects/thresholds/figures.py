@@ -24,7 +24,7 @@ from compare.branches import check_thresholds, fold_state, going_round, lifted, 
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, only_where
 from compare.kit.record import Check
-from compare.kit.style import STABLE, UNSTABLE, Line, Place
+from compare.kit.style import STABLE, UNSTABLE, Line, Name
 from model import Case, Parameters, State
 from model.arrays import Array
 
@@ -191,39 +191,46 @@ def diagram_of_set(p: Parameters, figure: str) -> Diagram:
     return Diagram(figure, p)
 
 
+def _round(
+    axes: Axes,
+    p: Parameters,
+    case: Case,
+    span: tuple[float, float],
+    name: Name = ("RR", (0.5, (-5, 5))),
+    line: Line = STABLE,
+) -> None:
+    """A branch on which the ball goes round with the fluid, from one flow to another."""
+    slip_x, flows = going_round(p, case, *span)
+    style.curve(axes, case, flows, spin(p, slip_x, flows), name, line)
+
+
 def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     """One diagram, with both scales."""
     figure, p = style.figure(5.8, 4.1), of.p
     axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
-
-    def draw(
-        case: Case, begin: float, end: float, text: str = "RR", place: Place = (0.5, (-5, 5)), line: Line = STABLE
-    ) -> None:
-        slip_x, flows = going_round(p, case, begin, end)
-        style.curve(axes, case, flows, spin(p, slip_x, flows), (text, place), line)
-
+    draw = partial(_round, axes, p)
     guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
     bottom, top = 0.0, 2 * t.omega_02
     if of.figure == "fig-9":
         guides = {"omega_02": t.omega_02}
-        draw(Case.NS, 1e-3 * t.omega_02, (1 - 1e-9) * t.omega_02, "NS", (0.35, (-4, 6)))
-        draw(Case.NR, t.omega_02, top, "NR", (0.5, (4, 6)))
+        draw(Case.NS, (1e-3 * t.omega_02, (1 - 1e-9) * t.omega_02), ("NS", (0.35, (-4, 6))))
+        draw(Case.NR, (t.omega_02, top), ("NR", (0.5, (4, 6))))
         style.mark(axes, t.omega_02, lifted(t.omega_02, p), "P2", (0, 8))
     elif of.figure == "fig-10":
         del guides["omega_03"]
         top = 1.25 * t.omega_04
-        draw(Case.RR, 0.0, t.omega_01)
+        draw(Case.RR, (0.0, t.omega_01))
         slipping(axes, p, partial(spin, p), (0.5, (0, -7)), (0.4, (6, 6)))
-        draw(Case.SR, t.omega_02, top, "SR", (0.85, (-5, -5)))
+        draw(Case.SR, (t.omega_02, top), ("SR", (0.85, (-5, -5))))
         style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
         style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-4, -6))
         style.mark(axes, t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
     elif of.figure == "fig-11":
         guides = {"omega_02": t.omega_02, "omega_03": t.omega_03}
         top = 1.6 * t.omega_03
-        draw(Case.RR, 0.0, t.omega_03)
-        draw(Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.02, (9, 3)), UNSTABLE)
-        draw(Case.SR, t.omega_03, top, "SR", (0.5, (4, 6)))
+        draw(Case.RR, (0.0, t.omega_03))
+        draw(Case.SR, (t.omega_02, t.omega_03), ("SR, unstable", (0.02, (9, 3))), UNSTABLE)
+        draw(Case.SR, (t.omega_03, top), ("SR", (0.5, (4, 6))))
         for w in (t.omega_02, t.omega_03):
             axes.plot([w], [lifted(w, p)], **style.POINT)
     else:
@@ -231,11 +238,11 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
         guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
         omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
         bottom, top = (edge + part * (omega_04 - t.omega_02) for edge, part in ((t.omega_02, -0.5), (omega_04, 0.35)))
-        draw(Case.RR, bottom, t.omega_03)
-        draw(Case.RR, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
+        draw(Case.RR, (bottom, t.omega_03))
+        draw(Case.RR, (t.omega_03, omega_01), ("RR, virtual", (0.6, (-4, 4))), UNSTABLE)
         slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
-        draw(Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.5, (-30, -14)), UNSTABLE)
-        draw(Case.SR, t.omega_03, top, "SR", (0.35, (-5, -5)))
+        draw(Case.SR, (t.omega_02, t.omega_03), ("SR, unstable", (0.5, (-30, -14))), UNSTABLE)
+        draw(Case.SR, (t.omega_03, top), ("SR", (0.35, (-5, -5))))
         style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
         style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (7, 0))
         style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
