@@ -116,6 +116,8 @@ _LARGE = 2.0
 number = Number()
 count = Number(allowed=Range(1, 1e6, whole=True))
 count_or_none = Number(allowed=Range(0, 1e6, whole=True))
+processes = Number(allowed=Range(0, 8 * (os.cpu_count() or 1), whole=True))
+"""Of this machine, some 250 MB each: a slip of the finger would bring it down."""
 seed = Number(allowed=Range(0, 2**32, whole=True))
 seconds = Number("s", Range(1e-9, 1e9))
 """A duration, or a time step."""
@@ -331,7 +333,7 @@ def add_workers(parser: Parser) -> None:
 def add_processes(parser: Any) -> None:
     """The option that says how many processes of this machine take part, for a parser or a group of one."""
     here, all_of_them = "processes of this machine; 0: this one", os.cpu_count() or 1
-    parser.add_argument("--workers", type=count_or_none, default=all_of_them, help=here)
+    parser.add_argument("--workers", type=processes, default=all_of_them, help=here)
 
 
 def add_samples(parser: Parser) -> None:

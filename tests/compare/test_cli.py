@@ -299,6 +299,12 @@ def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> No
         ("basins --across y=0:1:2 --up h=0:99:2 --results new/map", "h = 99 m is out of range"),
         ("simulate --tme=3 --omega-0 5", "there is no option '--tme' (did you mean '--time'?)"),
         ("predict extra", "'extra' is one argument too many"),
+        (
+            "sweep --vary eta=0.1,0.2 --workers 1e5",
+            "--workers: 100000 is out of range: it must be a whole number >= 0 and",
+        ),
+        ("cases block-rests -o new", "-o writes all cases: 'block-rests' has no effect beside it"),
+        ("simulate --start omega_c=5 omega_c=6", "--start names omega_c twice"),
         ("simulate --view --time 3", "--time has no effect beside --view"),
         ("simulate --view --engine event", "--view shows MuJoCo, not event"),
         ("simulate --speed 2", "--speed is for --view"),
