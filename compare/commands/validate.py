@@ -83,6 +83,8 @@ def line(verdict: Verdict) -> Text:
         parts.append(Text("; ".join([f"{count:>4} number{'s' if count > 1 else ''}", *found])))
     elif verdict.error:
         parts.append(Text(verdict.error, "red"))
+    elif verdict.outcome is Outcome.NOT_RUN and verdict.claim.level > Level.QUICK:
+        parts.append(Text(f"measured from the {verdict.claim.level.name.lower()} level on", "dim"))
     elif verdict.missing:
         parts.append(Text(str(verdict.missing[0]), "dim"))
     for each in (witness for witness in verdict.witnesses[1:] if witness.outcome is not Outcome.NOT_ASKED):
