@@ -147,6 +147,7 @@ def _here(x: float, y: float) -> Figure:
         "y": [y],
         "marker": look,
         "showlegend": False,
+        "cliponaxis": False,
     }
 
 
@@ -277,7 +278,7 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
 
     sliders = {}
     for name, (text, low, high, step) in SLIDERS.items():
-        ui.label(text)
+        ui.html(typeset(text), sanitize=False)
         with ui.row().classes("w-full no-wrap items-center"):
             sliders[name] = slider = ui.slider(min=low, max=high, step=step, value=value(name))
             slider.props(f'aria-label="{name}"').on_value_change(partial(change, name))
