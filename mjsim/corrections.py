@@ -4,29 +4,23 @@ MuJoCo takes forces at the beginning of a step and lets contact be soft. Each bl
 consequence of that. None knows a solution of the problem: each is built from what the last step gave, and vanishes
 where motion and forces are steady.
 
-`drive` goes through the runs of a batch, one after the other, in floats: plain Python, or compiled (`mjsim.compiled`).
+All is written in floats, for plain Python or compiled loops (`mjsim.stepping`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from mjsim.contact_settings import ContactSettings
-from mjsim.recorder import COORDINATES, NORMALS, NSENSOR, SENSORS
 from model import Parameters
-from model.arrays import Array
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 
 _SLIDES = 9.0
 """A contact slides if its speed squared exceeds this times that of its change in a step; ending slip changes faster."""
-NOT, LANDS, GOES_ON, BEGINS = range(4)
-"""Whether a ball takes the next step in fine ones: not; as it lands; in the shortest, as it did the last one; or in
-these as the first of all, without a blow, after which it goes on upon its joints however forces change."""
 _NEAR = 32.0
 """Steps to the axis from which on they are shorter: the azimuth turns by up to 1/32 in one."""
-_NORMAL_A, _NORMAL_B = (SENSORS + at for at in range(NSENSOR)[NORMALS])
 
 
 class Ball(NamedTuple):
@@ -169,8 +163,8 @@ def corrections(
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
     # that speed for the last step's friction f leaves only the change of f to creep: the friction rows then read
-    # a + R_t (f - f_last) = -b_f v, with the cone where it was. That is the law of `mjsim.coulomb`;
-    # surface velocities carry it into a batch, whose steps have no halves. The friction forces follow from
+    # a + R_t (f - f_last) = -b_f v, with the cone where it was. That is the law of `mjsim.coulomb`,
+    # in a field that whole steps of MuJoCo's look at. The friction forces follow from
     # contact = (A_x + B_x, A_y + B_y, -r A_z, r B_z).
     (inward, upward, about_x, about_y), (A_normal, B_normal) = contact, normals
     floor_z -= ball.memory / ball.r * about_x
@@ -179,7 +173,7 @@ def corrections(
     wall_z += ball.memory / ball.r * about_y
 
     # De Saxce's share. In the engine's convex law slip lifts a contact: its normal row gets mu |w|, with the w = b_f v
-    # of its friction rows. It is that law's, too; `drive` takes it away.
+    # of its friction rows. It is that law's, too; `mjsim.stepping` takes it away.
     lift_A, lift_B = 0.0, 0.0
     if ball.memory > 0:
         lift_A = ball.mass * ball.hover_A * math.hypot(v_Ax + ahead * A_x, v_Az + ahead * A_z)
@@ -232,61 +226,3 @@ def followed(margin: float, gap: float, gain: float) -> float:
     """
     left = margin - gain * gap
     return left if left > 0 else 0.0
-
-
-def ball_of(balls: Array, run: int) -> Ball:
-    """The ball of a run, a column of the table."""
-    return Ball(*balls[:, run].tolist())
-
-
-def velocity_of(rows: Array, run: int) -> Velocity:
-    """The velocities of a run, a column of six."""
-    return Velocity(
-        float(rows[0, run]), float(rows[1, run]), float(rows[2, run]),
-        float(rows[3, run]), float(rows[4, run]), float(rows[5, run]),
-    )  # fmt: skip
-
-
-def drive(
-    omega_0: Array, row: Array, balls: Array, due: Any, held: Any, contact: Array, normals: Array, forces: Array,
-    qvel: Array, last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
-    adhesion: Array,
-) -> bool:  # fmt: skip
-    """Let the margins follow the gaps and set what drives the next step; say of runs that land in it that they are
-    `due`, and return whether any takes it in fine ones. A row (runs, columns) begins with place and velocities; to the
-    sensors that follow is to be added what they leave out of the normal forces.
-
-    Forces of contacts (6 and 2, runs) are those of the engine's last step, but for runs where others are `held`.
-    """
-    some = False
-    for k in range(qpos.shape[1]):
-        ball, v, before = ball_of(balls, k), velocity_of(qvel, k), velocity_of(last, k)
-        if not held[k]:
-            for i in range(6):
-                forces[i, k] = contact[i, k]
-            forces[6, k], forces[7, k] = normals[0, k] + adhesion[0, k], normals[1, k] + adhesion[1, k]
-        given = float(forces[1, k]), float(forces[2, k]), float(forces[3, k]), float(forces[4, k])
-        loads = float(forces[6, k]), float(forces[7, k])
-        theta, h, y = float(qpos[0, k]), float(qpos[1, k]), float(qpos[2, k])
-        if due[k] == NOT and loads[0] * loads[1] == 0 and eventful(h, y, v, before, loads, ball):
-            due[k] = LANDS
-        some |= due[k] != NOT
-        if ball.gain > 0:
-            margins[0, k] = followed(float(margins[0, k]), y, ball.gain)
-            margins[1, k] = followed(float(margins[1, k]), h, ball.gain)
-        turn[0, k], turn[3, k] = math.cos(theta / 2), math.sin(theta / 2)
-        qpos[3, k], qpos[4:7, k] = 1.0, 0.0
-        row[k, :COORDINATES], row[k, COORDINATES:SENSORS] = qpos[:COORDINATES, k], qvel[:, k]
-        driving, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]), (lift_A, lift_B) = corrections(
-            v, before, ball.R - h, float(omega_0[k]), given, loads, ball
-        )
-        applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = driving
-        # Adhesion of a contact adds R times itself to the reference acceleration of its normal row, and pulls the body
-        # by as much. With the pull taken back, minus what slip would take from the contact leaves De Saxce's share.
-        lift_A, lift_B = lift_A * (y < margins[0, k]), lift_B * (h < margins[1, k])
-        adhesion[0, k], adhesion[1, k] = -lift_A, -lift_B
-        row[k, SENSORS:] = 0.0
-        row[k, _NORMAL_A], row[k, _NORMAL_B] = -lift_A, -lift_B
-        applied[1, k] -= lift_B
-        applied[2, k] -= lift_A
-    return some

@@ -7,7 +7,7 @@ import functools
 import math
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from mjsim import limits, recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
-from mjsim.stepping import HUGE, Polar
+from mjsim.stepping import HUGE, Engine, JointedBall
 from model import Events, Flow, Header, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.errors import check_type
@@ -25,14 +25,14 @@ from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_number
 
 if TYPE_CHECKING:
-    from mjsim.free import Free
+    from mjsim.free import FreeBall
     from mjsim.journal import Journal
 
 BLOCK, BLOCK_STEPS = 256, 20_000
 """A run hands out its samples once it has so many, or has taken so many steps."""
 EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
-NOTED = 4096
+NOTED = 16_384
 """Steps of all runs that are noted before their cases are told."""
 RUNS_A_THREAD = 16
 """Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's Python."""
@@ -45,7 +45,7 @@ Blocks = list[npt.NDArray[np.void]]
 class Run:
     """Simulations under way: iterating advances them and yields blocks of samples.
 
-    Several share a batch of MuJoCo's; results don't depend on how many do, to the bit.
+    Balls of equal parameters share an engine, one after the other; results don't depend on that, to the bit.
 
     Parameters
     ----------
@@ -90,14 +90,7 @@ class Run:
         scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
         built = {p: scene.build(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
-        given = models, scenes, settings, states, theta_0
-        self._stepper: Free | Polar
-        if settings.scene != "joints":
-            from mjsim.free import Free  # here, because the law of its contacts takes long to load
-
-            self._stepper = Free(*given)
-        else:
-            self._stepper = Polar(*given)
+        self._balls = balls(zip(models, scenes, states, strict=True), settings, theta_0)
         shown = dataclasses.asdict(settings) | {
             "t_end": float(t_end), "sample_interval": self._interval * settings.timestep, "x0": None,
             "theta_0": theta_0, "event_times": EVENT_TIMES,
@@ -125,13 +118,14 @@ class Run:
     @property
     def margins(self) -> Array:
         """Present margins of the contacts A and B, shape (runs, 2), m."""
-        return self._stepper.margins.T
+        return np.array([ball.margins for ball in self._balls])
 
     def __iter__(self) -> Iterator[Blocks]:
         blocks, state = self._journal.recall() if self._journal else (iter(()), {})
         done, step, kept = 0, int(state.get("steps", 0)), [state["waiting"]] if state else []
         if state:
-            self._stepper.restore(state)
+            for k, ball in enumerate(self._balls):
+                ball.restore({name: state[f"{name}_{k}"] for name in ball.state()})
             self._classifier.restore(state)
         for raw in blocks:
             yield self._finish(done, raw)
@@ -140,7 +134,8 @@ class Run:
         while step < self._steps and not all(header.failure for header in self.headers):
             rows = self._rows[: self._steps - step]
             time = (step + np.arange(len(rows)) + 0.5) * self._settings.timestep
-            self._stepper.advance(np.stack([flow(time) for flow in self._flows], axis=-1), rows)
+            for k, (ball, flow) in enumerate(zip(self._balls, self._flows, strict=True)):
+                ball.advance(flow(time), rows[:, k])
             kept.append(rows[-step % self._interval :: self._interval].copy())
             step += len(rows)
             self._classifier.add(recorder.contacts(rows), step == self._steps)
@@ -152,7 +147,8 @@ class Run:
             kept = [waiting]  # their cases are not yet decided
             if self._journal:
                 state = {"steps": np.array(step), "waiting": waiting}
-                state |= self._stepper.state() | self._classifier.state()
+                states = enumerate(ball.state() for ball in self._balls)
+                state |= {f"{name}_{k}": own[name] for k, own in states for name in own} | self._classifier.state()
                 self._journal.note(raw, state)
             yield self._finish(done, raw)
             done += len(raw)
@@ -174,7 +170,7 @@ class Run:
         blocks: Blocks = []
         for i, (p, header) in enumerate(zip(self._parameters, self.headers, strict=True)):
             count = 0 if header.failure else int(sound[:, i].sum())
-            part = recorder.samples(time[:count], raw[:count, i], self._stepper.lead, p)
+            part = recorder.samples(time[:count], raw[:count, i], self._balls[0].lead, p)
             if not header.failure and count < len(time):
                 self._ends[i] = end = float(time[count])
                 names = zip(VARIABLES, UNITS, strict=True)
@@ -184,6 +180,21 @@ class Run:
             part["case"] = self._classifier.cases(i, samples[:count] * self._interval)
             blocks.append(part)
         return blocks
+
+
+def balls(
+    given: Iterable[tuple[Any, Parameters, State]], settings: ContactSettings, theta_0: float
+) -> Sequence[JointedBall | FreeBall]:
+    """Of runs with their models, parameters and starts."""
+    if settings.scene != "joints":
+        from mjsim.free import FreeBall  # here, because the law of its contacts takes long to load
+
+        return [FreeBall(*each, settings, theta_0) for each in given]
+    engines: dict[Parameters, Engine] = {}
+    return [
+        JointedBall(engines.get(p) or engines.setdefault(p, Engine(model, p, settings)), x, theta_0)
+        for model, p, x in given
+    ]
 
 
 def simulate(
@@ -238,8 +249,8 @@ def simulate_many(
 ) -> list[Trajectory]:
     """Simulate many runs at once, in this process; arguments as in `simulate`.
 
-    `flow` is one for all, one for each, or None for each one's own omega_0. Each thread steps a MuJoCo batch of its
-    share of the runs; None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the same to the
+    `flow` is one for all, one for each, or None for each one's own omega_0. Each thread steps its share of the runs;
+    None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the same to the
     bit whatever the number. A run that breaks down has a header that says so; the others go on.
 
     Raises

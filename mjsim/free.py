@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -110,42 +109,8 @@ def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:
     law.step(data)
 
 
-class Free:
-    """Simulations of free balls, one after the other; arguments and methods as of `mjsim.stepping.Polar`."""
-
-    def __init__(
-        self,
-        models: Sequence[Any],
-        parameters: Sequence[Parameters],
-        settings: ContactSettings,
-        x0s: Sequence[npt.ArrayLike],
-        theta_0: float,
-    ) -> None:
-        self._balls = [FreeBall(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
-        self.margins, self.lead = np.zeros((2, len(models))), self._balls[0].ahead
-
-    def advance(self, omega_0: Array, rows: Array) -> None:
-        for k, ball in enumerate(self._balls):
-            ball.advance(omega_0[:, k], rows[:, k])
-
-    def state(self) -> dict[str, Array]:
-        kept = np.empty((len(self._balls), mujoco.mj_stateSize(self._balls[0].model, _INTEGRATION)))
-        for ball, own in zip(self._balls, kept, strict=True):
-            mujoco.mj_getState(ball.model, ball.data, own, _INTEGRATION)
-        laws = {k: ball.law.state() for k, ball in enumerate(self._balls) if ball.law}
-        known = {f"{name}_{k}": values for k, law in laws.items() for name, values in law.items()}
-        return known | {"integration": kept, "theta": np.array([ball.theta for ball in self._balls])}
-
-    def restore(self, state: dict[str, Array]) -> None:
-        for k, ball in enumerate(self._balls):
-            mujoco.mj_setState(ball.model, ball.data, state["integration"][k], _INTEGRATION)
-            ball.theta = float(state["theta"][k])
-            if ball.law:
-                ball.law.restore({name: state[f"{name}_{k}"] for name in ball.law.state()})
-
-
 class FreeBall:
-    """One of them, with an engine of its own."""
+    """One of them, with an engine of its own; arguments and methods as of `mjsim.stepping.JointedBall`."""
 
     def __init__(
         self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float,
@@ -158,7 +123,7 @@ class FreeBall:
         self.data = mujoco.MjData(model)
         self.p, self.theta, self._timestep = p, theta_0, settings.timestep
         self.law = Coulomb(self.model, rigid=True, share=share) if settings.rigid else None
-        self.ahead = settings.timestep / 2 if self.law else 0.0
+        self.lead = settings.timestep / 2 if self.law else 0.0
         data, wall = self.data, self.model.body("wall") if self.law else None
         self.body = Body(
             qpos=data.qpos,
@@ -182,9 +147,9 @@ class FreeBall:
             self.law.reset()
         now, x, self.theta = to_world(x, theta, self.p), State.of(x), theta
         place = now.position
-        if self.ahead:
-            there = x._replace(y=x.y + self.ahead * x.v_y, h=x.h + self.ahead * x.v_h)
-            place = to_world(there, theta + self.ahead * float(x.omega_c), self.p).position
+        if self.lead:
+            there = x._replace(y=x.y + self.lead * x.v_y, h=x.h + self.lead * x.v_h)
+            place = to_world(there, theta + self.lead * float(x.omega_c), self.p).position
         self.data.qpos[:7] = [*place, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:6] = [*now.velocity, *now.spin]
 
@@ -204,3 +169,21 @@ class FreeBall:
         row[0] = self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
         mujoco.mj_step(self.model, data)
         row[_SEEN:] = *data.sensordata, row[2], row[1]
+
+    @property
+    def margins(self) -> Array:
+        """Of both contacts, m: there are none."""
+        return np.zeros(2)
+
+    def state(self) -> dict[str, Array]:
+        """Copies of all that is carried from one step to the next."""
+        kept = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
+        mujoco.mj_getState(self.model, self.data, kept, _INTEGRATION)
+        return {"integration": kept, "azimuth": np.array(self.theta)} | (self.law.state() if self.law else {})
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Go on from such a state."""
+        mujoco.mj_setState(self.model, self.data, state["integration"], _INTEGRATION)
+        self.theta = float(state["azimuth"])
+        if self.law:
+            self.law.restore(state)

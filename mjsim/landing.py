@@ -60,7 +60,7 @@ class Fine:
         self._p, self._whole, self._fall = p, settings.timestep, settings.slowest_fall(p.g)
         rigid = ContactSettings.rigid_at(settings.timestep / _FIRST)
         self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0, _SHARE)
-        self._ball.ahead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
+        self._ball.lead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
         self._through = compiled.through
 
     def step(self, x: State, theta: float, rates: Array, omega_0: float, finely: bool = False) -> Landed:

@@ -1,4 +1,4 @@
-"""The loop round MuJoCo's step, the same for one run and for a batch.
+"""Balls on joints along the paper's coordinates, and the loop round MuJoCo's step.
 
 Before each step the wall is turned to be tangent at the ball's azimuth, the margins follow the gaps, and
 `mjsim.corrections` says what drives the step. The body axes of a homogeneous ball are arbitrary: they are set upright,
@@ -8,187 +8,261 @@ velocities (leapfrog).
 A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as `mjsim.landing` says; so
 it does the first one, which finds the margins and forces that belong to the start.
 
-Arrays have the runs in the last axis and contacts in the order A, B.
+The same text runs in plain Python, or compiled (`mjsim.compiled`). Contacts are in the order A, B.
 """
 
 from __future__ import annotations
 
+import copy
 import functools
-import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
-from mujoco.batch import MODEL_FIELDS, Batch
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import BEGINS, GOES_ON, LANDS, NOT, Ball, Velocity, ball_of, near_axis
+from mjsim.corrections import Ball, Velocity, corrections, eventful, followed, near_axis
+from mjsim.recorder import COORDINATES, NORMALS, NSENSOR, SENSORS
 from model import Parameters, State
 from model.arrays import Array
 
 if TYPE_CHECKING:
-    from mjsim.landing import Fine, Landed
+    from mjsim.landing import Fine
 
 HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 _CHANGE = 0.5
 """Most that contact forces may change in a step before the ball goes on upon its joints, in units of what the
 largest force, at least that of gravity and the wall's friction, does as the ball goes round."""
+NOT, LANDS, GOES_ON, BEGINS = range(4)
+"""Whether a ball takes the next step in fine ones: not; as it lands; in the shortest, as it did the last one; or in
+these as the first of all, without a blow, after which it goes on upon its joints however forces change."""
+_DUE, _HELD = 0, 1
+_NORMAL_A, _NORMAL_B = (SENSORS + at for at in range(NSENSOR)[NORMALS])
 
 
-class Polar:
-    """One or many balls on joints along the paper's coordinates.
+class Joints(NamedTuple):
+    """A ball on its joints: what the engine has in its memory, and from `last` on what is ours."""
+
+    qpos: Any
+    qvel: Any
+    start: Any
+    """Accelerations from which the solver starts."""
+    margins: Any
+    """Of the contacts, m."""
+    contact: Any
+    """Generalised forces of the contacts: the second to the fifth are inward, upward, moments about x and y."""
+    sensors: Any
+    applied: Any
+    adhesion: Any
+    """By how much the engine tells that contacts bear less than they do, N."""
+    turn: Any
+    """Quaternion of floor and wall;"""
+    floor: Any
+    wall: Any
+    """and their surface velocities, m s-1."""
+    last: Any
+    """Velocities a step ago."""
+    forces: Any
+    """Generalised forces of the contacts in the last step (6), N and N m, and normal ones (2), N."""
+    marks: Any
+    """Whether the next step is due to be taken in fine ones, and whether the last one was, with its forces held."""
+    ball: Ball
+    served: Any
+    """What takes a step, see `engine_step`."""
+
+
+def seen_forces(body: Joints) -> None:
+    """Take the contact forces of the last step from the engine, unless it wasn't the engine's."""
+    if body.marks[_HELD] == 0:
+        for i in range(6):
+            body.forces[i] = body.contact[i]
+        body.forces[6] = body.sensors[1] + body.adhesion[0]
+        body.forces[7] = body.sensors[15] + body.adhesion[1]
+
+
+def drive(omega_0: float, row: Any, body: Joints) -> None:
+    """Let the margins follow the gaps and set what drives the next step; say if the ball is due to land in it.
+
+    The row begins with place and velocities; to the sensors that follow is to be added what they leave out of the
+    normal forces.
+    """
+    qpos, forces, margins, applied, ball = body.qpos, body.forces, body.margins, body.applied, body.ball
+    seen_forces(body)
+    v, before = velocity_of(body.qvel), velocity_of(body.last)
+    theta, h, y = float(qpos[0]), float(qpos[1]), float(qpos[2])
+    given = float(forces[1]), float(forces[2]), float(forces[3]), float(forces[4])
+    loads = float(forces[6]), float(forces[7])
+    if body.marks[_DUE] == NOT and loads[0] * loads[1] == 0 and eventful(h, y, v, before, loads, ball):
+        body.marks[_DUE] = LANDS
+    if ball.gain > 0:
+        margins[0], margins[1] = followed(float(margins[0]), y, ball.gain), followed(float(margins[1]), h, ball.gain)
+    body.turn[0], body.turn[3] = math.cos(theta / 2), math.sin(theta / 2)
+    qpos[3], qpos[4], qpos[5], qpos[6] = 1.0, 0.0, 0.0, 0.0
+    driving, surfaces, (lift_A, lift_B) = corrections(v, before, ball.R - h, omega_0, given, loads, ball)
+    for i in range(COORDINATES):
+        row[i] = qpos[i]
+    for i in range(6):
+        row[COORDINATES + i], applied[i] = body.qvel[i], driving[i]
+    body.floor[0], body.floor[1], body.wall[0], body.wall[1] = surfaces
+    # Adhesion of a contact adds R times itself to the reference acceleration of its normal row, and pulls the body
+    # by as much. With the pull taken back, minus what slip would take from the contact leaves De Saxce's share.
+    lift_A, lift_B = lift_A * (y < margins[0]), lift_B * (h < margins[1])
+    body.adhesion[0], body.adhesion[1] = -lift_A, -lift_B
+    for i in range(SENSORS, SENSORS + NSENSOR):
+        row[i] = 0.0
+    row[_NORMAL_A], row[_NORMAL_B] = -lift_A, -lift_B
+    applied[1] -= lift_B
+    applied[2] -= lift_A
+
+
+def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
+    """A step for each omega_0, of which some are done, noted in rows (steps, `COLUMNS`), up to one that the ball takes
+    in fine ones: its number; one that has diverged takes none."""
+    while done < len(fluid):
+        row = rows[done]
+        drive(float(fluid[done]), row, body)
+        if body.marks[_DUE] != NOT and sound(body):
+            return done
+        for i in range(6):
+            body.last[i] = body.qvel[i]
+        body.marks[_DUE] = body.marks[_HELD] = 0
+        engine_step(body.served)
+        for i in range(NSENSOR):
+            row[SENSORS + i] += body.sensors[i]
+        done += 1
+    return done
+
+
+def sound(body: Joints) -> bool:
+    """Whether place and velocities are numbers of a motion."""
+    found = True
+    for i in range(6):
+        found = found and abs(body.qpos[i]) < HUGE and abs(body.qvel[i]) < HUGE
+    return found
+
+
+def velocity_of(v: Any) -> Velocity:
+    """Six numbers as velocities."""
+    return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
+
+
+def engine_step(served: Any) -> None:
+    """A step of MuJoCo's; compiled, model and data are known by their addresses."""
+    mujoco.mj_step(*served)
+
+
+class Engine:
+    """What balls of equal parameters share, one after the other: MuJoCo, and what takes fine steps."""
+
+    def __init__(self, model: Any, p: Parameters, settings: ContactSettings) -> None:
+        from mjsim import compiled  # here, because numba takes long to load, and it has this module compiled
+
+        self.model = model = copy.copy(model)  # its wall moves
+        self.data = data = mujoco.MjData(model)
+        self.up_to_landing, self.p, self.settings = compiled.up_to_landing, p, settings
+        floor, wall = (model.geom_surfacevel[model.geom(name).id, :2] for name in ("floor", "wall"))
+        self.body = Joints(
+            *(data.qpos, data.qvel, data.qacc_warmstart, model.pair_margin[:2], data.qfrc_constraint),
+            *(data.sensordata, data.qfrc_applied, model.pair_adhesion[:2], data.mocap_quat[0], floor, wall),
+            *(np.zeros(6), np.zeros(8), np.zeros(2, np.int8)),
+            Ball(*map(float, Ball.of(p, settings))),
+            compiled.served_plain(model, data),
+        )
+
+    @functools.cached_property
+    def fine(self) -> Fine:
+        from mjsim.landing import Fine  # here, because the law takes long to load
+
+        return Fine(self.p, self.settings)
+
+
+class JointedBall:
+    """One of them.
 
     Parameters
     ----------
-    models, parameters, x0s : one of each for every run; full states (8,); omega_0 is that of the steps
-    settings : shared by all runs
+    engine : its own, or shared with others of the same parameters
+    x : full state (8,) at the start; omega_0 is that of the steps
     theta_0 : azimuth at the start, rad
     """
 
-    def __init__(
-        self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        x0s: Sequence[npt.ArrayLike], theta_0: float,
-    ) -> None:  # fmt: skip
-        from mjsim import compiled  # here, because numba takes long to load
+    def __init__(self, engine: Engine, x: npt.ArrayLike, theta_0: float) -> None:
+        self.engine, self._p, self._settings, self._body = engine, engine.p, engine.settings, engine.body
+        self._h, self.lead = self._settings.timestep, self._settings.timestep * self._settings.midpoint
+        """The step, and how far places are ahead of velocities, s."""
+        x, body = State.of(x), self._body
+        place, v = recorder.joint_state(x, theta_0, self._p)
+        fall = self._settings.slowest_fall(self._p.g)
+        calm = all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h)))
+        body.forces[:] = body.margins[:] = 0.0
+        body.marks[_DUE] = (BEGINS if calm else LANDS) if self._settings.servo else NOT
+        self._set(place, v, np.zeros(6))
+        self._keep()
 
-        self._parameters, self._settings, runs = parameters, settings, len(models)
-        self.model = models[0]
-        self.data, array, self._step = _batch(models) if runs > 1 else _single(models[0])
-        self._drive, self._h, self.lead = compiled.drive, settings.timestep, settings.timestep * settings.midpoint
-        """What is done before a step; the step, and how far places are ahead of velocities, s."""
-        self._qpos, self._qvel, sensors = array("qpos"), array("qvel"), array("sensordata")
-        self.margins, self._sensors = array("pair_margin")[:2], sensors.T
-        """Margins of the contacts, shape (2, runs), m."""
-        surfaces, self._start = array("geom_surfacevel"), array("qacc_warmstart")
-        floor, wall = (surfaces[6 * models[0].geom(name).id :][:2] for name in ("floor", "wall"))
-        self._last, self._forces = np.zeros((6, runs)), np.zeros((8, runs))
-        """Velocities a step ago; generalised forces of the contacts in the last step (6), N and N m, and normal ones,
-        which are the engine's, but for"""
-        self._held, self._due = np.ones(runs, dtype=bool), np.full(runs, NOT, dtype=np.int8)
-        """runs whose last step wasn't the engine's; and whether they take the next one in fine ones."""
-        self._adhesion = array("pair_adhesion")[:2]
-        """By how much the engine tells that contacts bear less than they do, N."""
-        given = {"forces": self._forces, "qvel": self._qvel, "last": self._last, "qpos": self._qpos}
-        given["margins"] = self.margins
-        self._state: dict[str, Any] = given | {"start": self._start, "due": self._due}
-        """All that is carried from one step to the next."""
-        self._arguments = (
-            np.array([Ball.of(p, settings) for p in parameters]).T, self._due, self._held, array("qfrc_constraint"),
-            sensors[recorder.NORMALS], *given.values(), array("mocap_quat"), array("qfrc_applied"), floor, wall,
-            self._adhesion,
-        )  # fmt: skip
-        self._fine = functools.cache(functools.partial(_fine, settings=settings))
-        for run, (x0, p) in enumerate(zip(x0s, parameters, strict=True)):
-            x = State.of(x0)
-            place, v = recorder.joint_state(x, theta_0, p)
-            fall = settings.slowest_fall(p.g)
-            calm = all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h)))
-            if settings.servo:
-                self._due[run] = BEGINS if calm else LANDS
-            self._set(run, place, v, np.zeros(6))
+    def _set(self, place: Array, v: Array, rates: Array) -> None:
+        """Go on from a place and velocities at one time, with such accelerations and the forces it has."""
+        body = self._body
+        body.qvel[:], body.last[:], body.start[:] = v, v - self._h * rates, rates
+        body.qpos[:3] = place + self.lead * (v + rates * self.lead / 2)[:3]
+        body.marks[_HELD] = 1
 
-    def _set(self, run: int, place: Array, v: Array, rates: Array) -> None:
-        """Let a run go on from a place and velocities at one time, with such accelerations and the forces it has."""
-        self._qvel[:, run], self._last[:, run], self._start[:, run] = v, v - self._h * rates, rates
-        self._qpos[:3, run] = place + self.lead * (v + rates * self.lead / 2)[:3]
-        self._held[run] = True
+    def advance(self, fluid: Array, rows: Array) -> None:
+        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
+        for name, values in self._kept.items():
+            getattr(self._body, name)[:] = values
+        done = 0
+        while (done := self.engine.up_to_landing(self._body, fluid, rows, done)) < len(fluid):
+            self._land(float(fluid[done]), rows[done])
+            done += 1
+        self._keep()
 
-    def advance(self, omega_0: Array, rows: Array | None = None) -> None:
-        """Take steps with omega_0 (steps, runs), and note each in rows (steps, runs, `COLUMNS`)."""
-        scratch = np.empty((len(self._due), recorder.COLUMNS))
-        for fluid, row in zip(omega_0, itertools.repeat(scratch) if rows is None else rows, strict=False):
-            some = self._drive(fluid, row, *self._arguments)
-            lands = list(self._landing()) if some else []
-            self._last[:] = self._qvel
-            self._step()
-            self._held[:], self._due[:] = False, NOT
-            row[:, recorder.SENSORS :] += self._sensors
-            for run, how, x, theta, rates, gaps in lands:
-                fine = self._fine(self._parameters[run])
-                landed = fine.step(x, theta, rates, float(fluid[run]), how != LANDS)
-                self._land(run, landed, how == BEGINS)
-                row[run, recorder.SENSORS :], row[run, -2:] = landed.seen, gaps
-
-    def _landing(self) -> Iterator[tuple[Any, ...]]:
-        """Runs that land in the coming step, but for those that have diverged.
-
-        Of each its number, and how; state and azimuth at the time of its velocities, what a second changes of these;
-        and gaps.
-        """
-        sound = (np.abs(self._qpos) < HUGE).all(axis=0) & (np.abs(self._qvel) < HUGE).all(axis=0)
-        for run in np.flatnonzero((self._due != NOT) & sound).tolist():
-            ahead, v = self._qpos[:3, run], self._qvel[:, run]
-            rates = (v - self._last[:, run]) / self._h
-            place = ahead - self.lead * (v + rates * self.lead / 2)[:3]
-            x, gaps = recorder.state(place, v, self._parameters[run]), ahead[:0:-1].copy()
-            yield run, int(self._due[run]), x, float(place[0]), rates, gaps
-
-    def _land(self, run: int, landed: Landed, calm: bool) -> None:
-        """Go on after a step in fine ones: upon the joints, if forces change slowly or are `calm`, and the axis is far.
+    def _land(self, omega_0: float, row: Array) -> None:
+        """Take a step in fine ones, and go on upon the joints, if forces change slowly and the axis is far.
 
         The contacts get margins with which they bear their forces.
         """
-        p, v = self._parameters[run], landed.velocity
-        near = (
-            near_axis(p.R - landed.place[1], Velocity(*v), ball_of(self._arguments[0], run)) and landed.forces[7] == 0
-        )
+        p, body, how = self._p, self._body, int(self._body.marks[_DUE])
+        ahead, v = body.qpos[:3].copy(), body.qvel.copy()
+        rates = (v - body.last) / self._h
+        place = ahead - self.lead * (v + rates * self.lead / 2)[:3]
+        x = recorder.state(place, v, p)
+        landed = self.engine.fine.step(x, float(place[0]), rates, omega_0, how != LANDS)
+        row[SENSORS:], row[-2:] = landed.seen, ahead[:0:-1]
+        v = landed.velocity
+        near = near_axis(p.R - landed.place[1], Velocity(*v), body.ball) and landed.forces[7] == 0
         pace = max(abs(v[0]), math.sqrt(p.g / p.R))
         most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(landed.forces[[1, 2]]).max())
-        fast = landed.change > _CHANGE * self._h * pace * most and not calm
-        self._due[run] = GOES_ON if near or fast else NOT
-        self._forces[:, run] = landed.forces
-        self._set(run, landed.place, v, landed.rates * (not near))
+        fast = landed.change > _CHANGE * self._h * pace * most and how != BEGINS
+        body.marks[_DUE] = GOES_ON if near or fast else NOT
+        body.forces[:] = landed.forces
+        self._set(landed.place, v, landed.rates * (not near))
         if self._settings.servo:
             loads = landed.forces[6:] / p.m
-            self.margins[:, run] = np.maximum(landed.place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
+            body.margins[:] = np.maximum(landed.place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
+
+    def _keep(self) -> None:
+        """Keep all that is carried from one step to the next, in an engine that others use."""
+        seen_forces(self._body)
+        self._body.marks[_HELD] = 1
+        self._kept = {name: getattr(self._body, name).copy() for name in _KEPT}
+
+    @property
+    def margins(self) -> Array:
+        """Of both contacts, m."""
+        kept: Array = self._kept["margins"]
+        return kept
 
     def state(self) -> dict[str, Array]:
-        """Copies of all that is carried from one step to the next."""
-        contact, normals = self._arguments[3:5]
-        np.copyto(self._forces, np.concatenate([contact, normals + self._adhesion]), where=~self._held)
-        return {name: values.copy() for name, values in self._state.items()}
+        """All that is carried from one step to the next."""
+        return self._kept
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from such a state."""
-        for name, values in self._state.items():
-            values[...] = state[name]
-        self._held[:] = True
+        self._kept = state
 
 
-def _fine(p: Parameters, settings: ContactSettings) -> Fine:
-    """What takes fine steps with such a ball."""
-    from mjsim.landing import Fine  # here, because the law takes long to load
-
-    return Fine(p, settings)
-
-
-def _single(model: Any) -> tuple[Any, Callable[[str], Array], Callable[[], Any]]:
-    """MuJoCo for one run: its data, fields of them or of the model as views (n, 1), and its step."""
-    data = mujoco.MjData(model)
-
-    def array(name: str) -> Array:
-        return np.asarray(getattr(data if hasattr(data, name) else model, name)).reshape(-1, 1)
-
-    return data, array, functools.partial(mujoco.mj_step, model, data)
-
-
-def _batch(models: Sequence[Any]) -> tuple[Any, Callable[[str], Array], Callable[[], Any]]:
-    """For many, each with its own value of every model field in which the models differ; views (n, runs)."""
-    made = Batch(models[0], nsim=len(models), nthread=1)
-    for name in MODEL_FIELDS:
-        owner, _, field = name.rpartition(".")
-        values = [np.asarray(getattr(getattr(model, owner) if owner else model, field)) for model in models]
-        if len({value.tobytes() for value in values}) > 1:
-            made.expand(name)[:] = np.stack(values)
-
-    def array(name: str) -> Array:
-        values: Array = made.expand(name) if name in MODEL_FIELDS else made.bind(name)
-        values = values[:, 0] if name == "mocap_quat" else values  # there is one mocap body
-        return values.reshape(len(models), -1).T
-
-    return None, array, made.step
+_KEPT = ("forces", "qvel", "last", "qpos", "margins", "start", "marks")

@@ -48,7 +48,7 @@ EXCEPTIONS = {
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "_explicit")),
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "_implicit")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
-    *("mjsim/corrections.py:corrections", "mjsim/corrections.py:drive", "mjsim/landing.py:through"),
+    *("mjsim/corrections.py:corrections", "mjsim/landing.py:through"),
     *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_hand_on", "_holds", "_put_back")),
     "mjsim/world_axes.py:driven",
     # what an exact case is made of

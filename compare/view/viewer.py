@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mjsim import ContactSettings, limits, scene
-from mjsim.stepping import Polar
-from model import Flow, InputError, Parameters
+from mjsim import ContactSettings, limits, recorder, scene
+from mjsim.stepping import Engine, JointedBall
+from model import Flow, InputError, Parameters, State
 from model.parameters import POSITIVE, check_number
 
 FRAME = 1 / 60
@@ -33,16 +33,16 @@ def view(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings
         )
     from mujoco import viewer  # here, because it needs a window system
 
-    stepper = start(p, x0, flow, settings)
+    ball = start(p, x0, flow, settings)
     try:
-        handle = viewer.launch_passive(stepper.model, stepper.data, show_left_ui=False, show_right_ui=False)
+        handle = viewer.launch_passive(ball.engine.model, ball.engine.data, show_left_ui=False, show_right_ui=False)
     except RuntimeError as error:  # macOS needs to be asked in another way
         raise InputError(f"the viewer does not open: {' '.join(str(error).split())}") from error
     with handle:
-        run(handle, stepper, flow, settings.timestep, speed)
+        run(handle, ball, flow, settings.timestep, speed)
 
 
-def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> Polar:
+def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> JointedBall:
     """The simulation, with what only serves contact out of sight."""
     if settings.scene != "joints":
         raise InputError("the viewer shows scene = 'joints' only")
@@ -50,10 +50,10 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     limits.check_start(x0, p, settings)
     model, _ = scene.build(p, settings, shown=True)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
-    return Polar([model], [p], settings, [x0], 0.0)
+    return JointedBall(Engine(model, p, settings), State.one(x0), 0.0)
 
 
-def run(handle: Any, stepper: Polar, flow: Flow, timestep: float, speed: float) -> int:
+def run(handle: Any, ball: JointedBall, flow: Flow, timestep: float, speed: float) -> int:
     """Step and draw until the window is closed; return the number of steps.
 
     The simulation follows the clock; where it can't, it runs as fast as it can.
@@ -66,7 +66,7 @@ def run(handle: Any, stepper: Polar, flow: Flow, timestep: float, speed: float) 
             begin += (due - most) * timestep / speed
             due = most
         with handle.lock():
-            stepper.advance(flow((steps + 0.5 + np.arange(due)) * timestep)[:, None])
+            ball.advance(flow((steps + 0.5 + np.arange(due)) * timestep), np.empty((due, recorder.COLUMNS)))
         steps += due
         handle.sync()
         time.sleep(max(0.0, FRAME - (time.monotonic() - frame)))

@@ -162,7 +162,7 @@ def _linked(name: str, arguments: int, returns: Any) -> Any:
     return types.ExternalFunction(f"coulomb_{name}", returns(*[types.intp] * arguments))
 
 
-mj_step1, mj_step2 = _function("mj_step1"), _function("mj_step2")
+mj_step, mj_step1, mj_step2 = _function("mj_step"), _function("mj_step1"), _function("mj_step2")
 mj_fwdActuation, mj_fwdAcceleration = _function("mj_fwdActuation"), _function("mj_fwdAcceleration")
 mj_fwdConstraint, mj_fwdVelocity = _function("mj_fwdConstraint"), _function("mj_fwdVelocity")
 mj_makeConstraint, mj_island = _function("mj_makeConstraint"), _function("mj_island")

@@ -30,7 +30,8 @@ from compare.kit.workers import Workers, dask, processes
 from mjsim import scene
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
-from mjsim.stepping import Polar
+from mjsim.recorder import COLUMNS
+from mjsim.stepping import Engine, JointedBall
 from model import Flow, Parameters, State, storage
 
 REPEATS = 5
@@ -170,9 +171,8 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     settings, p = ContactSettings(), SLIPPING
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
-    omega_0 = np.full((500, 1), p.omega_0)
-    settled = Polar([model], [p], settings, [state.x], 0.0)
-    settled.advance(omega_0)
+    settled = Engine(model, p, settings)
+    JointedBall(settled, state.x, 0.0).advance(np.full(500, p.omega_0), np.empty((500, COLUMNS)))
     starts = [p] * runs, [state.x] * runs, steps * settings.timestep, [Flow.steady(p.omega_0)] * runs, settings
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(REPEATS):
@@ -184,7 +184,7 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     return [statistics.median(bare) / each, statistics.median(whole) / each, statistics.median(ratios)]
 
 
-def _bare(settled: Polar, runs: int, steps: int) -> float:
+def _bare(settled: Engine, runs: int, steps: int) -> float:
     """Time in s of the given steps with no more around them than a loop."""
     model, data = settled.model, settled.data
     if runs == 1:

@@ -44,7 +44,7 @@ def test_the_loop_is_that_of_a_simulation(reference: Parameters, monkeypatch: py
     steps = viewer.run(window, stepper, flow, settings.timestep, 1.0)
     assert steps == 500  # half a second: the first of the 33 pictures shows the start
     run = mjsim.simulate(p, x0, 0.5, flow, settings, sample_interval=0.5)
-    qpos, qvel = np.array(stepper.data.qpos), np.array(stepper.data.qvel)
+    qpos, qvel = np.array(stepper.engine.data.qpos), np.array(stepper.engine.data.qvel)
     place = qpos[:3] - settings.midpoint * settings.timestep * qvel[:3]  # positions are ahead of velocities
     qvel[3:] = rotated(qpos[3:], qvel[3:])
     # Equal but for the round-off of turning one state into the paper's variables, or many at once.
@@ -63,7 +63,7 @@ def test_a_slow_machine_does_not_run_after_the_clock(reference: Parameters, monk
 
 def test_what_serves_contact_alone_is_out_of_sight(reference: Parameters) -> None:
     stepper = viewer.start(reference, np.zeros(6), Flow.steady(12.0), ContactSettings())
-    assert stepper.model.geom("wall").rgba[3] == 0
+    assert stepper.engine.model.geom("wall").rgba[3] == 0
 
 
 def test_no_display_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

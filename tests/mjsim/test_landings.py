@@ -5,9 +5,9 @@ import pytest
 
 import analytic
 import mjsim
-from mjsim import ContactSettings, scene
+from mjsim import ContactSettings, recorder, scene
 from mjsim.landing import COARSE
-from mjsim.stepping import Polar
+from mjsim.stepping import NOT, Engine, JointedBall
 from model import Case, Parameters
 
 HOPS = Parameters.named("hopping")
@@ -82,15 +82,16 @@ def test_a_ball_that_slips_fast_lands_at_any_step(step: float) -> None:
 
 
 def test_a_state_amid_a_landing_is_taken_up_to_the_bit() -> None:
-    settings, omega_0 = ContactSettings.for_problem(HOPS, 5e-4), np.array([HOPS.omega_0])
+    settings = ContactSettings.for_problem(HOPS, 5e-4)
     model, _ = scene.build(HOPS, settings)
-    one, other = (Polar([model], [HOPS], settings, [START], 0.0) for _ in range(2))
-    one.advance([omega_0] * 10)  # the first step is a free ball's, too
-    while not one.state()["due"][0]:
-        one.advance([omega_0])
+    one, other = (JointedBall(Engine(model, HOPS, settings), START, 0.0) for _ in range(2))
+    fluid, rows = np.full(10, HOPS.omega_0), np.empty((10, recorder.COLUMNS))
+    one.advance(fluid, rows)  # the first step is a free ball's, too
+    while one.state()["marks"][0] == NOT:
+        one.advance(fluid[:1], rows[:1])
     other.restore(one.state())
-    for polar in (one, other):
-        polar.advance([omega_0] * 5)
+    for ball in (one, other):
+        ball.advance(fluid[:5], rows[:5])
     for name, values in one.state().items():
         np.testing.assert_array_equal(other.state()[name], values, err_msg=name)
 
