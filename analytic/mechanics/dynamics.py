@@ -152,8 +152,8 @@ def forces(
     """
     if case is Case.RR:
         _, _, omega_c, *_ = x
-        B_y = np.nan_to_num(rolling_forces.least_utilisation(omega_c, p, omega_0).B_y)
-        return rolling_family(omega_c, p, omega_0, B_y)
+        B_y = rolling_forces.least_utilisation(omega_c, p, omega_0).B_y
+        return rolling_family(omega_c, p, omega_0, np.where(np.isnan(B_y), 0.0, B_y))
     given = zip((case.A, case.B), (slip_A, slip_B), slides(x, p), strict=True)
     slips = (slip or direction(*slide) for contact, slip, slide in given if contact is Contact.S)
     return FORCES[case](x, p, omega_0, *slips)

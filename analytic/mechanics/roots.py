@@ -38,21 +38,25 @@ def crossing(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.ArrayLik
     return np.where(changes, np.where(f_a == 0, a, best), np.nan)
 
 
-_MOST = 200
-"""More than enough for roots whose size is above 1e-44 of the interval, by halving alone."""
+_MOST, _SHORT = 200, 1e-10
+"""Steps: more than enough for roots whose size is above 1e-44 of the interval, by halving alone; and the length of one
+of Newton's, relative to the root, after which nothing is left."""
 
 
 def rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, guess: Array) -> Array:
     """Where f, given with its derivative, rises through zero on the way from start to end, to the last digits.
 
-    By Newton's method from a guess, or halving where that leaves what is known to hold the root.
+    By Newton's method from a guess, or halving where that leaves what is known to hold the root. A step of Newton's
+    leaves about the square of its length.
     """
     below, above, root = start, end, guess
     for _ in range(_MOST):
         before, (value, slope) = root, f(root)
-        below, above = np.where(value < 0, root, below), np.where(value < 0, above, root)
+        low = value < 0
+        below, above = np.where(low, root, below), np.where(low, above, root)
         root = root - value / np.where(slope == 0, np.inf, slope)
-        root = np.where((root - below) * (root - above) <= 0, root, (below + above) / 2)
-        if np.all(np.abs(root - before) <= 2 * math.ulp(1.0) * np.abs(before)):
+        inside = (root - below) * (root - above) <= 0
+        root = np.where(inside, root, (below + above) / 2)
+        if np.all(np.abs(root - before) <= np.where(inside, _SHORT, 2 * math.ulp(1.0)) * np.abs(before)):
             break
     return np.asarray(root)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import gc
 import hashlib
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar
 
 try:
     import numba
-    from numba.core.compiler_lock import global_compiler_lock
     from numba.extending import overload, register_jitable
 except ImportError:
     numba = None
@@ -61,26 +60,13 @@ def _alone(function: Any) -> Any:
 
                 file = stack.enter_context((Path(function.stats.cache_path) / "compiling").open("w"))
                 fcntl.flock(file, fcntl.LOCK_EX)
-            stack.enter_context(_soon())
+            if gc.isenabled():  # looking for garbage among all that compiling makes takes a tenth of it
+                gc.disable()
+                stack.callback(gc.enable)
             return compile_(*given, **named)
 
     function._compile_for_args = compile_alone
     return function
-
-
-@contextmanager
-def _soon() -> Iterator[None]:
-    """Compile in less time to loops that are as fast: LLVM optimises less, and nobody looks for garbage."""
-    with global_compiler_lock:
-        level, collects = numba.config.OPT, gc.isenabled()
-        numba.config.OPT = type(level)(1)
-        gc.disable()
-        try:
-            yield
-        finally:
-            numba.config.OPT = level
-            if collects:
-                gc.enable()
 
 
 def in_place_of(function: Callable[..., Any]) -> Callable[[F], F]:
