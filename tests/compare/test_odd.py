@@ -6,6 +6,7 @@ a file that is damaged, a directory, a link, an input of the same line.
 
 import argparse
 import contextlib
+import gc
 import hashlib
 import io
 import itertools
@@ -229,6 +230,8 @@ def carried_out(words: list[str], patience: float) -> tuple[int, str, str]:
         signal.signal(signal.SIGALRM, usual)
     if presses and time.process_time() - presses[0] > 3.0:
         raise Late
+    if presses:
+        gc.collect()  # what it broke off may have left a file open: that is heard here, where it is ignored
     said = "".join(line for line in err.getvalue().splitlines(True) if not line.startswith("dualball: warning: "))
     return code, out.getvalue(), said
 

@@ -28,11 +28,10 @@ def main() -> int:
     args = parser.parse_args()
     try:
         first, *others = args.directories
-        levels = [trial.judged(first, args.workers, whole=args.whole)]
-        levels += [trial.judged(each, args.workers, whole=False) for each in others]
+        levels = [trial.judged(first, args.workers, args.whole), *(trial.judged(each, args.workers) for each in others)]
         measured = trial.wrong_engines(first, args.workers) if args.engines else []
         named = [name.partition("=") for name in args.witness]
-        alone = [trial.heard(Path(where or first), name, args.workers) for name, _, where in named]
+        alone = [trial.judged(Path(where or first), args.workers, by=name) for name, _, where in named]
         if args.page:
             write_text(args.page, mutants.page(levels, measured, alone))
     except InputError as error:

@@ -86,19 +86,14 @@ def measured(directory: Path) -> Records:
     return steps[1]
 
 
-def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
-    """Every wrong theory judged on the measurements stored in a results directory.
+def judged(directory: Path, workers: int = 2, whole: bool = False, by: str = "") -> Judged:
+    """Every wrong theory judged on the measurements stored in a results directory, or on what a witness alone says.
 
-    By all claims; unless `whole`, by the quickest ones first and only until one notices it.
+    By the quickest claims first and only until one notices it; if `whole`, by all.
     """
     level = results.load(directory).level.lower()
-    return Judged(level, _theories(directory, "", whole, workers), directory, whole)
-
-
-def heard(directory: Path, by: str, workers: int = 2) -> Judged:
-    """Every wrong theory judged on what a witness, alone, says of it, by the quickest claims first."""
-    name = f"{results.load(directory).level.lower()}, by {by}"
-    return Judged(name, _theories(directory, by, False, workers), directory, whole=False)
+    name = f"{level}, by {by}" if by else level
+    return Judged(name, _theories(directory, by, whole, workers), directory, whole)
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
