@@ -152,12 +152,11 @@ def worst(results: Sequence[Result]) -> Result | None:
 
 
 def about(league: Mapping[str, Sequence[Result]]) -> Rows:
-    """What each engine declares, its worst case and why; or why it was not tried."""
+    """What each engine that was tried declares, its worst case and why; `notes` say why others were not."""
     table = [["engine", "version", "declared", "worst case", "why"]]
     for name, results in league.items():
         engine, found = results[0].engine, worst(results)
         if found is None:
-            table.append([name, "", results[0].skipped, "", ""])
             continue
         failed = f": {found.failure}" if found.failure else ""
         table.append([name, engine.version, engine.declared, f"{found.case}, {cell(found)}{failed}", engine.note])
