@@ -1,6 +1,6 @@
 """Figures of one's own: functions draw into axes of matplotlib, new ones if none are given, and return them.
 
-For example::
+For example:
 
     from compare import plot
     from model import Parameters

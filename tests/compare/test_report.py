@@ -360,6 +360,7 @@ def test_an_address_opens_its_row_and_the_page_prints(tab):
         ("r = 0.2 m, 8πρ_fνr/(jm)", "<i>r</i> = 0.2 m, 8<i>π</i><i>ρ</i><sub>f</sub><i>ν</i><i>r</i>/(<i>jm</i>)"),
         ("y = -3 m, it doesn't, K ρ^(2/3)", "<i>y</i> = −3 m, it doesn&#39;t, <i>K</i> <i>ρ</i><sup>2/3</sup>"),
         ("slip_x of run_of(m), test_j, RR, kg/m³, 2 cm", "slip_x of run_of(m), test_j, RR, kg/m³, 2 cm"),
+        ("it rolls (R); A. R. Champneys", "it rolls (R); A. R. Champneys"),
     ],
 )
 def test_symbols_are_typeset_and_names_of_programs_are_not(text: str, shown: str) -> None:

@@ -43,7 +43,8 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
 _SYMBOL = (  # compiled where it is first needed
     r"((?:(?<![\w.])[A-Za-z]|[Α-ω])\u0303?)(?:_([A-Za-z0-9]{1,3})(?![A-Za-z0-9_(])|([₀-₉]+))"  # with an index
     r"|([Α-ω](?![ms]\b|[a-z]{2})"  # alone
-    r"|(?<![A-Za-z_.'’])(?<!\d )(?!RR|cm|m(?![gRrcjΑ-ω·]| =))[mgRrcj]+(?![A-Za-z'’_])"  # alone, or a product
+    r"|(?<![A-Za-z_.'’])(?<!\d )(?<![A-Z]\. )(?!RR|cm|(?<=\()R\)|m(?![gRrcjΑ-ω·]| =))"  # or a product:
+    r"[mgRrcj]+(?![A-Za-z'’_])"
     r"|(?<![\w.'’])(?<!\d )(?<!&#39;)(?:[yht](?![\w'’.])|[A-Za-z](?= [=&≤≥])|[A-Ca-ce-z](?=[Α-ω])|K(?= [Α-ω])))"
     r"|\^\(?([\d/]+)\)?"  # a power
     r"|((?<= )-(?= )|(?<![\w).])-(?=\d))"  # minus
