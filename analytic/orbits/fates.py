@@ -116,8 +116,11 @@ class Attractor:
         return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
 
 
-def event_driven(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
-    """Event-driven simulations as `Runs`: where numba is installed each is a compiled call, on all cores."""
+def event_driven(
+    p: Parameters, x0s: Array, duration: float, interval: float, threads: int | None = None
+) -> list[Trajectory]:
+    """Event-driven simulations as `Runs`, on all cores unless `threads` says how many: each is a compiled call where
+    numba is installed."""
 
     def motion(x0: Array) -> Trajectory:
         try:
@@ -126,7 +129,7 @@ def event_driven(p: Parameters, x0s: Array, duration: float, interval: float) ->
             run: Trajectory = error.trajectory
             return run
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         return list(pool.map(motion, x0s))
 
 
