@@ -26,7 +26,8 @@ def main() -> None:
     parser.add_argument("--only", action="append", metavar="NAME", help="only this table (may be repeated)")
     args = parser.parse_args()
     pages: dict[str, dict[str, Callable[[], Rows]]] = {
-        "speed.md": {"event-driven": theory.event_driven, "many": theory.many, "siconos": theory.stepped},
+        "speed.md": {"event-driven": theory.event_driven, "states": theory.states, "many": theory.many,
+                     "siconos": theory.stepped},
         "campaigns.md": {"growth": program.growth, "costs": program.costs, "start": program.start_up,
                          "study": partial(program.study, args.before)},
     }  # fmt: skip

@@ -178,6 +178,30 @@ def _no_worse(motion: Motion, method: str, worst: float, right: Array, compiled:
     raise AssertionError
 
 
+def states() -> Rows:
+    """The same without the forces and samples that are made of states by the same code: what `solve_ivp` gives alone.
+
+    By LSODA, of the motions that it gets through, at the tolerance at which it errs by no more than compiled runs.
+    """
+    rows = [["", "compiled, ms", "solve_ivp with LSODA, ms", "by compiled"]]
+    for name, motion in list(MOTIONS.items())[:3]:
+        right = run(motion, BEST).x
+
+        def compiled(rtol: float = 1e-9, of: Motion = motion) -> Array:
+            return simulate_many(of.p, of.x, of.t_end, of.flow, Settings(rtol=rtol), threads=1).x[0]
+
+        def by_lsoda(rtol: float, own: Callable[[float], Array] = compiled) -> Array:
+            plain = mock.patch.object(hybrid, "compiled", return_value=None)
+            with plain, mock.patch.object(hybrid, "stretch", partial(_solved, "LSODA")):
+                return own(rtol)
+
+        worst = deviation(compiled(), right)
+        rtol = next(each for each in TOLERANCES if deviation(by_lsoda(each), right) <= worst or each == TOLERANCES[-1])
+        ours, theirs = seconds(compiled), seconds(partial(by_lsoda, rtol))
+        rows.append([name, f"{1e3 * ours:.2f}", f"{1e3 * theirs:.1f}", f"{theirs / ours:.1f}"])
+    return rows
+
+
 STEPPED, ALLOWED = [0.02 / n for n in (2, 4, 5, 8, 10, 20, 40)], 5e-3
 """Time steps, s, parts of the time between samples, and the error up to which one of them will do."""
 
