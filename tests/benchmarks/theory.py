@@ -188,7 +188,8 @@ def states() -> Rows:
         right = run(motion, BEST).x
 
         def compiled(rtol: float = 1e-9, of: Motion = motion) -> Array:
-            return simulate_many(of.p, of.x, of.t_end, of.flow, Settings(rtol=rtol), threads=1).x[0]
+            x: Array = simulate_many(of.p, of.x, of.t_end, of.flow, Settings(rtol=rtol), threads=1).x[0]
+            return x
 
         def by_lsoda(rtol: float, own: Callable[[float], Array] = compiled) -> Array:
             plain = mock.patch.object(hybrid, "compiled", return_value=None)
