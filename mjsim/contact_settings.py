@@ -100,6 +100,8 @@ class ContactSettings:
                 check_choice(field.name, getattr(self, field.name), field.metadata["known"])
         if self.scene != "joints" and (self.memory or self.servo or self.order == 2):
             raise InputError(f"scene = {self.scene!r} needs memory = False, servo = 0, order = 1: it has no joints")
+        if self.rigid and (self.noslip_iterations or self.integrator == "discrete"):
+            raise InputError("scene = 'rigid' needs noslip_iterations = 0 and another integrator than 'discrete'")
         if self.memory and self.cone == "pyramidal":
             raise InputError("cone = 'pyramidal' needs memory = False: rows of the pyramid mix normal and friction")
         if self.timestep > self.largest_timestep * (1 + 1e-12):

@@ -136,7 +136,7 @@ def as_it_comes(step: float) -> ContactSettings:
 
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that contacts may hover with these settings is on trial
+        warnings.simplefilter("ignore")  # that contacts may chatter with these settings is on trial
         return mjsim.Run(*given, **more)
 
 

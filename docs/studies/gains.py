@@ -75,7 +75,7 @@ def gains() -> Rows:
         _error(seed, found, _usual)
     for name, (way, changed) in WAYS.items():
         with warnings.catch_warnings(), changed:
-            warnings.simplefilter("ignore")  # of contacts that hover
+            warnings.simplefilter("ignore")  # of contacts that chatter
             begin = time.process_time()
             errors = [_error(seed, found, way) for seed, found in exact.items()]
             spent = time.process_time() - begin

@@ -111,7 +111,7 @@ def landings(step: float) -> Rows:
     rows = [["settings", "ω_c 5 ms after a landing", "rebound", "motion with it", "motion that hits the wall"]]
     for name, way in ways.items():
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of contacts that hover
+            warnings.simplefilter("ignore")  # of contacts that chatter
             land, hit = states.LANDING, states.HITTING
             lands, hits, *others = (
                 mjsim.simulate(each.p, x0, lasts, settings=way, sample_interval=step)
@@ -147,7 +147,7 @@ def _theory(name: str, steps: Sequence[float]) -> list[Contestant]:
 
 
 def _contestants(ways: Ways) -> list[Contestant]:
-    """They run without a warning where contacts hover: what poor settings do is the question here."""
+    """They run without a warning where contacts chatter: what poor settings do is the question here."""
     return [Contestant(name, NEWCOMER, each.timestep, each) for name, each in ways.items()]
 
 
@@ -162,7 +162,7 @@ def _cost(task: Task) -> float:
     given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings), []
     for _ in range(states.REPEATS):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of contacts that hover
+            warnings.simplefilter("ignore")  # of contacts that chatter
             run = Run(*given, sample_interval=task.sample_interval)
         begin = time.process_time()
         for _ in run:

@@ -173,7 +173,8 @@ class Coulomb:
         """Within this, `mujoco.mj_step`, `mj_forward` and `mj_step1` with `mj_step2` obey the law for this model.
 
         It is MuJoCo's control callback, for programs that step by themselves. Each `MjData` of the model has a memory
-        of its own; other models are left alone. Several may be installed at once.
+        of its own; other models are left alone. Several may be installed at once. Without numba MuJoCo builds no model
+        within this, as under any callback in Python.
 
         Raises
         ------

@@ -12,6 +12,9 @@ from mjsim import ContactSettings
 from model import Case, InputError, Parameters
 
 
+FREE = {"scene": "rigid", "memory": False, "servo": 0.0, "order": 1}
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -28,6 +31,8 @@ from model import Case, InputError, Parameters
         ({"servo": float("nan")}, r"servo = nan s must be finite"),
         ({"scene": "facets"}, "scene = 'facets' needs memory = False, servo = 0, order = 1"),
         ({"scene": "rigid", "memory": False, "order": 1}, "scene = 'rigid' needs memory = False, servo = 0"),
+        (FREE | {"noslip_iterations": 5}, "scene = 'rigid' needs noslip_iterations = 0"),
+        (FREE | {"integrator": "discrete"}, "and another integrator than 'discrete'"),
     ],
 )
 def test_refused(changes, words) -> None:
