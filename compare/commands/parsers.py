@@ -149,7 +149,7 @@ def sweep(parser: Parser) -> None:
     means = "store what each run settles to, for collect, and not its samples"
     parser.add_argument("--means-only", action="store_true", help=means)
     options.add_workers(parser)
-    parser.add_argument("--batch", type=options.count, default=64, help="runs in one MuJoCo batch")
+    parser.add_argument("--batch", type=options.count, default=64, help="most runs that a process takes at once")
     options.add_directory(parser, "sweep")
     options.add_json(parser, "print a summary as JSON")
     parser.needs("--seed", "--random")

@@ -35,7 +35,7 @@ from model.parameters import POSITIVE, Range, check_number
 from model.versions import current_versions
 
 BATCH = 64
-"""Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
+"""Most runs that a process takes at once, and stores in one file."""
 HELD = 2**16
 """Most samples of a batch, some 11 MB, three times that while it is stored; a run with more is written as it comes."""
 READ = 2**18
@@ -86,7 +86,7 @@ class Campaign:
     ----------
     directory : where the run files go; made if it doesn't exist
     workers : number of processes, or `Workers` of another kind; 0 runs everything in this process
-    batch : most runs in one MuJoCo batch
+    batch : most runs that a process takes at once
     limit : longest time a run may take, s; a run that takes longer is reported as failed
     report : called after every batch with `doing`, and how many runs are done, in all, and failed
     doing : what the campaign is about

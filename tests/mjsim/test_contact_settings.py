@@ -11,7 +11,6 @@ import mjsim
 from mjsim import ContactSettings
 from model import Case, InputError, Parameters
 
-
 FREE = {"scene": "rigid", "memory": False, "servo": 0.0, "order": 1}
 
 
