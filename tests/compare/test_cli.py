@@ -12,6 +12,7 @@ import pytest
 import xarray
 
 from compare.bench import league
+from compare.catalogue import CLAIMS
 from compare.commands import cli, parsers
 from compare.kit import engines
 from mjsim import ContactSettings
@@ -257,6 +258,11 @@ def test_the_tutorial_carries_out_every_command() -> None:
     """But for the page that waits for a browser."""
     shown = re.findall(r"^!dualball (\S+)", (ROOT / "docs" / "tutorial.md").read_text("utf-8"), re.MULTILINE)
     assert {*shown} | {"explore"} == {*COMMANDS}
+
+
+def test_every_claim_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["validate", "--list"]) == 0
+    assert {claim.id for claim in CLAIMS} <= set(capsys.readouterr().out.split())
 
 
 def test_parameters_are_described_once(capsys: pytest.CaptureFixture[str]) -> None:
