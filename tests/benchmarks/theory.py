@@ -279,7 +279,7 @@ def many() -> Rows:
 
     with mock.patch.object(hybrid, "compiled", return_value=timed):
         spent = 1e3 * seconds(at_once, 1) / RUNS
-    share, turns = sum(inside) / RUNS / spent, []
+    share, turns = statistics.fmean(inside) / spent, []
     for _ in range(REPEATS):
         before, one, two = two_processes(), passes(1), passes(2)
         turns.append((min(before, two_processes()), one / two))
