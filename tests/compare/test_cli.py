@@ -173,7 +173,7 @@ def pressing(task, path, stop):
         return stop()
     return store(task, path, stop=pressed)
 simulate.store = pressing
-raise SystemExit(cli.main(["simulate", "--time", "30", "--sample-interval", "0.004", "-o", sys.argv[2]]))
+raise SystemExit(cli.main(["simulate", "--time", "90", "--sample-interval", "0.004", "-o", sys.argv[2]]))
 """
 
 
@@ -199,7 +199,7 @@ def test_an_interrupted_run_is_kept_and_goes_on(tmp_path: Path, monkeypatch: pyt
     again = simulate(4, output)  # the journal's two blocks count, and one more is new
     assert (again.returncode, first.stat().st_mtime_ns) == (130, kept)
     assert len(storage.load(output.with_suffix(".failed.h5")).time) == 2 * len(part.time)
-    words = ["simulate", "--time", "30", "--sample-interval", "0.004", "-o"]
+    words = ["simulate", "--time", "90", "--sample-interval", "0.004", "-o"]
     with monkeypatch.context() as patch:
         patch.setattr("compare.kit.tasks.LONG", 1000)
         assert cli.main([*words, str(output)]) == 0
