@@ -41,7 +41,8 @@ NOT, LANDS, GOES_ON, BEGINS = range(4)
 """Whether a ball takes the next step in fine ones: not; as it lands; in the shortest, as it did the last one; or in
 these as the first of all, without a blow, after which it goes on upon its joints however forces change."""
 _DUE, _HELD = 0, 1
-_NORMAL_A, _NORMAL_B = (SENSORS + at for at in range(NSENSOR)[NORMALS])
+_NORMAL_A, _NORMAL_B = range(NSENSOR)[NORMALS]
+"""Where sensors have the normal forces."""
 
 
 class Joints(NamedTuple):
@@ -80,8 +81,8 @@ def seen_forces(body: Joints) -> None:
     if body.marks[_HELD] == 0:
         for i in range(6):
             body.forces[i] = body.contact[i]
-        body.forces[6] = body.sensors[1] + body.adhesion[0]
-        body.forces[7] = body.sensors[15] + body.adhesion[1]
+        body.forces[6] = body.sensors[_NORMAL_A] + body.adhesion[0]
+        body.forces[7] = body.sensors[_NORMAL_B] + body.adhesion[1]
 
 
 def drive(omega_0: float, row: Any, body: Joints) -> None:
@@ -114,7 +115,7 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
     body.adhesion[0], body.adhesion[1] = -lift_A, -lift_B
     for i in range(SENSORS, SENSORS + NSENSOR):
         row[i] = 0.0
-    row[_NORMAL_A], row[_NORMAL_B] = -lift_A, -lift_B
+    row[SENSORS + _NORMAL_A], row[SENSORS + _NORMAL_B] = -lift_A, -lift_B
     applied[1] -= lift_B
     applied[2] -= lift_A
 
