@@ -10,13 +10,11 @@ import model
 if not hasattr(model, "Parameters"):
     raise ImportError(f"{model.__file__} hides the package model of dualball: rename that, or work in another folder")
 
-try:
-    import mujoco.batch
-except ImportError:
+if not hasattr(mujoco.MjModel, "pair_adhesion"):
     raise ImportError(
         f"dualball needs MuJoCo 4.0, and this is {mujoco.__version__}: Coulomb's law alone, package mujoco-coulomb, "
         "runs on 3.3 and later"
-    ) from None
+    )
 
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run, simulate, simulate_many
