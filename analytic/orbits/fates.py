@@ -95,7 +95,7 @@ class Attractor:
     """What some of the starts came to."""
 
     fate: Fate
-    """Of the first of them."""
+    """Of the one that settled first."""
     count: int
     starts: int
     """How many starts came to it, and how many there were."""
@@ -112,7 +112,7 @@ class Attractor:
 
     @property
     def run(self) -> Trajectory:
-        """What it does: a period by theory where there is an orbit, else the last window of the first run."""
+        """What it does: a period by theory where there is an orbit, else the last window of that run."""
         return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
 
 
@@ -156,20 +156,22 @@ def attractors(
     if lasting is None and p.c == 0:
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
-    groups, following = list[list[Fate]](), dict[Generator[Array, Trajectory, Fate], Array]()
-    window, todo = WINDOW * natural_units(p)[0], (_settling(p, x, duration, run, groups) for x in states)
-    while following := following | {each: next(each) for each in islice(todo, SIDE_BY_SIDE - len(following))}:
-        windows = run(p, np.array(list(following.values())), window, window / WINDOW_SAMPLES)
-        for each, seen in zip(list(following), windows, strict=True):
+    groups, window = list[list[Fate]](), WINDOW * natural_units(p)[0]
+    todo = (_settling(p, x, duration, run, groups) for x in states)
+    following = [(each, next(each)) for each in islice(todo, SIDE_BY_SIDE)]
+    while following:
+        windows = run(p, np.array([x for _, x in following]), window, window / WINDOW_SAMPLES)
+        goes_on = []
+        for (each, _), seen in zip(following, windows, strict=True):
             try:
-                following[each] = each.send(seen)
+                goes_on.append((each, each.send(seen)))
             except StopIteration as settled:
-                del following[each]
                 fate: Fate = settled.value
                 group = next((group for group in groups if group[0].same(fate)), None)
                 if group is None:
                     groups.append(group := [])
                 group.append(fate)
+        following = goes_on + [(each, next(each)) for each in islice(todo, SIDE_BY_SIDE - len(goes_on))]
     groups.sort(key=len, reverse=True)
     return [Attractor(group[0], len(group), len(states)) for group in groups]
 
