@@ -309,7 +309,7 @@ def _hand_over(run: Kept, recorder: Recorder) -> None:
 def path_forces(case: npt.NDArray[np.int8], x: Array, path: Array, p: Parameters) -> Array:
     """Contact forces at samples, shape (n, 6), N; in RR those of least utilisation. All of one case at once."""
     forces = np.empty((len(case), 6))
-    for each in map(Case, np.flatnonzero(np.bincount(case)).tolist()):
+    for each in map(Case, np.unique(case)):
         here = case == each
         _, alpha, beta, _, omega_0 = path[here].T
         slip_A = (np.sin(alpha), np.cos(alpha)) if each.A is Contact.S else None

@@ -38,6 +38,12 @@ REPEATS = 5
 BATCH = 64
 FINISHED = 10_000
 COUNT = 20_000_000
+STUDY = {
+    "validate --quick": "validate --quick --quiet -o {0}",
+    "judge": "judge {0}",
+    "figures": "figures --results {0} -o {0}/figures",
+}
+"""The main job and its parts, by their names in the table; {0} is the directory of results."""
 SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 """Slipping at both points: both contacts closed, and friction on its cone."""
 
@@ -48,16 +54,13 @@ def study(before: Path | None = None) -> Rows:
     rows = [["", "processor time", "by import mujoco", "memory", *(["before, divided by now"] if before else [])]]
     unit = min(_spent([sys.executable, "-c", "import mujoco"])[0] for _ in range(REPEATS))
     with tempfile.TemporaryDirectory() as directory:
-        for name in ("validate --quick --quiet -o {0}", "judge {0}", "figures --results {0} -o {0}/figures"):
+        for name, words in STUDY.items():
             taken = list[tuple[float, float]]()
             for place in filter(None, (Path.cwd(), before)):
-                words = name.format(Path(directory) / str(len(taken))).split()
-                taken.append(_spent([sys.executable, "-m", "compare", *words], place))
+                given = words.format(Path(directory) / str(len(taken))).split()
+                taken.append(_spent([sys.executable, "-m", "compare", *given], place))
             spent, held = taken[0]
-            row = [
-                "dualball " + name.split(" -o")[0].split(" {")[0].removesuffix(" --results").removesuffix(" --quiet")
-            ]
-            row += [f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"]
+            row = [f"dualball {name}", f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"]
             rows.append([*row, *(f"{more / spent:.2f}" for more, _ in taken[1:])])
     return rows
 
