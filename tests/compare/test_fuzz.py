@@ -139,6 +139,39 @@ def results_of(measurements: Path) -> Path:
     return directory
 
 
+@pytest.mark.parametrize(
+    ("kind", "command"),
+    [
+        *((name, "inspect FILE") for name in RUNS),
+        ("event", "inspect FILE --plot DIRECTORY/plot.png"),
+        ("event", "render FILE -o DIRECTORY/picture.png"),
+        ("event", "collect RUNS -o DIRECTORY/all.h5"),
+        ("batch", "inspect FILE"),
+        ("batch", "inspect FILE/event"),
+        ("collection", "inspect FILE"),
+        ("measurements", "inspect FILE"),
+        ("measurements", "judge RESULTS"),
+        ("measurements", "judge RESULTS --verbose"),
+        ("measurements", "figures --results RESULTS -o DIRECTORY"),
+    ],
+)
+def test_every_command_names_the_damaged_file(tmp_path, files, capsys, kind, command):
+    path = tmp_path / "results" / "measurements" / "bad.h5"
+    path.parent.mkdir(parents=True)
+    content = bytearray(files[kind].read_bytes())
+    content[len(content) // 2] ^= 16
+    path.write_bytes(content)
+    places = {"FILE": path, "DIRECTORY": tmp_path, "RUNS": path.parent, "RESULTS": results_of(path)}
+    capsys.readouterr()
+    for word, place in places.items():
+        command = command.replace(word, str(place))
+    assert cli.main(command.split()) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    reason = "it is damaged (its content does not match its checksum)"
+    assert err == f"dualball: error: cannot read {path}: {reason}\n"
+
+
 @pytest.mark.parametrize("count", [20, pytest.param(500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("engine", RUNS[:3])
 def test_a_header_that_says_something_else(tmp_path: Path, files: dict[str, Path], engine: str, count: int) -> None:
