@@ -22,7 +22,7 @@ from compare.kit.pictures import embedded, svg
 from compare.kit.record import Check
 from compare.kit.statistics import COVERAGE
 from compare.kit.tasks import sources
-from compare.kit.workers import JUDGING, Spread, at_most
+from compare.kit.workers import JUDGING, LateError, Spread, at_most
 from model import InputError, Parameters, StorageError
 from model.files import make_directory, write_text
 
@@ -204,7 +204,7 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
         picture = svg(figure)
         described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
         write_text(path, described + _mark(drawing, data))
-    except (GapError, StorageError, TimeoutError) as error:
+    except (GapError, StorageError, LateError) as error:
         return {"gap": str(error)}
     return {"picture": picture, "caption": caption}
 

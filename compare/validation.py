@@ -23,7 +23,7 @@ from compare.kit.levels import Level
 from compare.kit.programme import Protocol
 from compare.kit.progress import Show, ValidationProgress, nowhere
 from compare.kit.record import Missing, Records, RecordsByEngine
-from compare.kit.workers import JUDGING, Spread, Workers, at_most, processes, threads
+from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes, threads
 from compare.report import results
 from compare.report.results import Summary
 from compare.witnesses import full_verdict
@@ -180,7 +180,7 @@ def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     try:
         with at_most(JUDGING):
             return full_verdict(claim, testimony)
-    except TimeoutError as error:
+    except LateError as error:
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=str(error))
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from compare.kit.pages import Rows
@@ -21,18 +20,14 @@ DOCS = Path(__file__).parents[2] / "docs"
 def main() -> None:
     """Measure and write all tables, or those named."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description="Write the tables on speed.")
-    since = "also against a checkout of an earlier commit; c8dc858 is the last one before anything was compiled"
-    parser.add_argument("--before", type=Path, metavar="DIRECTORY", help=since)
     parser.add_argument("--only", action="append", metavar="NAME", help="only this table (may be repeated)")
     args = parser.parse_args()
     pages: dict[str, dict[str, Callable[[], Rows]]] = {
         "speed.md": {"event-driven": theory.event_driven, "states": theory.states, "many": theory.many,
                      "siconos": theory.stepped},
         "campaigns.md": {"growth": program.growth, "costs": program.costs, "start": program.start_up,
-                         "study": partial(program.study, args.before)},
+                         "study": program.study},
     }  # fmt: skip
-    if args.before:
-        pages["speed.md"]["before"] = partial(theory.before, args.before)
     check_names(args.only or (), [name for tables in pages.values() for name in tables], "table")
     for page, tables in pages.items():
         for name, rows in tables.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import importlib.util
 import math
 import os
@@ -12,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ from model import Flow, Parameters, State, storage
 REPEATS = 5
 BATCH = 64
 FINISHED = 10_000
-COUNT = 20_000_000
+PROGRAM = [sys.executable, "-m", "compare"]
 STUDY = {
     "validate --quick": "validate --quick --quiet -o {0}",
     "judge": "judge {0}",
@@ -48,20 +48,14 @@ SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 """Slipping at both points: both contacts closed, and friction on its cone."""
 
 
-def study(before: Path | None = None) -> Rows:
-    """A quick validation, and what is made of its measurements: processor time and memory; and how many times as long
-    that takes by the sources in a directory."""
-    rows = [["", "processor time", "by import mujoco", "memory", *(["before, divided by now"] if before else [])]]
+def study() -> Rows:
+    """A quick validation, and what is made of its measurements: processor time and memory."""
+    rows = [["", "processor time", "by import mujoco", "memory"]]
     unit = min(_spent([sys.executable, "-c", "import mujoco"])[0] for _ in range(REPEATS))
     with tempfile.TemporaryDirectory() as directory:
         for name, words in STUDY.items():
-            taken = list[tuple[float, float]]()
-            for place in filter(None, (Path.cwd(), before)):
-                given = words.format(Path(directory) / str(len(taken))).split()
-                taken.append(_spent([sys.executable, "-m", "compare", *given], place))
-            spent, held = taken[0]
-            row = [f"dualball {name}", f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"]
-            rows.append([*row, *(f"{more / spent:.2f}" for more, _ in taken[1:])])
+            spent, held = _spent([*PROGRAM, *words.format(directory).split()])
+            rows.append([f"dualball {name}", f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"])
     return rows
 
 
@@ -71,60 +65,56 @@ def costs() -> Rows:
     for name, runs in (("one simulation", 1), (f"batch of {BATCH}", BATCH)):
         bare, whole, ratio = cost(runs)
         rows.append([name, f"{1e6 * bare:.2f} µs", f"{1e6 * whole:.2f} µs", f"{ratio:.2f}"])
-    two_threads, threads_limit = threads()
-    two_over_one, machine, dask_over_processes = throughputs()
+    count = 4 * BATCH
+    given = [task.parameters for task in _tasks(count)], [State()] * count, 2.0
+
+    def on_threads(number: int) -> float:
+        return seconds(partial(mjsim.simulate_many, *given, sample_interval=0.2, threads=number))
+
+    two_threads, threads_limit = two_against_one(on_threads)
+    two_over_one, machine = two_against_one(lambda number: _campaign(partial(processes, number)))
     return [
         *rows,
-        [f"simulate_many of {4 * BATCH}: two threads against one", "", "", f"{two_threads:.2f}"],
+        [f"simulate_many of {count}: two threads against one", "", "", f"{two_threads:.2f}"],
         ["two processes of bare arithmetic at that time: the machine's limit", "", "", f"{threads_limit:.2f}"],
         ["campaign: two processes against one", "", "", f"{two_over_one:.2f}"],
         ["the same of bare arithmetic: the machine's limit", "", "", f"{machine:.2f}"],
-        ["campaign: two Dask workers against two processes", "", "", f"{dask_over_processes:.2f}"],
+        ["campaign: two Dask workers against two processes", "", "", f"{by_dask():.2f}"],
         ["campaign: bookkeeping of a task", "", f"{1e3 * bookkeeping():.1f} ms", ""],
         [f"campaign: resuming {FINISHED} finished tasks", "", f"{resuming():.1f} s", ""],
     ]
 
 
-def threads() -> tuple[float, float]:
-    """Speed of two threads of `mjsim.simulate_many` divided by that of one, and what the machine allows two processes;
-    of the turn in which it allowed most, since other programs take their share."""
-    count = 4 * BATCH
-    sets = [SLIPPING.replace(omega_0=15 + 10 * k / count) for k in range(count)]
-    given = sets, [State()] * count, 2.0
+def two_against_one(taken: Callable[[int], float]) -> tuple[float, float]:
+    """Speed of two at work, of what one or two take in s, divided by that of one; and what the machine allows two
+    processes; of the turn in which it allowed most, since other programs take their share."""
+    loop = [sys.executable, "-c", "for _ in range(20_000_000): pass"]
 
-    def many(number: int) -> float:
-        return _seconds(functools.partial(mjsim.simulate_many, *given, sample_interval=0.2, threads=number))
+    def loops(number: int) -> None:
+        for each in [subprocess.Popen(loop) for _ in range(number)]:
+            each.wait()
 
-    many(2)
+    def allowed() -> float:
+        return 2 * seconds(partial(loops, 1)) / seconds(partial(loops, 2))
+
+    taken(2)
     turns = []
     for _ in range(REPEATS):
-        before, one, two = two_processes(), many(1), many(2)
-        turns.append((min(before, two_processes()), one / two))
+        before, one, two = allowed(), taken(1), taken(2)
+        turns.append((min(before, allowed()), one / two))
     limit, ratio = max(turns)
     return ratio, limit
 
 
-def two_processes() -> float:
-    """Speed of two processes of bare arithmetic divided by that of one."""
-    loop = [sys.executable, "-c", f"for _ in range({COUNT}): pass"]
-
-    def run(number: int) -> None:
-        for each in [subprocess.Popen(loop) for _ in range(number)]:
-            each.wait()
-
-    return 2 * _seconds(functools.partial(run, 1)) / _seconds(functools.partial(run, 2))
-
-
 def start_up() -> Rows:
     """Processor time until commands have answered, beside that of importing MuJoCo."""
-    program = [sys.executable, "-m", "compare"]
     asked = {
         "import mujoco": [sys.executable, "-c", "import mujoco"],
         "import mjsim": [sys.executable, "-c", "import mjsim"],
-        "dualball --version": [*program, "--version"],
-        "dualball --help": [*program, "--help"],
-        "dualball predict": [*program, "predict"],
-        "dualball cases": [*program, "cases"],
+        "dualball --version": [*PROGRAM, "--version"],
+        "dualball --help": [*PROGRAM, "--help"],
+        "dualball predict": [*PROGRAM, "predict"],
+        "dualball cases": [*PROGRAM, "cases"],
     }
     took = {name: min(_spent(words)[0] for _ in range(REPEATS)) for name, words in asked.items()}
     first = took["import mujoco"]
@@ -141,10 +131,7 @@ def growth() -> Rows:
         for count in (1000, 10_000, MOST):
             runs, table = Path(directory) / str(count), Path(directory) / f"{count}.h5"
             vary = f"sweep --vary omega_0=5:45:{count} --time 0.1 --means-only --quiet --workers 0 -o {runs}"
-            taken = [
-                _spent([sys.executable, "-m", "compare", *words.split()])
-                for words in (vary, f"collect {runs} -o {table} --workers 0")
-            ]
+            taken = [_spent([*PROGRAM, *words.split()]) for words in (vary, f"collect {runs} -o {table} --workers 0")]
             size = sum(file.stat().st_size for file in runs.iterdir())
             (sweep, held), (gather, kept) = taken
             costs = f"{1e3 * sweep / count:.2f} ms a run", f"{held:.0f} MB", f"{size / count / 1e3:.2f} kB a run"
@@ -154,10 +141,9 @@ def growth() -> Rows:
     return rows
 
 
-def _spent(words: list[str], place: Path = Path()) -> tuple[float, float]:
-    """Processor time of a program and its workers, s, and its largest memory, MB, by the sources in a directory."""
-    own = os.environ | {"PYTHONPATH": str(place.resolve())}
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, cwd=place, env=own)
+def _spent(words: list[str]) -> tuple[float, float]:
+    """Processor time of a program and its workers, s, and its largest memory, MB."""
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     if status:
         sys.exit(f"ends with {os.waitstatus_to_exitcode(status)}: {' '.join(words)}")
@@ -180,7 +166,7 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(REPEATS):
         loop = Run(*starts, sample_interval=100 * settings.timestep)
-        whole.append(_seconds(functools.partial(list, loop), time.process_time))
+        whole.append(seconds(partial(list, loop), time.process_time))
         bare.append(_bare(settled, runs, steps))
     ratios = [2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)]
     each = steps * runs
@@ -191,7 +177,7 @@ def _bare(settled: Engine, runs: int, steps: int) -> float:
     """Time in s of the given steps with no more around them than a loop."""
     model, data = settled.model, settled.data
     if runs == 1:
-        azimuth, step = data.qpos[:1], functools.partial(mujoco.mj_step, model, data)
+        azimuth, step = data.qpos[:1], partial(mujoco.mj_step, model, data)
     else:
         batch = Batch(model, nsim=runs, nthread=1)
         for name in ("qpos", "qvel", "qfrc_applied", "mocap_quat", "qacc_warmstart"):
@@ -204,54 +190,38 @@ def _bare(settled: Engine, runs: int, steps: int) -> float:
             step()
             azimuth[:] = held
 
-    return _seconds(loop, time.process_time)
+    return seconds(loop, time.process_time)
 
 
-def _seconds(work: Callable[[], Any], clock: Callable[[], float] = time.perf_counter) -> float:
+def seconds(work: Callable[[], Any], clock: Callable[[], float] = time.perf_counter) -> float:
+    """What some work takes, s."""
     start = clock()
     work()
     return clock() - start
 
 
-def throughputs() -> tuple[float, float, float]:
-    """Speed of two processes divided by that of one, in campaigns and in bare arithmetic; and of two Dask workers
-    divided by that of two processes. Medians of neighbouring timings; nan without Dask."""
-    kinds = functools.partial(processes, 1), functools.partial(processes, 2)
-    times = [[_longer(work, kind) for work in (_campaign, _arithmetic) for kind in kinds] for _ in range(REPEATS)]
-    by_dask = [math.nan]
-    if importlib.util.find_spec("distributed"):
-        from distributed import LocalCluster
+def by_dask() -> float:
+    """Speed of two Dask workers in a campaign divided by that of two processes, median; nan without Dask."""
+    if not importlib.util.find_spec("distributed"):
+        return math.nan
+    from distributed import LocalCluster
 
-        given: dict[str, Any] = {"n_workers": 2, "threads_per_worker": 1, "silence_logs": 50}
-        cluster: Any = LocalCluster(host="127.0.0.1", dashboard_address=None, **given)  # type: ignore[no-untyped-call]
-        with cluster:
-            both = kinds[1], functools.partial(dask, cluster.scheduler_address)
-            turns = [[_longer(_campaign, kind) for kind in both] for _ in times]
-        by_dask = [two / other for two, other in turns]
-    two_over_one, machine = (statistics.median(row[k] / row[k + 1] for row in times) for k in (0, 2))
-    return two_over_one, machine, statistics.median(by_dask)
+    given: dict[str, Any] = {"n_workers": 2, "threads_per_worker": 1, "silence_logs": 50}
+    cluster: Any = LocalCluster(host="127.0.0.1", dashboard_address=None, **given)  # type: ignore[no-untyped-call]
+    with cluster:
+        both = partial(processes, 2), partial(dask, cluster.scheduler_address)
+        turns = [[_campaign(kind) for kind in both] for _ in range(REPEATS)]
+    return statistics.median(two / other for two, other in turns)
 
 
-def _longer(work: Callable[[Workers, int], None], kind: Callable[[], Workers]) -> float:
-    """Time that twice the work takes more than the work: what workers take to begin and to end cancels."""
-    once, twice = (_seconds(functools.partial(lambda n: work(kind(), n), size)) for size in (1, 2))
-    return twice - once
+def _campaign(kind: Callable[[], Workers]) -> float:
+    """Time in s that a campaign of twice the tasks takes more: what workers take to begin and to end cancels."""
 
+    def run(size: int) -> None:
+        with tempfile.TemporaryDirectory() as directory, Campaign(Path(directory), kind()) as campaign:
+            campaign.complete(_tasks(4 * size * BATCH, 2.0))
 
-def _campaign(kind: Workers, size: int) -> None:
-    with tempfile.TemporaryDirectory() as directory, Campaign(Path(directory), kind) as campaign:
-        campaign.complete(_tasks(4 * size * BATCH, 2.0))
-
-
-def _arithmetic(kind: Workers, size: int) -> None:
-    executor = kind.start()
-    list(executor.map(_count, [size * COUNT] * 2))
-    kind.stop(executor, False)
-
-
-def _count(times: int) -> None:
-    for _ in range(times):
-        pass
+    return seconds(partial(run, 2)) - seconds(partial(run, 1))
 
 
 def _tasks(count: int, t_end: float = 0.01) -> list[Task]:
@@ -269,10 +239,10 @@ def bookkeeping() -> float:
             here.complete(tasks)
 
     with tempfile.TemporaryDirectory() as directory:
-        alone = functools.partial(run_batch, tasks, Storing(Path(directory), "alone"), math.inf)
+        alone = partial(run_batch, tasks, Storing(Path(directory), "alone"), math.inf)
         alone()  # imports
         for _ in range(REPEATS):
-            spent.append((-_seconds(alone, time.process_time) + _seconds(campaign, time.process_time)) / BATCH)
+            spent.append((-seconds(alone, time.process_time) + seconds(campaign, time.process_time)) / BATCH)
     return statistics.median(spent)
 
 
@@ -284,4 +254,4 @@ def resuming() -> float:
         for k in range(0, FINISHED, BATCH):
             storage.save_batch({task.key: run for task in tasks[k : k + BATCH]}, Path(directory) / f"runs-{k:024x}.h5")
         with Campaign(Path(directory), workers=0) as campaign:
-            return _seconds(functools.partial(campaign.complete, tasks))
+            return seconds(partial(campaign.complete, tasks))

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import resource
 import statistics
-import subprocess
 import sys
 import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -31,11 +28,12 @@ from compare.kit.tasks import Task, carry_out
 from model import Case, Flow, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ, TURNING
-from tests.benchmarks.program import two_processes
+from tests.benchmarks.program import REPEATS, two_against_one
+from tests.benchmarks.program import seconds as clocked
 
-REPEATS, LEAST, BEST = 5, 0.3, 1e-13
-"""Runs of which the quickest counts, more if they take less than so many seconds in all; and the tolerance of the one
-that others are held against."""
+LEAST, BEST = 0.3, 1e-13
+"""Seconds that the runs of which the quickest counts take at least, and the tolerance of the run that others are held
+against."""
 RUNS = 100
 """Random runs at once."""
 TOLERANCES = [10.0**-k for k in range(6, 14)]
@@ -256,11 +254,6 @@ def many() -> Rows:
     def at_once(threads: int = 1, method: str = "event") -> None:
         simulate_many(P, starts, 5.0, settings=Settings(method=method), sample_interval=1.0, threads=threads)
 
-    def passes(threads: int) -> float:
-        begin = time.perf_counter()
-        at_once(threads)
-        return time.perf_counter() - begin
-
     each = {name: 1e3 * seconds(way) / RUNS for name, way in (
         ("simulate, one after the other", apart),
         ("simulate_many, one thread", at_once),
@@ -279,11 +272,8 @@ def many() -> Rows:
 
     with mock.patch.object(hybrid, "compiled", return_value=timed):
         spent = 1e3 * seconds(at_once, 1) / RUNS
-    share, turns = statistics.fmean(inside) / spent, []
-    for _ in range(REPEATS):
-        before, one, two = two_processes(), passes(1), passes(2)
-        turns.append((min(before, two_processes()), one / two))
-    limit, ratio = max(turns)
+    share = statistics.fmean(inside) / spent
+    ratio, limit = two_against_one(lambda number: clocked(partial(at_once, number)))
     return [
         [f"{RUNS} random runs of 5 s", "a run, ms", "divided by one thread's"],
         *([name, f"{took:.2f}", f"{took / whole:.1f}"] for name, took in each.items()),
@@ -291,58 +281,3 @@ def many() -> Rows:
         ["speed of two threads divided by that of one", "", f"{ratio:.2f}"],
         ["two processes of bare arithmetic at that time: the machine's limit", "", f"{limit:.2f}"],
     ]
-
-
-_TIMED = """
-import sys, time
-sys.path.insert(0, "")
-import numpy as np
-from analytic import Settings, simulate, simulate_many
-from model import Flow, Parameters, State
-for line in sys.stdin:
-    p, x, t_end, flow = eval(line)
-    *lines, waves = map(np.array, flow)
-    flow = Flow("given", *lines, waves.reshape(-1, 3))
-    begin = time.process_time()
-    simulate(p, x, t_end, flow)
-    print(time.process_time() - begin, flush=True)
-"""
-"""A process that runs motions of this study by the sources in its directory and prints what each takes, s."""
-
-
-def before(directory: Path) -> Rows:
-    """How many times as long the motions take by the sources in a directory as by these, compiled and in plain Python.
-
-    Each run is followed by one of the other sources, since a machine that slows down does so for both.
-    """
-    ways = {
-        "before": (directory, {}),
-        "compiled": (Path.cwd(), {}),
-        "plain Python": (Path.cwd(), {"NUMBA_DISABLE_JIT": "1"}),
-    }
-    rows = [["times as fast as before", *list(ways)[1:]]]
-    started = {
-        name: subprocess.Popen(
-            [sys.executable, "-c", _TIMED], cwd=path, env=os.environ | more | {"PYTHONPATH": str(path)}, text=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        )
-        for name, (path, more) in ways.items()
-    }  # fmt: skip
-    for name, motion in MOTIONS.items():
-        flow = [getattr(motion.flow, key).tolist() for key in ("start", "value", "slope", "waves")]
-        p = {field.name: getattr(motion.p, field.name) for field in Parameters.quantities()} | {"drag": motion.p.drag}
-        given = f"Parameters(**{p}), State{tuple(motion.x)}, {motion.t_end}, {flow}\n"
-        turns = [{each: _answer(process, given) for each, process in started.items()} for _ in range(REPEATS + 1)][1:]
-        ratios = [statistics.median(turn["before"] / turn[way] for turn in turns) for way in list(ways)[1:]]
-        rows.append([name, *(f"{ratio:.1f}" for ratio in ratios)])
-    for process in started.values():
-        process.communicate()
-    return rows
-
-
-def _answer(process: subprocess.Popen[str], question: str) -> float:
-    assert process.stdin
-    assert process.stdout
-    process.stdin.write(question)
-    process.stdin.flush()
-    return float(process.stdout.readline())

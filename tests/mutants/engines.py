@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from functools import partial
 from typing import Any
 from unittest import mock
 
@@ -69,23 +70,15 @@ def _altered(change: Callable[[Any], None]) -> AbstractContextManager[Any]:
     return mock.patch.object(scene, "build", altered)
 
 
-def _smooth_floor() -> AbstractContextManager[Any]:
+def _smooth(model: Any) -> None:
     """The floor carries the ball, but the contact with it has no friction."""
-
-    def smooth(model: Any) -> None:
-        model.pair_friction[0] = LEAST
-
-    return _altered(smooth)
+    model.pair_friction[0] = LEAST
 
 
-def _crooked_wall() -> AbstractContextManager[Any]:
+def _turn(model: Any) -> None:
     """The plane of the wall is turned about the vertical by `CROOKED`, so that it drives the ball round."""
-
-    def turn(model: Any) -> None:
-        wall, upright = model.geom("wall"), (math.cos(CROOKED / 2), 0.0, 0.0, math.sin(CROOKED / 2))
-        mujoco.mju_mulQuat(wall.quat, upright, wall.quat.copy())
-
-    return _altered(turn)
+    wall, upright = model.geom("wall"), (math.cos(CROOKED / 2), 0.0, 0.0, math.sin(CROOKED / 2))
+    mujoco.mju_mulQuat(wall.quat, upright, wall.quat.copy())
 
 
 WRONG_ENGINES: tuple[Engine, ...] = (
@@ -93,8 +86,8 @@ WRONG_ENGINES: tuple[Engine, ...] = (
     _wrong("wall friction 1 % low", lambda p: p.replace(eta=0.99 * p.eta)),
     _wrong("inertia 1 % high", lambda p: p.replace(j=1.01 * p.j)),
     _wrong("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
-    _wrong("the friction of the floor is missing", fault=_smooth_floor),
-    _wrong("the plane of the wall turned by 0.01 rad", fault=_crooked_wall),
+    _wrong("the friction of the floor is missing", fault=partial(_altered, _smooth)),
+    _wrong("the plane of the wall turned by 0.01 rad", fault=partial(_altered, _turn)),
     _wrong("no servo of the margins", servo=0.0),
     _wrong("no memory of friction", memory=False),
     _wrong("forces taken at the beginning of a step", order=1),

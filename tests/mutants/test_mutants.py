@@ -1,8 +1,8 @@
 """Wrong theories are believed everywhere for a while, and forgotten without a trace."""
 
+import contextlib
 import dataclasses
 import importlib
-import itertools
 import os
 import subprocess
 import sys
@@ -12,17 +12,13 @@ import numpy as np
 import pytest
 
 from analytic.stationary import solutions as stationary
-from compare.catalogue import CLAIMS
-from compare.judge import verdict
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.record import Records
 from compare.subjects.stationary import claims
 from docs.studies import mutants
 from model import Parameters
-from tests.mutants import trial
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import believed, noting
 from tests.mutants.theories import FOR_TESTS, THEORIES
@@ -30,24 +26,16 @@ from tests.mutants.theories import FOR_TESTS, THEORIES
 P = Parameters.named("reference").replace(omega_0=25.0)
 
 
-def test_there_are_many_and_each_replaces_a_function_that_exists_and_gives_it_back() -> None:
-    assert len(THEORIES) >= 40
-    assert len(WRONG_ENGINES) >= 8
+def test_each_replaces_a_function_that_exists_and_gives_it_back() -> None:
+    """Also where its believer breaks down."""
     assert len({wrong.what for wrong in (*THEORIES, *FOR_TESTS)}) == len(THEORIES) + len(FOR_TESTS)
     for wrong in (*THEORIES, *FOR_TESTS):
         module = importlib.import_module(wrong.module)
         right = getattr(module, wrong.function)
-        with believed(wrong):
+        with contextlib.suppress(ZeroDivisionError), believed(wrong):
             assert getattr(module, wrong.function) is not right, wrong.what
+            raise ZeroDivisionError
         assert getattr(module, wrong.function) is right, wrong.what
-
-
-def test_a_theory_that_raises_is_given_back_too() -> None:
-    right = stationary.stable_solutions
-    with pytest.raises(ZeroDivisionError), believed(THEORIES[0]):
-        raise ZeroDivisionError
-    assert stationary.stable_solutions is right
-    assert claims.analytic.stable_solutions is right
 
 
 def test_a_function_that_is_noted_answers_as_before() -> None:
@@ -70,15 +58,6 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(wrong, tmp_path, mon
     right, other = runs[MUJOCO.name], runs[wrong.name]
     assert other.header.parameters == right.header.parameters == P
     assert np.abs(other.x - right.x).max() > 1e-6
-
-
-def test_a_prediction_that_hangs_is_no_breakdown(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The judge takes every `Exception` of a prediction for a breakdown of the theory, which would be noticed."""
-    monkeypatch.setattr(trial, "PATIENCE", 0.1)
-    formal = next(claim for claim in CLAIMS if claim.algebra)
-    claim = dataclasses.replace(formal, algebra=lambda: (None for _ in itertools.count()))
-    with pytest.raises(trial.HangError):
-        trial._patiently(lambda: verdict(claim, Records()))
 
 
 def test_subjects_name_wrong_theories_and_tests_that_there_are():

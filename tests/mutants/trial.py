@@ -7,14 +7,11 @@
 from __future__ import annotations
 
 import functools
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import FrameType
-from typing import TypeVar
 
 from compare import validation
 from compare.catalogue import CLAIMS
@@ -22,7 +19,7 @@ from compare.claim import Claim, Outcome
 from compare.judge import forget, verdict
 from compare.kit import levels
 from compare.kit.record import Records
-from compare.kit.workers import processes
+from compare.kit.workers import LateError, at_most, processes
 from compare.report import results
 from compare.witnesses import full_verdict
 from tests.mutants import engines
@@ -31,7 +28,6 @@ from tests.mutants.exchange import WrongTheory, believed, noting
 from tests.mutants.theories import THEORIES
 
 Outcomes = dict[str, Outcome]
-R = TypeVar("R")
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
 """Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
 PATIENCE = 40.0
@@ -145,10 +141,6 @@ def name_of(wrong: WrongTheory) -> str:
     return f"{wrong.module}.{wrong.function}"
 
 
-class HangError(BaseException):
-    """A prediction takes too long; no `Exception`, which the judge would take for a breakdown of the theory."""
-
-
 def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
     """The verdict on a claim by a witness; by the engine on trial if it has no name."""
     if not by:
@@ -166,27 +158,14 @@ def _theory(directory: Path, by: str, whole: bool, right: Sequence[Right], numbe
     with believed(wrong):
         for claim, known in asked if whole else sorted(asked, key=lambda pair: pair[1].took):
             try:
-                outcome = _patiently(functools.partial(_outcome, directory, by, claim))
+                with at_most(PATIENCE):
+                    outcome = _outcome(directory, by, claim)
                 noticed |= {claim.id: outcome} if outcome is not known.outcome else {}
-            except HangError:  # as when a wrong theory never comes to the end of a motion
+            except LateError:  # as when a wrong theory never comes to the end of a motion
                 hung.append(claim.id)
             if noticed and not whole:
                 break
     return Trial(wrong.what, noticed, tuple(hung))
-
-
-def _patiently(judge: Callable[[], R]) -> R:
-    """A verdict; raises `HangError` if the predictions take longer than `PATIENCE`."""
-
-    def give_up(number: int, frame: FrameType | None) -> None:
-        raise HangError
-
-    signal.signal(signal.SIGVTALRM, give_up)
-    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
-    try:
-        return judge()
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
 
 
 def _engine(directory: Path, number: int) -> Trial:
