@@ -166,3 +166,24 @@ def test_a_file_of_version_1_is_read_and_what_is_none_refused(tmp_path):
         path.write_text(text)
         with pytest.raises(error, match=says):
             read(path)
+
+
+OLD = """
+def build(case, timestep):
+    globals().update(case=case, now=0.0, timestep=timestep)
+def step(n):
+    globals().update(now=now + n * timestep)
+def state():
+    return case.exact[abs(case.times - now).argmin()].reshape(-1, 3)
+"""
+
+
+def test_an_adapter_of_version_1_takes_what_it_took_and_is_not_asked_for_more(tmp_path, monkeypatch):
+    (tmp_path / "of_version_1.py").write_text(OLD)
+    (tmp_path / "of_version_2.py").write_text(f"FEATURES = ('two bodies',){OLD}")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert run(CASES["box-stops"], "of_version_1").passed
+    asked = run(CASES["plank"], "of_version_1")
+    assert asked.skipped == "of_version_1 doesn't say in FEATURES that it can do this: two bodies"
+    assert not asked.errors
+    assert run(CASES["plank"], "of_version_2").passed

@@ -44,9 +44,13 @@ def claim(name, protocol):
     return Claim(id=name, section="Stationary states", source="(1)", statement="So it is.", bearings=(bearing,))
 
 
+MEASURED = {"round": going_round, "broken": broken, "next": going_round, "after": after}
+NEEDS = {"next": ("broken",), "after": ("round",)}
+
+
 @pytest.fixture
 def counted(monkeypatch):
-    """Three protocols and their claims in the place of the real ones; the names of those that were carried out."""
+    """Some protocols and their claims in the place of the real ones; the names of those that were carried out."""
     done = []
 
     def counting(name, measure):
@@ -54,55 +58,64 @@ def counted(monkeypatch):
             done.append(name)
             yield from measure(lab, sets, records)
 
-        return Protocol(name, carried_out, ("round",) if name == "after" else ())
+        return Protocol(name, carried_out, NEEDS.get(name, ()))
 
-    protocols = [counting("round", going_round), counting("broken", broken), counting("after", after)]
+    protocols = [counting(*each) for each in MEASURED.items()]
     monkeypatch.setattr(validation, "PROTOCOLS", tuple(protocols))
     monkeypatch.setattr(validation, "CLAIMS", tuple(claim(f"of-{p.name}", p.name) for p in protocols))
     return done
 
 
-def run(directory, **how):
-    verdicts = validation.validate(directory, level=Level.QUICK, sets=SETS, workers=0, **how)  # type: ignore[arg-type]
-    return {verdict.claim.id: verdict.outcome for verdict in verdicts}
+def run(directory, sets=SETS, **how):
+    return validation.validate(directory, level=Level.QUICK, sets=sets, workers=0, **how)
 
 
 def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_named(tmp_path, counted):
-    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0)
-    assert [verdict.outcome for verdict in verdicts] == ["confirmed", "error", "not run"]
+    """What needs a broken protocol isn't measured: it would be kept, and taken for whole once the other is mended."""
+    verdicts = run(tmp_path)
+    assert [verdict.outcome for verdict in verdicts] == ["confirmed", "error", "error", "not run"]
     assert (tmp_path / results.REPORT).exists()
     assert [*map(str, verdicts[0].missing)] == [f"undamped: {UNDAMPED}"]
     assert {check.measurement.set for check in verdicts[0].checks} == {"mine"}
+    assert counted == ["round", "broken", "after"]
 
 
 def test_an_engine_that_is_named_is_heard_alone(tmp_path, counted):
     for engine, heard in ((None, ["mujoco", "mujoco-plain", "mujoco-defaults"]), (MUJOCO, ["mujoco"])):
-        (said,) = validation.validate(
-            tmp_path, level=Level.QUICK, sets=SETS, workers=0, engine=engine, claims=["of-round"]
-        )
+        (said,) = run(tmp_path, engine=engine, claims=["of-round"])
         assert [witness.engine for witness in said.witnesses] == heard
 
 
-def test_what_needs_a_broken_protocol_is_not_measured_without_it(tmp_path, counted, monkeypatch):
-    """Else what it measured would be kept, and taken for whole once the other is mended."""
-    monkeypatch.setattr(validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("next", going_round, ("broken",))))
-    monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, claim("of-next", "next")))
-    assert run(tmp_path)["of-next"] == "error"
-    assert not [*tmp_path.glob("measurements/*/next.h5")]
-
-
 def test_only_what_a_claim_needs_and_what_is_new_is_measured(tmp_path, counted):
-    assert run(tmp_path, claims=["of-after"]) == {"of-after": "not run"}
+    """And other sets apart."""
+    assert [verdict.outcome for verdict in run(tmp_path, claims=["of-after"])] == ["not run"]
     assert counted == ["round", "after"]
     run(tmp_path)
     run(tmp_path)
     assert counted == ["round", "after", "broken", "broken"]
+    run(tmp_path, SETS | {"mine": SETS["mine"].replace(mu=0.3)})
+    assert counted.count("round") == 2
+    assert len(list(tmp_path.glob("measurements/*/round.h5"))) == 2
+
+
+def test_stored_measurements_are_judged_again(tmp_path, counted):
+    """A file that was touched, or is gone, is named."""
+    run(tmp_path)
+    (tmp_path / results.REPORT).unlink()
+    (verdict,) = validation.judge_stored(tmp_path, ["of-round"])
+    assert verdict.outcome is Outcome.CONFIRMED
+    assert (tmp_path / results.REPORT).exists()
+    assert counted == ["round", "broken", "after"]
+    (path,) = tmp_path.glob("measurements/*/round.h5")
+    for spoil in (lambda: path.write_bytes(path.read_bytes()[:-100]), path.unlink):
+        spoil()
+        with pytest.raises(StorageError, match=r"round\.h5"):
+            validation.judge_stored(tmp_path)
 
 
 def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
     """Each as soon as its protocols have measured, while others measure."""
-    seen = []
-    first = threading.Event()
+    seen, first = [], threading.Event()
 
     def announce(verdict):
         seen.append(verdict.claim.id)
@@ -112,11 +125,10 @@ def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
         assert first.wait(30)
         yield from ()
 
-    protocols = *validation.PROTOCOLS, Protocol("waiting", waiting)
-    monkeypatch.setattr(validation, "PROTOCOLS", protocols)
+    monkeypatch.setattr(validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("waiting", waiting)))
     monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, claim("of-waiting", "waiting")))
-    assert run(tmp_path, announce=announce)["of-waiting"] == "not run"
-    assert set(seen) == {"of-round", "of-broken", "of-after", "of-waiting"}
+    assert run(tmp_path, announce=announce)[-1].outcome == "not run"
+    assert set(seen) == {each.id for each in validation.CLAIMS}
     assert seen[0] != "of-waiting"
 
 
@@ -145,26 +157,6 @@ def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing
         protocol = Protocol(f"of-{name}", lambda lab, sets, records: (), alone="it is that of the reference")
         missing = programme.carry_out(protocol, lab, {name: SETS["mine"]}, Records(), tmp_path).missing
         assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
-
-
-def test_stored_measurements_are_judged_again_those_of_other_sets_apart(tmp_path, counted):
-    """A file that was touched, or is gone, is named."""
-    run(tmp_path)
-    (tmp_path / results.REPORT).unlink()
-    verdicts = validation.judge_stored(tmp_path, ["of-round"])
-    assert [verdict.outcome for verdict in verdicts] == [Outcome.CONFIRMED]
-    assert (tmp_path / results.REPORT).exists()
-    assert counted == ["round", "broken", "after"]
-    (path,) = tmp_path.glob("measurements/*/round.h5")
-    for spoil in (lambda: path.write_bytes(path.read_bytes()[:-100]), path.unlink):
-        spoil()
-        with pytest.raises(StorageError, match=r"round\.h5"):
-            validation.judge_stored(tmp_path)
-    run(tmp_path)
-    other = SETS | {"mine": SETS["mine"].replace(mu=0.3)}
-    validation.validate(tmp_path, level=Level.QUICK, sets=other, workers=0)
-    assert counted.count("round") == 3
-    assert len(list(tmp_path.glob("measurements/*/round.h5"))) == 2
 
 
 @pytest.mark.parametrize("command", ["validate", "judge"])

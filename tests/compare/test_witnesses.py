@@ -1,25 +1,18 @@
 """What other engines say is judged in limits of no step that contain the truth, of all that they were asked."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import analytic
-import tests.measured
-from analytic.bifurcation.diagram import critical_drag
-from compare.catalogue import CLAIMS
 from compare.claim import Bearing, Claim, Outcome
-from compare.judge import forget
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
 from compare.witnesses import CEILING, COARSEST, _limit, extrapolated, full_verdict
 from model import Parameters
-from tests.mutants.exchange import WrongTheory, answer, believed, entries, scaled, times
+from tests.measured import measured
 
 P = Parameters.named("reference")
 RATIOS = 1 / np.array([1.0, 2.0, 3.0, 4.0])
@@ -33,10 +26,14 @@ CLAIM = Claim(
 )
 
 
-def seen(error, engine, **conditions):
+def seen(error, **conditions):
     """A measurement of omega_c with a relative error."""
-    m = tests.measured.measured("settled", "omega_c", P.omega_0 * (1 + error), 1e-12, P, "mine", **conditions)
-    return Records((replace(m, engine=engine),))
+    return Records((measured("settled", "omega_c", P.omega_0 * (1 + error), 1e-12, P, "mine", **conditions),))
+
+
+def said(steps, trial=None, claim=CLAIM, witness="mujoco-plain"):
+    """What a witness says by its measurements at steps that are so many times shorter, beside the engine on trial."""
+    return full_verdict(claim, {"mujoco": {1: trial or seen(0.0)}, witness: steps}).witnesses[1]
 
 
 SERIES = (
@@ -89,8 +86,7 @@ def test_the_uncertainty_of_a_limit_covers_the_truth():
 )
 def test_a_claim_is_judged_in_the_limit_of_no_step(left, outcome):
     """States that differ a little with the step are the same state; at 2 ms it is off by what users see."""
-    steps = {n: seen(left + 0.01 / n, "mujoco-plain", slip_x=1.0 + 0.05 / n) for n in (1, 2, 3, 4)}
-    _, plain = full_verdict(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": steps}).witnesses
+    plain = said({n: seen(left + 0.01 / n, slip_x=1.0 + 0.05 / n) for n in (1, 2, 3, 4)})
     assert (plain.outcome, plain.left_out) == (outcome, 0)
     assert plain.order == pytest.approx(1.0, abs=1e-6)
     assert plain.typical == plain.worst == pytest.approx(left + 0.005)
@@ -102,12 +98,8 @@ def test_a_claim_is_judged_in_the_limit_of_no_step(left, outcome):
 @pytest.mark.parametrize(("left", "outcome"), [(5e-7, Outcome.CONFIRMED), (5e-6, Outcome.REFUTED)])
 def test_three_steps_show_a_limit_to_a_share_of_what_extrapolation_takes_away(left, outcome):
     """Of 3.3e-6, with a standard uncertainty of a tenth; with four steps the lesser one is noticed, too."""
-    steps = {n: seen(left + 1e-5 / n, "mujoco-plain") for n in (1, 2, 3, 4)}
-    three = {n: records for n, records in steps.items() if n < 4}
-    assert [full_verdict(CLAIM, {"mujoco-plain": each}).outcome for each in (three, steps)] == [
-        outcome,
-        Outcome.REFUTED,
-    ]
+    three, four = ({n: seen(left + 1e-5 / n) for n in range(1, most)} for most in (4, 5))
+    assert [said(three).outcome, said(four).outcome] == [outcome, Outcome.REFUTED]
 
 
 @pytest.mark.parametrize(
@@ -115,7 +107,7 @@ def test_three_steps_show_a_limit_to_a_share_of_what_extrapolation_takes_away(le
 )
 def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
     """Two that are the same don't show a limit that well, and one that moves far shows none; one that stays off is."""
-    places = [tests.measured.measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors]
+    places = [measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors]
     checks = [Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places]
     limit = _limit(list(zip((2, 3, 4), checks, strict=True)))
     assert (limit and limit[0].agrees) is agrees
@@ -124,49 +116,42 @@ def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
 @pytest.mark.parametrize(("near", "outcome"), [(0.99, Outcome.INCONCLUSIVE), (0.9, Outcome.REFUTED)])
 def test_no_limit_is_taken_next_to_a_threshold(near, outcome):
     """There the step decides on the case, and all of a state in the wrong case would be off."""
-    steps = {n: seen(0.05 + 0.01 / n, "mujoco-plain") for n in (1, 2, 3, 4)}
-    end = tests.measured.measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine")
-    _, plain = full_verdict(
-        CLAIM, {"mujoco": {1: seen(0.0, "mujoco") + Records((end,))}, "mujoco-plain": steps}
-    ).witnesses
-    assert plain.outcome == outcome
+    end = Records((measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine"),))
+    assert said({n: seen(0.05 + 0.01 / n) for n in (1, 2, 3, 4)}, seen(0.0) + end).outcome is outcome
 
 
 def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
-    steps = {n: seen(0.0, "mujoco-plain", slip_x=100.0 * (n == 1), slip_y=100.0 * (n == 2)) for n in (1, 2, 3)}
-    (plain,) = full_verdict(CLAIM, {"mujoco-plain": steps}).witnesses
+    plain = said({n: seen(0.0, slip_x=100.0 * (n == 1), slip_y=100.0 * (n == 2)) for n in (1, 2, 3)})
     assert (plain.outcome, plain.left_out) == (Outcome.INCONCLUSIVE, 1)
     assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c"
 
 
 @pytest.mark.parametrize(("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)])
 def test_an_engine_as_it_comes_may_be_off_by_its_allowance(error, outcome):
-    (said,) = full_verdict(CLAIM, {"mujoco-defaults": {2: seen(error, "mujoco-defaults")}}).witnesses
-    assert (said.outcome, said.worst) == (outcome, pytest.approx(error))
+    defaults = said({2: seen(error)}, witness="mujoco-defaults")
+    assert (defaults.outcome, defaults.worst) == (outcome, pytest.approx(error))
 
 
 def test_who_was_asked_and_measured_nothing_is_undecided_and_says_why():
-    none = {1: Records((), (Missing("settled", "mine", "nothing settles"),))}
-    other = {2: Records((), (Missing("settled", "another", "nothing settles"),))}
-    said = full_verdict(CLAIM, {"mujoco": {1: seen(0.0, "mujoco")}, "mujoco-plain": none, "mujoco-defaults": other})
-    assert said.outcome is Outcome.CONFIRMED
-    _, plain, defaults = said.witnesses
-    assert (plain.outcome, defaults.outcome) == (Outcome.INCONCLUSIVE, Outcome.NOT_ASKED)
-    assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c; mine: nothing settles"
-    assert defaults.reason == "at this level nothing that bears on the claim was asked of it; another: nothing settles"
+    for name, outcome, reason in (
+        ("mine", Outcome.INCONCLUSIVE, "too few numbers can tell: 0 of 1 in ω_c"),
+        ("another", Outcome.NOT_ASKED, "at this level nothing that bears on the claim was asked of it"),
+    ):
+        plain = said({1: Records((), (Missing("settled", name, "nothing settles"),))})
+        assert (plain.outcome, plain.reason) == (outcome, f"{reason}; {name}: nothing settles")
 
 
 @pytest.mark.parametrize(("near", "outcome"), [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE)])
 def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
     """Of three states, one or two so near a threshold that the step may decide on their case."""
-    ends = Records((tests.measured.measured("thresholds", "omega_01", 2 * P.omega_0, 1e-6, P, "mine"),))
+    ends = Records((measured("thresholds", "omega_01", 2 * P.omega_0, 1e-6, P, "mine"),))
     flows = [P.omega_0] * (3 - near) + [2 * P.omega_0] * near
     rows = [
-        tests.measured.measured("settled", "omega_c", flow, 1e-12, P.replace(omega_0=flow), "mine", start=f"{k}")
+        measured("settled", "omega_c", flow, 1e-12, P.replace(omega_0=flow), "mine", start=f"{k}")
         for k, flow in enumerate(flows)
     ]
     own = Records(tuple(rows))
-    _, plain = full_verdict(CLAIM, {"mujoco": {1: own + ends}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
+    plain = said(dict.fromkeys((1, 2, 3), own), own + ends)
     assert (plain.outcome, plain.left_out) == (outcome, near)
 
 
@@ -178,62 +163,8 @@ def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost, outc
     flow = Bearing("thresholds", "omega_03", lambda m: m.parameters.omega_0)
     claim = replace(CLAIM, bearings=(Bearing("thresholds", "lifts", lambda m: 1.0), flow))
     sets = ("one", "another", "third")
-    counts = tuple(tests.measured.measured("thresholds", "lifts", 1.0, 0.0, P, name) for name in sets)
-    flows = tuple(tests.measured.measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)
-    trial, own = Records(counts + flows), Records(counts + flows[lost:])
-    _, plain = full_verdict(claim, {"mujoco": {1: trial}, "mujoco-plain": dict.fromkeys((1, 2, 3), own)}).witnesses
-    assert plain.outcome is outcome
+    counts = tuple(measured("thresholds", "lifts", 1.0, 0.0, P, name) for name in sets)
+    flows = tuple(measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)
+    own = Records(counts + flows[lost:])
+    assert said(dict.fromkeys((1, 2, 3), own), Records(counts + flows), claim).outcome is outcome
     assert full_verdict(claim, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN  # counts confirm no number
-
-
-SETS = {name: Parameters.named(name).replace(omega_0=1.0) for name in ("reference", "high-wall-friction")}
-FLOWS = "omega_01", "omega_02", "omega_03", "omega_04"
-
-
-def flows(engine, error, *lost):
-    """Thresholds of two sets, of which one lifts off, and of the first the drag at which its fold is born."""
-    rows = [
-        tests.measured.measured("birth", "critical_drag", critical_drag(SETS["reference"]), 1e-6, SETS["reference"])
-    ]
-    for name, p in SETS.items():
-        known = analytic.thresholds(p)
-        place = {"p": p, "set": name, "by": "", "side": ""}
-        rows.append(tests.measured.measured("thresholds", "lifts", p.eta > p.j, **place))
-        if p.eta < p.j:
-            rows.append(tests.measured.measured("thresholds", "folds", math.isfinite(known.omega_04), **place))
-        values = {flow: getattr(known, flow) * (1 + error) for flow in FLOWS if math.isfinite(getattr(known, flow))}
-        rows += [
-            tests.measured.measured("thresholds", flow, value, 1e-8, **place | {"p": p.replace(omega_0=value)})
-            for flow, value in values.items()
-        ]
-    return Records(tuple(replace(m, engine=engine) for m in rows if m.quantity not in lost))
-
-
-@pytest.mark.parametrize(
-    ("function", "wrong", "lost", "named"),
-    [
-        ("bifurcation.diagram.threshold_curves", answer(entries(omega_03=times(2.0))), "omega_03", "table-5-NT1"),
-        ("bifurcation.diagram.threshold_curves", answer(entries(omega_04=times(2.0))), "omega_04", "table-5-F"),
-        ("bifurcation.diagram.threshold_curves", answer(entries(omega_02=times(1.01))), "omega_02", "table-5-P2"),
-        ("stationary.slipping_branch.eta_critical", scaled(4.0), "critical_drag", "eta-critical"),
-    ],
-    ids=["ω₀₃ doubled", "ω₀₄ doubled", "ω₀₂ + 1 %", "η_cr × 4"],
-)
-def test_no_claim_that_a_fault_refutes_stays_confirmed_by_a_witness(function, wrong, lost, named):
-    """Whether it measured what the fault is about, with errors of first order in the step, or not."""
-    trial, steps = {"mujoco": {1: flows("mujoco", 0.0)}}, (1, 2, 3, 4)
-    asked = [claim for claim in CLAIMS if claim.protocols & {"thresholds", "birth"}]
-    whole = trial | {"mujoco-plain": {n: flows("mujoco-plain", 1e-3 / n) for n in steps}}
-    part = trial | {"mujoco-plain": {n: flows("mujoco-plain", 1e-3 / n, lost) for n in steps}}
-    right = {claim.id: full_verdict(claim, whole) for claim in asked}
-    assert right[named].witnesses[1].outcome is Outcome.CONFIRMED
-    forget()
-    module, _, name = f"analytic.{function}".rpartition(".")
-    with believed(WrongTheory("", module, name, wrong)):
-        for testimony, said in ((whole, Outcome.REFUTED), (part, Outcome.INCONCLUSIVE)):
-            heard = {claim.id: full_verdict(claim, testimony) for claim in asked}
-            about = [each for each in heard if heard[each].outcome is not right[each].outcome]
-            assert named in about
-            assert heard[named].witnesses[1].outcome is said
-            assert not [each for each in about if heard[each].witnesses[1].outcome is Outcome.CONFIRMED]
-    forget()
