@@ -25,15 +25,26 @@ SCENE = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
 <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>"""
 
 
+def carried_out(capsys: pytest.CaptureFixture[str], *argv: object) -> tuple[int, str, str]:
+    """The exit code of a command, given in a line or by its words, what it prints, and what it says of trouble."""
+    capsys.readouterr()
+    words = str(argv[0]).split() if len(argv) == 1 else map(str, argv)
+    return cli.main([*words]), *capsys.readouterr()
+
+
+def told(capsys: pytest.CaptureFixture[str], line: str) -> str:
+    """What a command prints that does what it should, with single spaces."""
+    code, out, err = carried_out(capsys, line)
+    assert code == 0, err
+    return " ".join(out.split())
+
+
 def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
     """The one line in which a command refuses its arguments."""
-    code = cli.main([str(arg) for arg in argv])
-    captured = capsys.readouterr()
-    assert code == 2
-    assert captured.out == ""
-    assert captured.err.startswith("dualball: error: ")
-    assert captured.err.count("\n") == 1
-    return captured.err
+    code, out, err = carried_out(capsys, *argv)
+    assert (code, out, err.count("\n")) == (2, "", 1), err
+    assert err.startswith("dualball: error: ")
+    return err
 
 
 def parser_of(command: str) -> options.Parser:

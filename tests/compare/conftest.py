@@ -3,10 +3,12 @@
 import dataclasses
 import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+import analytic
 from compare.gallery import FIGURES
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import GapError
@@ -14,6 +16,8 @@ from compare.kit.engines import EVENT
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.report import report
+from model import Parameters, storage
+from tests.commands import METER, SCENE
 
 
 def lacking(_: object) -> None:
@@ -30,6 +34,21 @@ def few_figures() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session")
+def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with what commands read, to be copied."""
+    made = tmp_path_factory.mktemp("stocked")
+    p = Parameters.named("reference").replace(omega_0=25.0)
+    for name, mu in (("run", p.mu), ("runs/one", p.mu), ("runs/other", 0.3)):
+        (made / name).parent.mkdir(exist_ok=True)
+        storage.save(analytic.simulate(p.replace(mu=mu), [0] * 6, 1.0), made / f"{name}.h5")
+    Parameters.named("steel-in-water").save(made / "set.toml")
+    (made / "flow.csv").write_text("time (s); omega_0 (rad/s)\n0; 10,5\n1; 20\n")
+    (made / "scene.xml").write_text(SCENE)
+    (made / "meter.toml").write_text(METER)
+    return made
+
+
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
     """Where protocols run the event-driven simulation, the quickest engine, at the quick level."""
@@ -39,7 +58,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Chromium, without a window; contexts and pages of it may have nothing to complain of."""
+    """Chromium, without a window."""
     playwright = pytest.importorskip("playwright.sync_api")
     path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if path is None:
@@ -50,3 +69,14 @@ def browser() -> Iterator[Any]:
         )
         yield chromium
         chromium.close()
+
+
+@pytest.fixture
+def tab(browser: Any) -> Iterator[Any]:
+    """A page that may have nothing to complain of and asks the network for nothing."""
+    page, wrong = browser.new_page(viewport={"width": 1200, "height": 844}), list[str]()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda request: wrong.append(request.url) if request.url.startswith("http") else None)
+    yield page
+    page.close()
+    assert not wrong

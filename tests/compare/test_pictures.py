@@ -1,22 +1,17 @@
 """Pictures on pages hold series and scales, and a browser makes of them what a reader can play with."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 from matplotlib.figure import Figure
 
-from compare.commands import cli
 from compare.commands.bench import LEAGUE_PAGE
-from compare.kit import pages
 from compare.kit.pictures import embedded, plain, svg
+from tests.commands import told
 
 
-def made() -> Figure:
+def made():
     figure = Figure(figsize=(4, 3))
     axes = figure.add_subplot()
     axes.plot([1.0, 10.0], [0.0, 4.0], label="_a line")
@@ -25,7 +20,7 @@ def made() -> Figure:
     return figure
 
 
-def test_series_and_scales_are_in_the_picture() -> None:
+def test_series_and_scales_are_in_the_picture():
     text = svg(made())
     assert text == svg(made())  # equal figures give equal text
     series = re.findall('data-series="([^"]*)"', text)
@@ -36,7 +31,7 @@ def test_series_and_scales_are_in_the_picture() -> None:
     ElementTree.fromstring(text)
 
 
-def test_marks_that_look_alike_are_one_path() -> None:
+def test_marks_that_look_alike_are_one_path():
     figure = Figure(figsize=(2, 2))
     figure.add_subplot().plot(range(30), range(30), "o", label="many")
     text = svg(figure)
@@ -45,7 +40,7 @@ def test_marks_that_look_alike_are_one_path() -> None:
     assert text.count("<use") < 20  # of ticks
 
 
-def test_pictures_of_a_page_share_letters_and_nothing_else() -> None:
+def test_pictures_of_a_page_share_letters_and_nothing_else():
     pictures, letters = embedded({"a": svg(made()), "b": svg(made())})
     of = {name: set(re.findall('id="([^"]*)"', text)) for name, text in pictures.items()}
     there = set(re.findall('id="([^"]*)"', letters))
@@ -65,46 +60,32 @@ def test_pictures_of_a_page_share_letters_and_nothing_else() -> None:
         ("plain", "plain"),
     ],
 )
-def test_labels_are_read_without_tex(label: str, read: str) -> None:
+def test_labels_are_read_without_tex(label, read):
     assert plain(label) == read
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_the_league_page_answers(browser: Any, tmp_path: Path) -> None:
-    """Values under the pointer, a series switched off, zoom; without scripts the picture; and no network."""
+def test_the_league_page_answers(browser, tab, tmp_path, capsys):
+    """Values under the pointer, a series switched off, zoom; without scripts the picture."""
     names = [f"tests.compare.test_runner:{name}" for name in ("EXACT", "ROUGH")]
-    words = ["league", "--quick", "--engine", names[0], "--engine", names[1], "--workers", "1", "--quiet"]
-    assert cli.main([*words, "-o", str(tmp_path)]) == 0
-    page = browser.new_page()
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    page.on("pageerror", lambda error: pytest.fail(str(error)))
-    page.goto((tmp_path / LEAGUE_PAGE).as_uri())
-    figure = page.locator("figure.plot")
+    told(capsys, f"league --quick --engine {names[0]} --engine {names[1]} --workers 1 --quiet -o {tmp_path}")
+    page = tmp_path / LEAGUE_PAGE
+    assert "Copyright Timmy Willison" in page.read_text("utf-8")  # of what zooms
+    tab.goto(page.as_uri())
+    figure = tab.locator("figure.plot")
     figure.scroll_into_view_if_needed()
     figure.locator(".series label").first.wait_for()  # a figure answers from when it is first seen
     assert figure.locator(".series label").all_inner_texts() == names
     mark = figure.locator(f'[data-series="{names[1]}"] use').first
     place = mark.bounding_box()
-    page.mouse.move(place["x"] + place["width"] / 2, place["y"] + place["height"] / 2)
+    tab.mouse.move(place["x"] + place["width"] / 2, place["y"] + place["height"] / 2)
     assert figure.locator("output").inner_text().startswith(names[1])
     figure.get_by_label(names[1]).uncheck()
     assert not mark.is_visible()
     figure.get_by_label("closer").click()
-    page.wait_for_timeout(300)
+    tab.wait_for_timeout(300)
     assert "scale(1" in figure.locator("svg").evaluate("picture => picture.style.transform")
-    assert len(asked) == 1  # the file
-    page.close()
     dumb = browser.new_context(java_script_enabled=False).new_page()
-    dumb.goto((tmp_path / LEAGUE_PAGE).as_uri())
+    dumb.goto(page.as_uri())
     assert dumb.locator("figure.plot svg").bounding_box()["height"] > 100
     dumb.context.close()
-
-
-def test_scripts_are_whole() -> None:
-    """Nothing in them ends the element that they stand in, and the library says whose it is."""
-    empty = {key: [["a"]] for key in ("summary", "rows", "about")} | {"failed": [], "notes": []}
-    texts = {"caption": "", "least": "", "letters": "", "picture": "<svg/>"}
-    shown = pages.render("compare.bench", "league.html", **empty, **texts)
-    assert shown.count("<script") == shown.count("</script>") == 2
-    assert "Copyright Timmy Willison" in shown

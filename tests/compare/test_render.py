@@ -2,7 +2,6 @@
 
 import dataclasses
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,24 +10,24 @@ from PIL import Image
 
 import analytic
 import mjsim
-from compare.commands import cli
 from compare.kit import style
 from compare.view import geometry, render
-from model import Case, InputError, Parameters, Trajectory, storage
+from model import Case, InputError, Parameters, storage
 from model.kinematics import angular_velocity
+from tests.commands import told
 
 WIDTH = 320
 
 
 @pytest.fixture(scope="module")
-def run() -> Trajectory:
+def run():
     """Two-point slipping, and rolling before."""
     p = Parameters.named("reference").replace(omega_0=25.0)
     return mjsim.simulate(p, [0, 0, 13.0, 0, 0, 0], 0.8, sample_interval=0.01)
 
 
 @pytest.fixture
-def draws() -> None:
+def draws():
     render.choose_opengl.cache_clear()
     try:
         render.choose_opengl()
@@ -36,28 +35,16 @@ def draws() -> None:
         pytest.skip(str(error))
 
 
-@pytest.fixture
-def picture(tmp_path: Path, draws: None) -> Callable[..., Image.Image]:
-    """A picture of a run at a time in s, small."""
-
-    def drawn(run: Trajectory, at: float | None, **arrows: float) -> Image.Image:
+def test_a_picture_shows_the_case_and_the_ball_moves(run, draws, tmp_path):
+    def picture(run, at, **arrows):
         render.write(run, tmp_path / "p.png", at, WIDTH, **arrows)
         return Image.open(tmp_path / "p.png").convert("RGB")
 
-    return drawn
-
-
-def sign(image: Image.Image) -> str:
-    """Colour of the sign with the case, beside its letters."""
-    unit = image.width / 960
-    return "#{:02x}{:02x}{:02x}".format(*image.getpixel((round(27 * unit), round(50 * unit))))
-
-
-def test_a_picture_shows_the_case_and_the_ball_moves(run: Trajectory, picture: Callable[..., Image.Image]) -> None:
-    early, late = picture(run, 0.1), picture(run, None)
+    early, late, unit = picture(run, 0.1), picture(run, None), WIDTH / 960
     assert early.size == (WIDTH, WIDTH * 10 // 16)
-    cases = [Case(run.case[np.searchsorted(run.time, 0.1)]), Case(run.case[-1])]
-    assert [sign(early), sign(late)] == [style.COLOURS[case].lower() for case in cases]
+    for image, k in ((early, np.searchsorted(run.time, 0.1)), (late, -1)):
+        beside_letters = image.getpixel((round(27 * unit), round(50 * unit)))
+        assert "#{:02x}{:02x}{:02x}".format(*beside_letters) == style.COLOURS[Case(run.case[k])].lower()
     assert np.mean(np.asarray(early) != np.asarray(late)) > 0.01
     assert picture(run, None, force_arrow=0.0, slip_arrow=0.0) != late
     # A run of another engine is shown in the scene of its parameters.
@@ -66,21 +53,17 @@ def test_a_picture_shows_the_case_and_the_ball_moves(run: Trajectory, picture: C
     assert picture(event, 0.3).size == early.size
 
 
-@pytest.mark.usefixtures("draws")
-def test_command_writes_pictures_and_films(run: Trajectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file, film = tmp_path / "run.h5", tmp_path / "film.gif"
+def test_the_command_writes_pictures_and_films(run, draws, tmp_path, capsys):
+    file, film, picture = tmp_path / "run.h5", tmp_path / "film.gif", tmp_path / "p.png"
     storage.save(run, file)
-    options = ["--at", "0.2", "--time", "0.4", "--speed", "0.5", "--rate", "10", "--width", str(WIDTH)]
-    assert cli.main(["render", str(file), "-o", str(film), *options]) == 0
+    told(capsys, f"render {file} -o {film} --at 0.2 --time 0.4 --speed 0.5 --rate 10 --width {WIDTH}")
     with Image.open(film) as frames:
         assert frames.n_frames == 5  # both ends of 0.4 s at 10 a second
         assert frames.info["duration"] == 100
-    assert cli.main(["render", str(file), "-o", str(tmp_path / "p.png"), "--at", "0.5", "--width", str(WIDTH)]) == 0
-    assert "320 × 200" in capsys.readouterr().out
+    assert "320 × 200" in told(capsys, f"render {file} -o {picture} --at 0.5 --width {WIDTH}")
 
 
-@pytest.mark.usefixtures("draws")
-def test_a_film_as_mp4(run, tmp_path, monkeypatch):
+def test_a_film_as_mp4(run, draws, tmp_path, monkeypatch):
     """Of even size, as its standard wants it: 330 × 206 of 331 × 206."""
     av, film = pytest.importorskip("av"), tmp_path / "film.mp4"
     assert render.write(run, film, at=0.2, time=0.4, speed=0.5, rate=10, width=331) == f"{film}: 5 frames"
@@ -96,39 +79,24 @@ def test_a_film_as_mp4(run, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_page_plays_in_a_browser_without_network(browser, run, tmp_path):
-    """Frames, numbers and the case follow the slider; nothing is fetched, nothing fails."""
+def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
+    """Frames, numbers and the case follow the slider."""
     pytest.importorskip("nicegui")
     file = tmp_path / "run.html"
     assert render.write(run, file, at=0.1, speed=0.5, rate=50).endswith(": 71 frames")  # ends of 0.7 s of the run
     assert file.stat().st_size < 3e6
-    page, wrong, fetched = browser.new_page(), list[str](), list[str]()
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("request", lambda request: fetched.append(request.url))
-    page.goto(file.as_uri())
-    page.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
+    tab.goto(file.as_uri())
+    tab.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
     for k, time in ((0, 0.1), (70, 0.8)):
-        page.locator("#place").fill(str(k))
-        page.wait_for_function(f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')")
+        tab.locator("#place").fill(str(k))
+        tab.wait_for_function(f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')")
         now = geometry.resampled(run, np.array([time]))
-        assert page.locator("#case").inner_text() == Case(now.case[0]).name
-        assert f"ωc = {now.omega_c[0]:.2f} rad/s" in page.locator("#numbers").inner_text()
-    assert page.locator("#play").inner_text() == "Play"
-    page.close()
-    assert not wrong
-    assert [url for url in fetched if not url.startswith(("file:", "data:", "blob:"))] == []
+        assert tab.locator("#case").inner_text() == Case(now.case[0]).name
+        assert f"ωc = {now.omega_c[0]:.2f} rad/s" in tab.locator("#numbers").inner_text()
+    assert tab.locator("#play").inner_text() == "Play"
 
 
-def test_a_page_without_what_it_needs(run: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"1\.6e\+04 frames are more than 8000: choose a shorter time, or"):
-        render.write(run, tmp_path / "run.html", speed=0.05, rate=1000)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'"):
-        render.write(run, tmp_path / "run.html", rate=10)
-    assert not list(tmp_path.iterdir())
-
-
-def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None:
+def test_the_ball_turns_with_its_angular_velocity(reference):
     """Rolling steadily, about an axis that itself goes round: the mean turn about z is that of o_y."""
     p, x = reference.replace(omega_0=5.0), np.array([0, 0, 5.0, 0, 0, 0])
     run = mjsim.simulate(p, x, 0.05, sample_interval=0.005)
@@ -138,7 +106,7 @@ def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None
     assert step == pytest.approx(float(np.linalg.norm(angular_velocity(x, p))), rel=(5.0 * 5e-3) ** 2)
 
 
-def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
+def test_a_run_is_shown_between_its_samples(run):
     between = geometry.resampled(run, np.array([0.104, 0.8]))
     assert between.omega_c == pytest.approx([0.6 * run.omega_c[10] + 0.4 * run.omega_c[11], run.omega_c[-1]])
     assert between.force_A[1] == pytest.approx(run.force_A[-1])
@@ -156,23 +124,26 @@ def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
         ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
         ("p.gif", {"at": 2.0}, "at = 2 s is out of range"),
         ("p.gif", {"speed": 0.0}, "speed = 0 is out of range"),
+        ("p.html", {"speed": 0.05, "rate": 1000}, r"1\.6e\+04 frames are more than 8000: choose a shorter time, or"),
+        ("p.html", {"rate": 10}, r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'"),
     ],
 )
-def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name: str, options: dict, message: str) -> None:
+def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name, options, message):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match=message):
         render.write(run, Path(name), **options)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_scene_without_a_ball(run: Trajectory, tmp_path: Path) -> None:
+def test_a_scene_without_a_ball(run, tmp_path):
     for mjcf, message in (("<mujoco/>", "no geom named 'ball'"), ("<mujoco", "no valid MJCF")):
         other = dataclasses.replace(run, header=dataclasses.replace(run.header, mjcf=mjcf))
         with pytest.raises(InputError, match=message):
             render.write(other, tmp_path / "p.png", 0.0, WIDTH)
 
 
-def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch):
     monkeypatch.setattr(render, "works", lambda name: False)
     monkeypatch.setattr("platform.system", lambda: "Linux")
     for chosen, message in (("", "apt-get install libegl1"), ("glfw", "unset MUJOCO_GL = 'glfw'")):

@@ -3,13 +3,11 @@
 from contextlib import nullcontext
 
 import numpy as np
-import pytest
 
 import mjsim
-from compare.commands import cli
 from compare.view import viewer
 from mjsim import ContactSettings, recorder
-from model import Flow, Parameters
+from model import Flow
 from model.kinematics import rotated
 
 
@@ -36,7 +34,7 @@ class Window:
         pass
 
 
-def test_the_loop_is_that_of_a_simulation(reference: Parameters, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_loop_is_that_of_a_simulation(reference, monkeypatch):
     p, x0 = reference.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0]
     flow, settings = Flow.ramp(20.0, 25.0, 0.3), ContactSettings()
     stepper, window = viewer.start(p, x0, flow, settings), Window(33)
@@ -52,26 +50,10 @@ def test_the_loop_is_that_of_a_simulation(reference: Parameters, monkeypatch: py
     np.testing.assert_array_less(np.abs(recorder.state(place, qvel, p) - run.x[-1]), 4 * np.finfo(float).eps * scale)
 
 
-def test_a_slow_machine_does_not_run_after_the_clock(reference: Parameters, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_machine_does_not_run_after_the_clock(reference, monkeypatch):
     settings = ContactSettings()
     flow, window = Flow.steady(12.0), Window(4, takes=3.0)
     stepper = viewer.start(reference, [0, 0, 12.0, 0, 0, 0], flow, settings)
     monkeypatch.setattr(viewer, "time", window)
     steps = viewer.run(window, stepper, flow, settings.timestep, 1.0)
     assert steps == 3 * round(viewer.BEHIND / settings.timestep)
-
-
-def test_what_serves_contact_alone_is_out_of_sight(reference: Parameters) -> None:
-    stepper = viewer.start(reference, np.zeros(6), Flow.steady(12.0), ContactSettings())
-    assert stepper.engine.model.geom("wall").rgba[3] == 0
-
-
-def test_no_display_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("platform.system", lambda: "Linux")
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    assert cli.main(["simulate", "--view", "--omega-0", "20"]) == 2
-    shown = capsys.readouterr().err
-    assert "there is no display" in shown
-    assert shown.count("\n") == 1
-    assert cli.main(["simulate", "--view", "--speed", "0"]) == 2
