@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from compare.adapters.scene import upright
-from compare.bench import run
+from compare.bench import cases, run
+from compare.bench.case import TOLERANCE
 from compare.bench.runner import EngineProcess
 from model.kinematics import rotated
 from tests.exact_cases import CASES
@@ -32,17 +33,28 @@ def test_an_engine_reaches_its_order(name):
     assert run(CASES["lands"], f"{OWN}.{name}:defaults", steps=(2e-3,)).error < 2
 
 
-def test_what_spins_and_rolls_has_second_order():
+@pytest.fixture(scope="module")
+def mujoco():
+    with closing(EngineProcess(f"{OWN}.mujoco_free:best")) as trial:
+        yield trial
+
+
+def test_under_coulombs_law_mujoco_is_right_in_every_case(mujoco):
+    """At 2 ms by half of what passes at 1 ms."""
+    for case in cases():
+        assert mujoco.result(case, (2e-3,)).error < TOLERANCE / 2, case.name
+
+
+def test_what_spins_and_rolls_has_second_order(mujoco):
     """A disc on its rim, whose gyroscopic moments are as large as those of its contact (1.6e-2 without these)."""
-    coarse, fine = run(CASES["rolling-disc"], f"{OWN}.mujoco_free:best", steps=(4e-3, 2e-3)).errors
+    coarse, fine = mujoco.result(CASES["rolling-disc"], (4e-3, 2e-3)).errors
     assert coarse < 1e-3
     assert coarse / fine > 3.5
 
 
-def test_landings_are_late_by_a_part_of_a_step():
+def test_landings_are_late_by_a_part_of_a_step(mujoco):
     """A blow that lifts the ball off its floor: else gravity has it for up to a step and a half before, 2e-2."""
-    errors = run(CASES["hits-the-wall"], f"{OWN}.mujoco_free:best", steps=(1.09e-3, 1e-3, 0.93e-3)).errors
-    assert max(errors) < 2.5e-3
+    assert max(mujoco.result(CASES["hits-the-wall"], (1.09e-3, 1e-3, 0.93e-3)).errors) < 2.5e-3
 
 
 @pytest.mark.slow  # they compile for minutes where they haven't run before

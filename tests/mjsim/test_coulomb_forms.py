@@ -1,7 +1,9 @@
 """Coulomb's law does the same compiled and as it stands, in scenes of all kinds, and goes on from a state."""
 
+import contextlib
 import importlib.util
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
@@ -78,21 +80,13 @@ def plain():
 def run(monkeypatch, form, model, law, steps, installed=False):
     """Positions and velocities after each step, and what is remembered at the end."""
     monkeypatch.setattr(doors, "compiled", form)
-    data, path = mujoco.MjData(model), []
+    data, path, coulomb = mujoco.MjData(model), [], Coulomb(model, **law)
     data.qvel[0] = 0.5
-    coulomb = Coulomb(model, **law)
-    if installed:
-        with coulomb.installed():
-            for _ in range(steps):
-                mujoco.mj_step(model, data)
-                path.append(np.append(data.qpos, data.qvel))
-            state = coulomb.state()
-    else:
+    with coulomb.installed() if installed else contextlib.nullcontext():
         for _ in range(steps):
-            coulomb.step(data)
+            mujoco.mj_step(model, data) if installed else coulomb.step(data)
             path.append(np.append(data.qpos, data.qvel))
-        state = coulomb.state()
-    return np.array(path), state
+        return np.array(path), coulomb.state()
 
 
 def check_same(monkeypatch, plain, make, law, steps=40, installed=False):
@@ -126,18 +120,21 @@ def test_projected_solver_agrees(monkeypatch, plain, cone):
 @pytest.mark.parametrize(("law", "cone"), [({}, "elliptic"), ({"rigid": True}, "pyramidal")], ids=str)
 @pytest.mark.parametrize("name", ["pile, condim 6", "dry joints", "sparse"])
 def test_restored_to_the_bit(name, law, cone):
+    """Others that go on from a state, each in a thread of its own."""
     model = scene(name, cone)
-    data, again = mujoco.MjData(model), mujoco.MjData(model)
-    coulomb, restored = Coulomb(model, **law), Coulomb(model, **law)
+    data, coulomb = mujoco.MjData(model), Coulomb(model, **law)
     coulomb.step(data, 60)
-    restored.restore(coulomb.state())
-    mujoco.mj_copyData(again, model, data)
+    others = [(Coulomb(model, **law), mujoco.MjData(model)) for _ in range(3)]
+    for restored, again in others:
+        restored.restore(coulomb.state())
+        mujoco.mj_copyData(again, model, data)
     coulomb.step(data, 60)
-    restored.step(again, 60)
-    assert np.array_equal(data.qpos, again.qpos)
-    assert np.array_equal(data.qvel, again.qvel)
-    ours, theirs = coulomb.state(), restored.state()
-    assert all(np.array_equal(ours[name], theirs[name]) for name in ours)
+    with ThreadPoolExecutor(3) as pool:
+        list(pool.map(lambda other: other[0].step(other[1], 60), others))
+    for restored, again in others:
+        np.testing.assert_array_equal(np.append(again.qpos, again.qvel), np.append(data.qpos, data.qvel))
+        for kept, ours in zip(restored.state().values(), coulomb.state().values(), strict=True):
+            np.testing.assert_array_equal(kept, ours)
 
 
 def test_other_time_forgets_once():

@@ -1,5 +1,6 @@
 """The law serves with numba and without it, and says so where MuJoCo is another one than it knows."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -44,16 +45,22 @@ def test_loops_serve_as_they_stand(before):
     assert serves(before) == "as it stands"
 
 
+NAME = f"MuJoCo {mujoco.__version__}"
+STRUCTS = "import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fields = {}\n"
+
+
 @pytest.mark.parametrize(
-    ("fields", "says"),
-    [("[f for f in d.fields if f.name != 'time']", "which has no time"), ("d.fields[::-1]", "doesn't lie in memory")],
+    ("before", "says"),
+    [
+        (STRUCTS.format("[f for f in d.fields if f.name != 'time']"), f"{NAME}.* which has no time"),
+        (STRUCTS.format("d.fields[::-1]"), f"{NAME}.* doesn't lie in memory"),
+        ("import mujoco; mujoco.__version__, mujoco.MjModel = '3.3.0', object\n", "needs MuJoCo 4.0, and this is 3.3"),
+    ],
 )
-def test_another_mujoco_is_named(fields, says):
-    before = f"import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fields = {fields}\n"
+def test_another_mujoco_is_named(before, says):
     done = subprocess.run([sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 1
-    assert f"MuJoCo {mujoco.__version__}" in done.stderr.splitlines()[-1]
-    assert says in done.stderr.splitlines()[-1]
+    assert re.search(says, done.stderr.splitlines()[-1])
 
 
 @pytest.mark.slow  # it compiles
@@ -65,12 +72,6 @@ def test_compiled_loops_need_no_place_for_a_cache():
         "    vars(caching).get(name, type('', (), {}))._locator_classes = []\n"
     )
     assert serves(before) == "compiled"
-
-
-def test_an_older_mujoco_is_named():
-    before = "import mujoco; mujoco.__version__, mujoco.MjModel = '3.3.0', object; "
-    done = subprocess.run([sys.executable, "-c", before + "import mjsim"], cwd=ROOT, capture_output=True, text=True)
-    assert done.stderr.splitlines()[-1].startswith("ImportError: dualball needs MuJoCo 4.0, and this is 3.3.0")
 
 
 def test_both_wheels_have_one_version():
