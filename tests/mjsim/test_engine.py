@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import mjsim
+from compare.kit.engines import as_it_comes
 from mjsim import ContactSettings, compiled, scene, stepping
 from model import Case, Flow, InputError, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
@@ -92,12 +93,14 @@ def test_runs_need_all_that_makes_them() -> None:
             mjsim.simulate_many(sets, x0s, 0.1, flow)
 
 
-def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:
-    wild = [0, 0, 1e9, 0, 0, 0]
+@pytest.mark.parametrize("settings", [None, RIGID, as_it_comes(1e-3)], ids=["joints", "free", "facets"])
+@pytest.mark.parametrize("omega_c", [1e6, 1e9])
+def test_divergence_stops_a_run_and_keeps_what_there_is(settings, omega_c) -> None:
+    wild = [0, 0, omega_c, 0, 0, 0]
     with pytest.raises(SimulationError, match=r"diverged by t = .* s") as caught:
-        mjsim.simulate(P, wild, 0.1)
+        mjsim.simulate(P, wild, 0.1, settings=settings)
     assert caught.value.trajectory.header.failure
-    failed, sound = mjsim.simulate_many([P, P], [wild, [0, 0, 1, 0, 0, 0]], 0.1)
+    failed, sound = mjsim.simulate_many([P, P], [wild, [0, 0, 1, 0, 0, 0]], 0.1, settings=settings)
     assert not failed.complete
     assert sound.complete
     assert len(sound.time) == 101

@@ -94,12 +94,3 @@ def test_a_state_amid_a_landing_is_taken_up_to_the_bit() -> None:
         ball.advance(fluid[:5], rows[:5])
     for name, values in one.state().items():
         np.testing.assert_array_equal(other.state()[name], values, err_msg=name)
-
-
-def test_landings_do_not_depend_on_those_of_others_in_a_batch() -> None:
-    settings, higher = ContactSettings.for_problem(HOPS, 5e-4), [START[0] + 2e-5, *START[1:]]  # lands a little later
-    alone, beside = (
-        mjsim.simulate_many([HOPS] * len(x0s), x0s, LASTS, settings=settings, sample_interval=0.01)
-        for x0s in ([START], [START, higher])
-    )
-    np.testing.assert_array_equal(beside[0].x, alone[0].x)
