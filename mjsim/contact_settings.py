@@ -28,14 +28,13 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from mjsim.coulomb.law import Law
 from model import InputError, Parameters
 from model.arrays import Array, Real
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
-FORESEEN = Law.share / 5
-"""Share of a force to which a step knows what rigid contacts slip. (A fifth was chosen after the slip of a rolling ball
-had been seen, which is a tenth of that.)"""
+FORESEEN = 0.01
+"""Share of a force to which a step knows what rigid contacts slip: a fifth of `Law.share` of mjsim.coulomb, by a test.
+(A fifth was chosen after the slip of a rolling ball had been seen, which is a tenth of that.)"""
 _LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
 """`contact_decay` beyond which contacts are made slower; and `solref` with its time in steps, the fastest first: stable
 up to mu eta = 1.03, 2.1, 5 and 9."""

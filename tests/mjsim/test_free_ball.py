@@ -7,6 +7,8 @@ import analytic
 import mjsim
 from compare.kit.engines import COULOMB, as_it_comes
 from mjsim import compiled, free
+from mjsim.contact_settings import FORESEEN
+from mjsim.coulomb.law import Law
 from model import Case, Parameters, State
 
 P = Parameters.named("reference")
@@ -63,6 +65,10 @@ def test_what_rolls_on_the_wall_and_slides_on_the_floor_goes_on_in_short_steps(s
     run = mjsim.simulate(p, State(omega_c=18.77, slip_x=29.37), 20 * step, settings=rigid(step), sample_interval=step)
     assert set(run.cases) == {Case.SR}
     assert run.force_A[:, 1] == pytest.approx(run.force_A[-1, 1], rel=1e-2)
+
+
+def test_what_a_step_foresees_of_slip_is_the_number_of_the_law() -> None:
+    assert pytest.approx(FORESEEN) == Law.share / 5
 
 
 def test_compiled_steps_are_those_in_python(monkeypatch) -> None:
