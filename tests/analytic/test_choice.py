@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analytic import simulate, solution, thresholds
+from analytic import simulate, thresholds
 from analytic.mechanics import dynamics, rolling_forces
 from analytic.mechanics.contact_problem import Closed, solve
 from analytic.mechanics.rigid_body import Forces, slip_at_A, slip_at_B, velocities
@@ -20,16 +20,13 @@ from analytic.simulation import transitions
 from analytic.simulation.equations import smooth_rates
 from analytic.simulation.motion import Fluid, Moment, of_ball
 from analytic.simulation.settings import Settings
-from model import Case, Contact, SimulationError, State
+from model import Case, Contact, State
 from tests.random_motions import UNIT, P, random_start
 
-JAMMING = {  # where Moreau's time stepping and MuJoCo settle, omega_c in rad s-1
-    P.replace(mu=mu, eta=eta, j=j, r=r * P.R, c=kappa * UNIT, omega_0=Omega_0 * UNIT): settles
-    for mu, eta, j, r, kappa, Omega_0, settles in (
-        (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635, 25.46520),
-        (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099, 19.08114),
-    )
-}
+JAMMING = [
+    P.replace(mu=1.7222, eta=0.0388, j=0.482, r=0.292 * P.R, c=0.1099 * UNIT, omega_0=2.635 * UNIT),
+    P.replace(mu=1.2277, eta=0.1721, j=0.611, r=0.154 * P.R, c=0.1198 * UNIT, omega_0=2.099 * UNIT),
+]
 """Sets in which forces can hold RR beyond omega_01, by jamming."""
 
 
@@ -105,17 +102,6 @@ def test_the_limit_of_a_steep_contact(p):
     coarse, fine = np.array(errors)
     assert fine[0] < coarse[0] / 5  # 10^(4/5) = 6.3
     assert fine[1] > 0.9 * coarse[1]
-
-
-@pytest.mark.parametrize("p", JAMMING)
-def test_settles_where_the_other_simulators_do(p):
-    settled = solution(p, Case.SS)
-    assert settled.state.omega_c == pytest.approx(JAMMING[p], abs=5e-6)
-    run = simulate(p, np.zeros(6), 60 / p.c, sample_interval=1.0)
-    assert run.cases[-1] is Case.SS
-    np.testing.assert_allclose(run.x[-1], settled.state, atol=1e-6 * p.omega_0)
-    jammed = simulate(p, np.zeros(6), 4.0, sample_interval=0.1, leave_rolling="infeasible")
-    assert np.ptp(jammed.omega_c[-20:]) > 1  # sticks and slips for ever
 
 
 def test_a_slight_disturbance_ends_rolling_in_time_stepping_too():
@@ -207,22 +193,3 @@ def test_a_single_rolling_contact_holds_or_gives_way(rolls):
             assert settled
             slip = slip_at_A(rates, p) if rolls == "A" else slip_at_B(rates, p)
             assert (math.hypot(*slip) < 1e-9 * p.g) == (math.hypot(*friction) < load)
-
-
-def fault(seed):
-    """What is wrong with a run of 60/c; empty if nothing is. Changes of case take their time: a hop has some five."""
-    p, x0 = random_start(seed)
-    try:
-        run = simulate(p, x0, 60 / p.c, sample_interval=1 / p.c)
-    except SimulationError as error:
-        return f"seed {seed}: {error}"
-    settings = run.header.settings
-    balanced = settings["energy_residual"] <= 1e-6 * settings["energy_scale"]
-    calm = len(run.events) < 100 + 5 * 60 / p.c * UNIT
-    return "" if balanced and calm else f"seed {seed}: {settings}, {len(run.events)} events"
-
-
-@pytest.mark.parametrize("seed", [*range(30, 40), 1736, 2340, 6867])
-def test_long_random_runs_end(seed):
-    """The last three come to rest: no solver crawls through round-off, and no ball hops by it."""
-    assert not fault(seed)

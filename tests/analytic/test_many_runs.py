@@ -1,61 +1,98 @@
-"""Many event-driven runs, each of them one compiled call, come to what single runs come to."""
+"""A run is the same alone and among many, compiled and in plain Python."""
+
+import fcntl
 
 import numpy as np
 import pytest
 
 from analytic import Settings, simulate, simulate_many
-from analytic.simulation import hybrid
+from analytic.simulation import compiling, hybrid, stepping
 from analytic.simulation.ensemble import random_starts
 from analytic.simulation.integrator import StalledError
-from model import Parameters, State
+from model import Flow, InputError, Parameters, State
 from model.drag import LAWS
-from model.errors import InputError
-from tests.analytic.test_solvers import FLOWS, STARTS
 
-P = Parameters.named("reference").replace(omega_0=25.0)
+pytest.importorskip("numba")
+P = Parameters.named("reference").replace(omega_0=25.0, nu_f=1e-5)
+FLOWS = (
+    Flow.steady(25.0),
+    Flow.staircase([10.0, 40.0, 20.0], 0.7),
+    Flow.ramp(5.0, 45.0, 1.5),
+    Flow.sine(25.0, 8.0, 1.5),
+    Flow.sampled([0.0, 1.0, 2.0], [-10.0, -30.0, -15.0]),
+)
+STARTS = {
+    "at rest": State(),
+    "slips at both": State(omega_c=12.0, slip_x=-40.0, slip_y=5.0, slip_z=3.0),
+    "on the wall": State(y=0.02, omega_c=44.0, slip_y=3.0),
+    "on the floor": State(omega_c=10.0, h=0.01, v_h=0.1, slip_x=5.0),
+    "flies": State(y=0.05, v_y=0.3, omega_c=8.0, h=0.02, v_h=-0.3),
+}
+BALLS = [P.replace(drag=LAWS[k % len(LAWS)]) for k in range(len(FLOWS))]
+"""For each flow one, by all laws of drag."""
 
 
-@pytest.fixture(params=["compiled", "plain"])
-def way(request, monkeypatch):
-    """Compiled runs, or those in plain Python."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(hybrid, "compiled", lambda: None)
-    return request.param
+def in_plain_python(monkeypatch):
+    monkeypatch.setattr(hybrid, "compiled", lambda: None)
+    for loop in ("advance", "follow"):
+        monkeypatch.setattr(stepping, loop, getattr(stepping, loop).py_func)
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_runs_are_those_of_simulate(way, restitution):
-    """All laws of drag, flows and starts at once: to what errors of 1e-9 in each grow to (`test_solvers`)."""
-    laws = [P.replace(drag=law, nu_f=1e-5) for law in LAWS]
-    given = [(p, x0, flow) for p in laws for x0 in STARTS.values() for flow in FLOWS.values()]
-    if restitution:
-        given = [(p, x0._replace(h=0.02), flow) for p, x0, flow in given if x0.y or x0.h][::5]
-    elif way == "plain":  # is slow: each law, start and flow in some of them
-        given = given[::7]
-    sets, x0s, flows = zip(*given, strict=True)
-    settings = Settings(restitution=restitution, initial_impact=True)
-    many = simulate_many(sets, x0s, 1.0, flows, settings, sample_interval=0.1, threads=2)
-    for n, (p, x0, flow) in enumerate(given):
-        one = simulate(p, x0, 1.0, flow, settings, sample_interval=0.1)
-        np.testing.assert_allclose(many.x[n], one.x, rtol=0, atol=1e-6 * (np.abs(one.x).max() + 0.01))
-        assert np.array_equal(many.case[n], one.case)
-        hard = np.maximum(one.events.impulse_A[:, 1], one.events.impulse_B[:, 0]) / p.m / (1 + restitution)
-        assert many.landings[n].sum() == np.sum(hard > 1e-3 * np.sqrt(p.g * p.R))
-    assert np.all(many.end == 1.0)
+def assert_same(run, other, tolerance):
+    """To a tolerance relative to the size of each variable."""
+    assert run.complete
+    np.testing.assert_array_equal(run.events.to_case, other.events.to_case)
+    np.testing.assert_allclose(run.events.time, other.events.time, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(run.events.impulse_B, other.events.impulse_B, rtol=0, atol=tolerance)
+    assert np.all(np.abs(run.x - other.x) <= tolerance * (np.abs(other.x).max(axis=0) + 0.01))
+
+
+def landings(run):
+    """How many of its landings count."""
+    p, e = run.header.parameters, run.header.settings["restitution"]
+    blows = np.maximum(run.events.impulse_A[:, 1], run.events.impulse_B[:, 0]) / p.m / (1 + e)
+    return np.sum(blows > 1e-3 * np.sqrt(p.g * p.R))
+
+
+@pytest.mark.parametrize(
+    ("start", "restitution", "tolerance"), [*((start, 0.0, 1e-6) for start in STARTS), ("flies", 0.5, 1e-5)]
+)
+def test_event_driven_runs_agree(start, restitution, tolerance, monkeypatch):
+    """To what errors of 1e-9 in each grow to: chains of landings magnify them."""
+    x0, (balls, flows) = STARTS[start], (BALLS[:1], FLOWS[:1]) if restitution else (BALLS, FLOWS)
+    given = {"settings": Settings(restitution=restitution, initial_impact=True), "sample_interval": 0.1}
+    alone = [simulate(p, x0, 1.5, flow, **given) for p, flow in zip(balls, flows, strict=True)]
+    many = simulate_many(balls, x0, 1.5, flows, threads=2, **given)
+    assert np.all(many.end == 1.5)
     assert not any(many.failure)
+    for run, x, case, landed in zip(alone, many.x, many.case, many.landings, strict=True):
+        np.testing.assert_allclose(x, run.x, rtol=0, atol=1e-6 * (np.abs(run.x).max() + 0.01))
+        np.testing.assert_array_equal(case, run.case)
+        assert landed.sum() == landings(run)
+    in_plain_python(monkeypatch)
+    for p, flow, run in zip(balls, flows, alone, strict=True):
+        assert_same(simulate(p, x0, 1.5, flow, **given), run, tolerance)
 
 
-def test_the_number_of_threads_changes_nothing(way):
-    x0s = random_starts(P, 12, 3)
-    one, two = (simulate_many(P, x0s, 1.0, sample_interval=0.25, threads=threads) for threads in (1, 2))
-    np.testing.assert_array_equal(one.x, two.x)
-    np.testing.assert_array_equal(one.landings, two.landings)
+def test_time_stepping_agrees(monkeypatch):
+    """To round-off, for one step serves both; at the ends of the flow's pieces a step ends, too."""
+    settings, x0s = Settings(method="time-stepping", timestep=1e-3), np.array([*STARTS.values()])
+    alone = [
+        simulate(p, x, 0.75, flow, settings, sample_interval=0.25) for p, x, flow in zip(BALLS, x0s, FLOWS, strict=True)
+    ]
+    many = simulate_many(BALLS, x0s, 0.75, FLOWS, settings, sample_interval=0.25, threads=2)
+    for run, x, case in zip(alone, many.x, many.case, strict=True):
+        np.testing.assert_allclose(x, run.x, rtol=0, atol=1e-14 * np.abs(run.x).max())
+        np.testing.assert_array_equal(case[1:], run.case[1:])
+    in_plain_python(monkeypatch)
+    plain = simulate(BALLS[4], x0s[4], 0.75, FLOWS[4], settings, sample_interval=0.25)
+    assert_same(plain, alone[4], 1e-9)
+    among = simulate_many(BALLS[4], x0s[4], 0.75, FLOWS[4], settings, sample_interval=0.25)
+    np.testing.assert_allclose(among.x[0], plain.x, rtol=0, atol=1e-14 * np.abs(plain.x).max())
 
 
 @pytest.mark.parametrize("method", ["event", "time-stepping"])
-def test_a_quiet_run_ends(way, method):
+def test_a_quiet_run_ends(method):
     """A fall of .096 s, then rest: quiet for .25 s at the sample at .4; without drag and flow."""
     p = P.replace(c=0.0, omega_0=0.0)
     x0 = State(y=9.81 / 2 * 0.096**2, h=0.02)
@@ -83,14 +120,26 @@ def test_where_compiled_steps_become_too_short_plain_python_takes_over(monkeypat
     assert len(single.events) == len(one.events)
 
 
-def test_a_torque_of_the_fluid_is_for_time_stepping():
-    with pytest.raises(InputError, match="fluid_torque = 1 s-1: the event-driven simulation"):
-        simulate_many(P.replace(fluid_torque=1.0), np.zeros(6), 0.1)
-    stepping = Settings(method="time-stepping")
-    assert simulate_many(P.replace(fluid_torque=1.0), np.zeros(6), 0.1, settings=stepping).end[0] == 0.1
+def test_of_processes_one_compiles(monkeypatch):
+    asked = []
+    monkeypatch.setattr(fcntl, "flock", lambda file, how: asked.append(how))
+
+    @compiling.compiled("of_a_test")
+    def more(x):
+        return x + 1
+
+    assert [more(1), more(2)] == [2, 3]
+    assert asked == [fcntl.LOCK_EX]
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1_000_000, 1.5])
-def test_threads_that_there_cannot_be(threads):
-    with pytest.raises(InputError, match="threads = "):
-        simulate_many(P, np.zeros(6), 0.1, threads=threads)
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"parameters": [P, P], "x0s": np.zeros((3, 6))}, "2 parameter sets, 3 starts"),
+        ({"x0s": [[-0.01, 0, 0, 0, 0, 0]]}, "y = -0.01 m"),
+        *(({"threads": threads}, f"threads = {threads:g}") for threads in (0, -1, 5000, 1.5)),
+    ],
+)
+def test_bad_input(given, message):
+    with pytest.raises(InputError, match=message):
+        simulate_many(**{"parameters": P, "x0s": np.zeros(6), "t_end": 0.1} | given)

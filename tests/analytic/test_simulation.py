@@ -11,61 +11,43 @@ import pytest
 
 from analytic import Settings, simulate, simulate_many
 from model import Case, Contact, Flow, InputError, Parameters, SimulationError
+from tests.random_motions import UNIT, random_start
 
 P = Parameters.named("reference")
 METHODS = ("event", "time-stepping")
-RTOL = 1e-9
+TOLERANCE = 1e-7
+"""Of laws, in natural units: a hundred times that of the integrator."""
 RUNS = int(os.environ.get("DUALBALL_RANDOM_RUNS", "10000"))
 """Length of the robustness run."""
 
 
-def random_run(seed):
-    """Parameters and a state, reference ranges: any friction up to 1.2, any drag, slips, on or off floor and wall."""
-    rng = np.random.default_rng(seed)
-    mu, eta, c, j = rng.uniform(0.02, 1.2), rng.uniform(0.02, 1.2), 10 ** rng.uniform(-2, 1), rng.uniform(0.1, 2 / 3)
-    p = P.replace(mu=mu, eta=eta, c=c, j=j, omega_0=rng.uniform(-40, 40))
-    orbit = math.sqrt(p.g / p.R)
-    x = np.zeros(8)
-    x[2] = rng.normal() * orbit
-    x[3:6] = rng.normal(size=3) * orbit * p.R / p.r * 10 ** rng.uniform(-2, 0.3)
-    if rng.random() < 0.5:
-        x[:2] = rng.uniform(0, 0.1), rng.normal() * 0.5
-    if rng.random() < 0.5:
-        x[6:] = rng.uniform(0, p.R), rng.normal() * 0.5
-    x[[0, 6]] *= rng.random(2) > 0.1  # some move into what they touch
-    return p, x
-
-
-def assert_lawful(run, tolerance):
-    """Coulomb's inequality, signs of normal forces, gaps, energy: each up to `tolerance` of the natural unit."""
+def assert_lawful(run):
+    """Coulomb's inequality, signs of normal forces, gaps, energy: each up to `TOLERANCE` of the natural unit."""
     p = run.header.parameters
     weight = p.m * p.g * (1 + np.abs(p.R * run.omega_c**2 / p.g))
-    A_x, A_y, A_z = run.force_A.T
-    B_x, B_y, B_z = run.force_B.T
+    (A_x, A_y, A_z), (B_x, B_y, B_z) = run.force_A.T / weight, run.force_B.T / weight
     assert np.all(np.isfinite(run.x))
-    assert np.all(A_y >= -tolerance * weight)
-    assert np.all(B_x >= -tolerance * weight)
-    assert np.all(np.hypot(A_x, A_z) <= p.mu * A_y + tolerance * weight)
-    assert np.all(np.hypot(B_y, B_z) <= p.eta * B_x + tolerance * weight)
-    assert np.all(run.gap_A >= -tolerance * p.R)
-    assert np.all(run.gap_B >= -tolerance * p.R)
+    assert np.all(np.minimum(A_y, B_x) >= -TOLERANCE)
+    assert np.all(np.hypot(A_x, A_z) <= p.mu * A_y + TOLERANCE)
+    assert np.all(np.hypot(B_y, B_z) <= p.eta * B_x + TOLERANCE)
+    assert np.all(np.minimum(run.gap_A, run.gap_B) >= -TOLERANCE * p.R)
     at_A, at_B = ("A", run.gap_A, run.slip_speed_A, run.force_A), ("B", run.gap_B, run.slip_speed_B, run.force_B)
     for contact, gap, slip, force in (at_A, at_B):
         state = np.array([getattr(case, contact) for case in run.cases])
-        assert np.all(np.abs(gap[state != Contact.N]) == 0)
+        assert np.all(gap[state != Contact.N] == 0)
         assert np.all(force[state == Contact.N] == 0)
-        assert np.all(slip[state == Contact.R] <= 1e-12 * math.sqrt(p.g * p.R) * (1 + weight[state == Contact.R]))
+        rolls = state == Contact.R
+        assert np.all(slip[rolls] <= 1e-12 * math.sqrt(p.g * p.R) * (1 + weight[rolls]))
     # Motions much slower than sqrt(g R) are integrated to the absolute tolerance.
-    assert run.header.settings["energy_residual"] <= tolerance * (run.header.settings["energy_scale"] + p.m * p.g * p.R)
+    assert run.header.settings["energy_residual"] <= TOLERANCE * (run.header.settings["energy_scale"] + p.m * p.g * p.R)
 
 
 def fault(seed, t_end=5.0):
-    """What is wrong with a run of the robustness test; empty if nothing is."""
-    p, x = random_run(seed)
+    """What is wrong with a run of the robustness test; empty if nothing is. Some move into what they touch at first."""
+    p, x = random_start(seed)
+    touching = x._replace(y=x.y * (seed % 5 > 0), h=x.h * (seed % 7 > 0))
     try:
-        run = simulate(p, x, t_end, initial_impact=True, sample_interval=0.01)
-        assert run.complete, run.header.failure
-        assert_lawful(run, 100 * RTOL)
+        assert_lawful(simulate(p, touching, t_end, initial_impact=True, sample_interval=0.01))
     except Exception as error:  # whatever it is, the other seeds are to run
         return f"seed {seed}: {type(error).__name__}: {error}"
     return ""
@@ -85,47 +67,57 @@ def test_ten_thousand_random_runs():
     assert not faults, "\n".join(faults)
 
 
+@pytest.mark.parametrize("seed", [*range(30, 40), 1736, 2340, 6867])
+def test_long_random_runs_end(seed):
+    """Over 60/c: a hop has some five changes of case. The last three come to rest: no solver crawls through round-off,
+    and no ball hops by it.
+    """
+    p, x0 = random_start(seed)
+    run = simulate(p, x0, 60 / p.c, sample_interval=1 / p.c)
+    assert run.header.settings["energy_residual"] <= 1e-6 * run.header.settings["energy_scale"]
+    assert len(run.events) < 100 + 5 * 60 / p.c * UNIT
+
+
 @pytest.mark.parametrize("zeros", list(itertools.product((0, 1), repeat=5)))
 def test_laws_hold_where_parameters_vanish(zeros):
     """From states at both contacts, with any of mu, eta, c, omega_0 and the slips zero."""
     mu, eta, c, omega_0, slips = zeros * np.array([0.7, 0.4, 3.0, -22.0, 30.0])
     p = P.replace(mu=mu, eta=eta, omega_0=omega_0, c=c)
-    run = simulate(p, [0, 0, 11.0, slips, -2 * slips, slips], 0.1, restitution=0.5, sample_interval=2e-3)
-    assert_lawful(run, 100 * RTOL)
+    assert_lawful(simulate(p, [0, 0, 11.0, slips, -2 * slips, slips], 0.1, restitution=0.5, sample_interval=2e-3))
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_trajectory_describes_itself(method):
     x0 = [0.02, 0.0, 8.0, 1.0, 2.0, 3.0, 0.01, -0.2]
     chosen = {"method": method, "timestep": 1e-3, "rtol": 1e-7, "restitution": 0.3}
-    run = simulate(P, x0, 0.3, **chosen, sample_interval=0.04, theta_0=2.0)
+    run = simulate(P, x0, 0.3, settings=Settings(**chosen), sample_interval=0.04, theta_0=2.0)
     assert run.header.engine == method
     np.testing.assert_allclose(run.time, [0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24, 0.28, 0.3], rtol=1e-14)
     np.testing.assert_allclose(run.x[0], x0, rtol=1e-13)
     assert run.theta[0] == pytest.approx(2.0, rel=1e-14)
     shown = json.loads(json.dumps(dict(run.header.settings)))
-    assert shown["restitution"] == 0.3
-    assert shown["x0"] == x0
-    assert shown["energy_residual"] >= 0
+    assert shown.items() >= {"x0": x0, **chosen}.items()
     assert np.any(run.events.impulse_A != 0)
     assert Case(run.events.from_case[0]) is run.cases[0]
-    np.testing.assert_array_equal(
-        simulate(P, x0, 0.3, settings=Settings(**chosen), sample_interval=0.04, theta_0=2.0).x, run.x
-    )
+    by_names = simulate(P, x0, 0.3, **chosen, sample_interval=0.04, theta_0=2.0)
+    np.testing.assert_array_equal(by_names.x, run.x)
 
 
 @pytest.mark.parametrize(("method", "torque"), [("event", 0.0), ("time-stepping", 0.0), ("time-stepping", 3.0)])
 @pytest.mark.parametrize("x", [[0, 0, 9, 0, 0, 0, 0, 0], [0.01, 0, 20, -30, 10, 20, 0.002, -0.1]])
 def test_the_mirrored_motion(method, torque, x):
     """Onsets of slip, landings and the fluid's torque: reflection turns omega_c, slip_x, slip_y and omega_0."""
-    p, flip, way = P.replace(fluid_torque=torque), np.array([1, 1, -1, -1, -1, 1, 1, 1]), {"timestep": 1e-3}
+    p, flip = P.replace(fluid_torque=torque), np.array([1, 1, -1, -1, -1, 1, 1, 1])
     there, back = (
-        simulate(p.replace(omega_0=s * 25.0), turn * x, 2.0, method=method, sample_interval=0.1, **way)
-        for s, turn in ((1.0, 1), (-1.0, flip))
+        simulate(p.replace(omega_0=flow), start, 2.0, method=method, sample_interval=0.1, timestep=1e-3)
+        for flow, start in ((25.0, x), (-25.0, flip * x))
     )
     assert len(there.events)
     np.testing.assert_array_equal(back.events.to_case, there.events.to_case)
     np.testing.assert_allclose(back.x, flip * there.x, rtol=0, atol=1e-7 * np.abs(there.x).max(axis=0).max())
+
+
+LONG, SLIPS = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -133,9 +125,8 @@ def test_progress_within_a_long_stretch(method, monkeypatch):
     """A single case and a single sample: the steps themselves report, so that a caller can stop the run in time."""
     for between_two_reports in ("hybrid.STRIDES", "hybrid.STEPS", "time_stepping.AT_ONCE"):
         monkeypatch.setattr(f"analytic.simulation.{between_two_reports}", 10 if "AT_ONCE" in between_two_reports else 3)
-    p, x0, seen = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10], []
-    assert len(simulate(p, x0, 0.2, method=method).time) == 1001  # samples as they are by default
-    run = simulate(p, x0, 4.0, method=method, timestep=1e-3, sample_interval=4.0, progress=seen.append)
+    seen = []
+    run = simulate(LONG, SLIPS, 4.0, method=method, timestep=1e-3, sample_interval=4.0, progress=seen.append)
     assert not len(run.events)
     assert len(seen) > 5
     assert seen == sorted(seen)
@@ -153,16 +144,14 @@ def test_a_speed_into_a_closed_contact(method):
     if method == "event":
         assert run.events.time[0] == 0.0
         assert run.events.impulse_A[0, 1] == pytest.approx(1.5 * P.m * 0.1, rel=1e-9)
-        assert_lawful(run, 100 * RTOL)
+        assert_lawful(run)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_ball_locked_in_the_corner_does_not_rebound(method):
     """Where mu, eta > 1 a fall into the corner has no impulses that meet restitution at both contacts."""
-    p = P.replace(mu=1.3, eta=1.3)
-    run = simulate(
-        p, [0, -0.4, 0, 0, 0, 40, 0, -0.4], 0.05, method=method, restitution=0.5, initial_impact=True, timestep=1e-3
-    )
+    p, given = P.replace(mu=1.3, eta=1.3), {"restitution": 0.5, "initial_impact": True, "timestep": 1e-3}
+    run = simulate(p, [0, -0.4, 0, 0, 0, 40, 0, -0.4], 0.05, method=method, **given)
     assert np.all(run.x[1:, [0, 1, 6, 7]] == 0)
 
 
@@ -200,9 +189,8 @@ def test_a_run_that_progress_ends_carries_its_samples(method, monkeypatch):
         if done > 0.3:
             raise InterruptedError("enough")
 
-    p, x0 = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10]
     with pytest.raises(SimulationError, match=r"stopped at t = .* s: enough") as stopped:
-        simulate(p, x0, 40.0, Flow.sine(25, 1, 1), method=method, sample_interval=1e-2, progress=enough)
+        simulate(LONG, SLIPS, 40.0, Flow.sine(25, 1, 1), method=method, sample_interval=1e-2, progress=enough)
     run = stopped.value.trajectory
     assert run.header.failure == str(stopped.value)
     assert 0 < len(run.time) < 4001

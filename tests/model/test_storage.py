@@ -56,63 +56,54 @@ def assert_same(a, b):
     assert one == two
 
 
-@pytest.fixture
-def path(tmp_path):
-    """A file of a run."""
-    storage.save(make(), tmp_path / "run.h5")
-    return tmp_path / "run.h5"
-
-
 @pytest.mark.parametrize(("n", "events"), [(50, 2), (0, 0), (1, 0), (5000, 7)])
-def test_what_is_saved_is_loaded(tmp_path, n, events):
-    trajectory = make(n, events)
-    storage.save(trajectory, tmp_path / "run.h5")
-    assert_same(storage.load(tmp_path / "run.h5"), trajectory)
+def test_what_is_saved_is_loaded_whole_or_in_parts(tmp_path, n, events):
+    trajectory, path = make(n, events), tmp_path / "run.h5"
+    storage.save(trajectory, path)
+    assert_same(storage.load(path), trajectory)
     assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
     # As a batch it is one of a run without a name.
-    assert storage.contents(tmp_path / "run.h5")[1] == []
-    assert_same(storage.load_runs(tmp_path / "run.h5")[""], trajectory)
-
-
-def test_xarray_opens_it_with_axes_units_and_cases(tmp_path):
-    trajectory = make()
-    storage.save(trajectory, tmp_path / "run.h5")
-    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
-        assert data.omega_c.dims == ("time",)
-        assert data.force_A.dims == ("time", "axis")
-        assert data.event_from.dims == ("event_time",)
-        np.testing.assert_array_equal(data.omega_c, trajectory.omega_c)
-        assert data.omega_c.units == "rad s-1"
-        assert all({"units", "long_name"} <= set(data[name].attrs) for name in columns(Trajectory))
-        names = data.case.flag_meanings.split()
-        assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
-        parameters = dataclasses.asdict(trajectory.header.parameters)
-        assert json.loads(data.parameters) == parameters == {name: data.attrs[name] for name in parameters}
-        assert data.title
-        assert data.Conventions
-        np.testing.assert_array_equal(data.omega_0, trajectory.header.flow(trajectory.time))
-    with h5py.File(tmp_path / "run.h5") as file:  # without xarray, too
-        assert h5py.check_enum_dtype(file["case"].dtype) == {case.name: case.value for case in Case}
-    said = repr(trajectory)
-    assert all(part in said for part in ("event: 50 samples", "last y=", trajectory.cases[0].name))
+    assert storage.contents(path)[1] == []
+    assert_same(storage.load_runs(path)[""], trajectory)
+    for size in (n // 7 + 1, n + 1):
+        parts = list(storage.parts(path, size))
+        assert {len(part.time) for part in parts[:-1]} <= {size}
+        assert all(len(part.events) == events for part in parts)
+        for name in columns(Trajectory):
+            joined = np.concatenate([getattr(part, name) for part in parts])
+            np.testing.assert_array_equal(joined, getattr(trajectory, name))
 
 
 @pytest.mark.parametrize(("n", "events", "failure"), [(50, 2, ""), (0, 0, "diverged"), (1, 0, "")])
-def test_in_memory_xarray_sees_what_it_reads_from_the_file(tmp_path, n, events, failure):
+def test_xarray_sees_axes_units_and_cases_in_a_file_and_in_memory(tmp_path, n, events, failure):
     trajectory = make(n, events, failure)
     storage.save(trajectory, tmp_path / "run.h5")
+    data = trajectory.to_xarray()
     with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as stored:
-        xarray.testing.assert_identical(trajectory.to_xarray(), stored)
-    np.testing.assert_array_equal(trajectory.to_xarray().force_B.sel(axis="y"), trajectory.force_B[:, 1])
+        xarray.testing.assert_identical(data, stored)
+    assert data.omega_c.dims == ("time",)
+    assert data.event_from.dims == ("event_time",)
+    np.testing.assert_array_equal(data.omega_c, trajectory.omega_c)
+    np.testing.assert_array_equal(data.force_B.sel(axis="y"), trajectory.force_B[:, 1])
+    np.testing.assert_array_equal(data.omega_0, trajectory.header.flow(trajectory.time))
+    assert data.omega_c.units == "rad s-1"
+    assert all({"units", "long_name"} <= set(data[name].attrs) for name in columns(Trajectory))
+    names = data.case.flag_meanings.split()
+    assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
+    parameters = dataclasses.asdict(trajectory.header.parameters)
+    assert json.loads(data.parameters) == parameters == {name: data.attrs[name] for name in parameters}
+    with h5py.File(tmp_path / "run.h5") as file:  # without xarray, too
+        assert h5py.check_enum_dtype(file["case"].dtype) == {case.name: case.value for case in Case}
 
 
-def test_without_xarray_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match="pip install xarray h5netcdf"):
-        make().to_xarray()
+@pytest.mark.parametrize(("library", "needed"), [("xarray", "xarray h5netcdf"), ("pandas", "pandas")])
+def test_without_the_library_it_is_named(monkeypatch, library, needed):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(InputError, match=f"pip install {needed}"):
+        getattr(make(), f"to_{library}")()
 
 
-def test_a_table_for_pandas_has_a_row_for_each_sample(monkeypatch):
+def test_a_table_for_pandas_has_a_row_for_each_sample():
     trajectory = make(50, 2)
     table = trajectory.to_pandas()
     assert len(table) == 50
@@ -121,9 +112,6 @@ def test_a_table_for_pandas_has_a_row_for_each_sample(monkeypatch):
     np.testing.assert_array_equal(table.omega_0, trajectory.omega_0)
     assert list(table.case) == [case.name for case in trajectory.cases]
     assert table.attrs["mu"] == trajectory.header.parameters.mu
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(InputError, match="pip install pandas"):
-        trajectory.to_pandas()
 
 
 def test_xarray_reads_a_table_with_a_row_for_each_sample(tmp_path):
@@ -150,29 +138,23 @@ def test_xarray_reads_a_table_with_a_row_for_each_sample(tmp_path):
         xarray.open_dataset(io.BytesIO(), engine=backend)
 
 
-def test_chunks_arrive_while_the_run_goes_on(tmp_path):
-    trajectory = make(300)
-    samples = np.empty(300, SAMPLE)
-    for name in columns(Trajectory):
-        samples[name] = getattr(trajectory, name)
-    path = tmp_path / "run.h5"
-    with storage.TrajectoryWriter(path, trajectory.header) as writer:
-        for block in np.array_split(samples, 7):
+def test_blocks_arrive_while_the_run_goes_on_and_leave_nothing_if_it_breaks_off(tmp_path):
+    blocks = np.array_split(np.zeros(50, SAMPLE), 7)
+    with storage.TrajectoryWriter(tmp_path / "run.h5", make().header) as writer:
+        for block in blocks:
             writer.append(block)
-            assert not path.exists()
-        writer.end(trajectory.events)
-    assert_same(storage.load(path), trajectory)
+            assert not (tmp_path / "run.h5").exists()
+        writer.end(Events())
+    assert len(storage.load(tmp_path / "run.h5").time) == 50
 
-
-def test_a_run_that_breaks_off_leaves_nothing(tmp_path):
     def break_off():
-        with storage.TrajectoryWriter(tmp_path / "run.h5", make().header) as writer:
-            writer.append(np.zeros(10, SAMPLE))
+        with storage.TrajectoryWriter(tmp_path / "other.h5", make().header) as writer:
+            writer.append(blocks[0])
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
         break_off()
-    assert list(tmp_path.iterdir()) == []
+    assert [each.name for each in tmp_path.iterdir()] == ["run.h5"]
 
 
 FULL = """
@@ -219,50 +201,13 @@ def replace(file, name, value):
     file[name] = value
 
 
-def test_a_file_from_before_the_flow_was_a_column_is_read(path):
+def test_a_file_from_before_the_flow_was_a_column_is_read(tmp_path):
     def age(file):
         del file["omega_0"], file.attrs["Conventions"], file.attrs["title"], file.attrs["mu"]
 
-    edit(path, age)
-    assert_same(storage.load(path), make())
-
-
-@pytest.mark.parametrize("size", [1, 7, 50, 51])
-def test_a_run_is_read_in_parts(tmp_path, size):
-    trajectory = make(50, 2)
-    storage.save(trajectory, tmp_path / "run.h5")
-    parts = list(storage.parts(tmp_path / "run.h5", size))
-    assert {len(part.time) for part in parts[:-1]} <= {size}
-    assert all(len(part.events) == 2 for part in parts)
-    for name in columns(Trajectory):
-        joined = np.concatenate([getattr(part, name) for part in parts])
-        np.testing.assert_array_equal(joined, getattr(trajectory, name))
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (lambda f: f.attrs.__setitem__("schema", "other"), "not a dualball-trajectory"),
-        (lambda f: f.attrs.__setitem__("schema_version", 99), "newer dualball: its schema version is 99"),
-        (lambda f: f.attrs.__setitem__("schema_version", "x"), "no valid schema version"),
-        (lambda f: f.attrs.__delitem__("engine"), "attribute 'engine' is missing"),
-        (lambda f: f.attrs.__setitem__("flow", "{"), "attribute 'flow' is not JSON"),
-        (lambda f: f.attrs.__setitem__("settings", "[]"), "attribute 'settings' is not a table"),
-        (lambda f: f.attrs.__setitem__("parameters", '{"m": -1}'), "missing parameter"),
-        (lambda f: f.__delitem__("omega_c"), "no dataset 'omega_c'"),
-        (lambda f: replace(f, "omega_c", h5py.SoftLink("/y")), "no dataset 'omega_c' of its own"),
-        (lambda f: replace(f, "force_A", np.zeros(50)), "'force_A' has shape"),
-        (lambda f: replace(f, "y", np.zeros(49)), "differ in length"),
-        (lambda f: replace(f, "y", np.array([b"a"] * 50)), "'y' has type"),
-        (lambda f: replace(f, "case", np.full(50, 9, np.int8)), "case that does not exist"),
-    ],
-)
-def test_a_foreign_or_damaged_file_is_refused(path, change, says):
-    edit(path, change)
-    with pytest.raises(StorageError, match=says) as caught:
-        storage.load(path)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
+    storage.save(make(), tmp_path / "run.h5")
+    edit(tmp_path / "run.h5", age)
+    assert_same(storage.load(tmp_path / "run.h5"), make())
 
 
 BATCH = {"a": make(50, 2), "b": make(0, 0, "diverged"), "c": make(7, 9)}
@@ -287,28 +232,41 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path):
         assert data.omega_c.units == "rad s-1"
         assert data.samples.values.tolist() == [50, 0, 7]
         np.testing.assert_array_equal(data.omega_c.sel(run="c")[:7], BATCH["c"].omega_c)
+    for name, says in (("", "name one of them, as FILE/NAME"), ("d", "holds no run of that name")):
+        with pytest.raises(StorageError, match=says):
+            storage.load(path / name)
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("name", "change", "says"),
     [
-        (lambda f: f.attrs.__setitem__("schema_version", 2), "newer dualball: its schema version is 2"),
-        (lambda f: replace(f, "header", ["{"] * 3), "attribute 'header' is not JSON"),
-        (lambda f: replace(f, "samples", [50, 0]), "does not hold what it should"),
-        (lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
+        ("run.h5", lambda f: f.attrs.__setitem__("schema", "other"), "not a dualball-trajectory"),
+        ("run.h5", lambda f: f.attrs.__setitem__("schema_version", 99), "newer dualball: its schema version is 99"),
+        ("run.h5", lambda f: f.attrs.__setitem__("schema_version", "x"), "no valid schema version"),
+        ("run.h5", lambda f: f.attrs.__delitem__("engine"), "attribute 'engine' is missing"),
+        ("run.h5", lambda f: f.attrs.__setitem__("flow", "{"), "attribute 'flow' is not JSON"),
+        ("run.h5", lambda f: f.attrs.__setitem__("settings", "[]"), "attribute 'settings' is not a table"),
+        ("run.h5", lambda f: f.attrs.__setitem__("parameters", '{"m": -1}'), "missing parameter"),
+        ("run.h5", lambda f: f.__delitem__("omega_c"), "no dataset 'omega_c'"),
+        ("run.h5", lambda f: replace(f, "omega_c", h5py.SoftLink("/y")), "no dataset 'omega_c' of its own"),
+        ("run.h5", lambda f: replace(f, "force_A", np.zeros(50)), "'force_A' has shape"),
+        ("run.h5", lambda f: replace(f, "y", np.zeros(49)), "differ in length"),
+        ("run.h5", lambda f: replace(f, "y", np.array([b"a"] * 50)), "'y' has type"),
+        ("run.h5", lambda f: replace(f, "case", np.full(50, 9, np.int8)), "case that does not exist"),
+        ("batch.h5/a", lambda f: f.attrs.__setitem__("schema_version", 2), "newer dualball: its schema version is 2"),
+        ("batch.h5/a", lambda f: replace(f, "header", ["{"] * 3), "attribute 'header' is not JSON"),
+        ("batch.h5/a", lambda f: replace(f, "samples", [50, 0]), "does not hold what it should"),
+        ("batch.h5/a", lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
     ],
 )
-def test_a_foreign_or_damaged_batch_is_refused(tmp_path, change, says):
-    path = tmp_path / "batch.h5"
-    storage.save_batch(BATCH, path)
-    with pytest.raises(StorageError, match="name one of them, as FILE/NAME"):
-        storage.load(path)
-    with pytest.raises(StorageError, match="holds no run of that name"):
-        storage.load(path / "d")
-    edit(path, change)
+def test_a_foreign_or_damaged_file_is_refused(tmp_path, name, change, says):
+    storage.save(make(), tmp_path / "run.h5")
+    storage.save_batch(BATCH, tmp_path / "batch.h5")
+    file = tmp_path / name.partition("/")[0]
+    edit(file, change)
     with pytest.raises(StorageError, match=says) as caught:
-        storage.load(path / "a")
-    assert str(path) in str(caught.value)
+        storage.load(tmp_path / name)
+    assert str(file) in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
