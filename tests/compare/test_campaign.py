@@ -19,7 +19,8 @@ from compare.kit import collection
 from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
 from compare.kit.tasks import Task
 from compare.kit.workers import Workers, _deaf, dask, processes
-from model import InputError, Parameters, SimulationError, StorageError, storage
+from mjsim import ContactSettings
+from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
 REST = (0.0,) * 8
@@ -32,12 +33,21 @@ def tasks(count=9, t_end=0.2):
     return [Task(engine="mujoco", parameters=P.replace(omega_0=5.0 + k), x0=REST, t_end=t_end) for k in range(count)]
 
 
+def numbers(runs):
+    """All numbers of runs, by their parameters."""
+    found = {str(run.header.parameters): {c: getattr(run, c).tobytes() for c in columns(Trajectory)} for run in runs}
+    assert len(found) == len(runs)
+    return found
+
+
 def data(directory):
     """All numbers of all runs of a directory."""
-    runs = [run for path in directory.glob("*.h5") for run in storage.load_runs(path).values()]
-    numbers = {str(run.header.parameters): {c: getattr(run, c).tobytes() for c in columns(Trajectory)} for run in runs}
-    assert len(numbers) == len(runs)
-    return numbers
+    return numbers([run for path in directory.glob("*.h5") for run in storage.load_runs(path).values()])
+
+
+def written(directory):
+    """When each file of runs was written."""
+    return {path: path.stat().st_mtime_ns for path in directory.glob("*.h5")}
 
 
 def completed(directory, workers=0, asked=None, **how):
@@ -57,30 +67,27 @@ def test_what_is_done_is_not_done_again(tmp_path):
     seen = []
     with Campaign(tmp_path, workers=0, report=lambda *now: seen.append(now), doing="it") as campaign:
         campaign.complete(tasks(3))
-        before = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
+        before = written(tmp_path)
         campaign.complete(tasks(4))
     assert seen[-1] == ("it", 4, 4, 0)
     assert completed(tmp_path, asked=tasks(4)) == []
-    assert len(before) == 1
-    assert before.items() <= {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}.items()
-    assert len(list(tmp_path.iterdir())) == 2
+    assert before.items() < written(tmp_path).items()
+    assert (len(before), len(written(tmp_path))) == (1, 2)
 
 
 def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
     """New runs, of 201 samples each, aren't read, nor is any file twice, as long as there is room."""
-    loaded = []
-    read = storage.load_runs
+    loaded, read = [], storage.load_runs
     monkeypatch.setattr(storage, "load_runs", lambda path: [loaded.append(path), read(path)][1])
-    for room, times in ((2**19, (0, 0, 2)), (500, (2, 4, 8))):
-        with Campaign(tmp_path / str(room), workers=0, batch=2) as campaign:
-            monkeypatch.setattr("compare.kit.campaign.READ", room)
-            for count in times[:2]:
-                campaign.run(tasks(4))
-                assert len(loaded) == count
-        with Campaign(tmp_path / str(room), workers=0) as again:
-            again.run(tasks(4))
-            again.run(tasks(4))
-            assert len(loaded) == times[2]
+    for room, times in ((2**19, [0, 0, 2, 2]), (500, [2, 4, 6, 8])):
+        monkeypatch.setattr("compare.kit.campaign.READ", room)
+        seen = []
+        for _ in range(2):
+            with Campaign(tmp_path / str(room), workers=0, batch=2) as campaign:
+                for _ in range(2):
+                    campaign.run(tasks(4))
+                    seen.append(len(loaded))
+        assert seen == times
         loaded.clear()
 
 
@@ -107,14 +114,11 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(tmp_pat
         monkeypatch.setattr("compare.kit.campaign.SOON_DONE", short)
         with Campaign(tmp_path / where, workers=0, batch=2, passing=True) as campaign:
             runs = campaign.run(tasks())
-            assert len(list((tmp_path / where).glob("*.h5"))) == files
-            numbers = {
-                str(run.header.parameters): {c: getattr(run, c).tobytes() for c in columns(Trajectory)} for run in runs
-            }
-            assert numbers == undisturbed
+            assert len(written(tmp_path / where)) == files
+            assert numbers(runs) == undisturbed
             campaign.keep([tasks()[4].key])
             campaign.reduce()
-            assert [path.name for path in (tmp_path / where).glob("*.h5")] == ["runs.h5"]
+            assert [path.name for path in written(tmp_path / where)] == ["runs.h5"]
             assert campaign.load(tasks()[4].key).header.parameters == tasks()[4].parameters
 
 
@@ -124,26 +128,21 @@ def test_runs_that_nobody_looks_at_are_not_handed_out(tmp_path):
     assert len({file for _, file, _ in ended}) == 1
 
 
-def cut(content):
-    return content[:-100]
+DAMAGES = [lambda content: content[:-100], lambda content: content[:4000] + bytes([content[4000] ^ 1]) + content[4001:]]
 
 
-def edited(content):
-    return content[:4000] + bytes([content[4000] ^ 1]) + content[4001:]
-
-
-@pytest.mark.parametrize("damage", [cut, edited])
+@pytest.mark.parametrize("damage", DAMAGES, ids=["cut", "edited"])
 def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path, undisturbed, capsys, damage):
     completed(tmp_path, batch=3)
     path = min(tmp_path.iterdir())
     path.write_bytes(damage(path.read_bytes()))
-    untouched = {each: each.stat().st_mtime_ns for each in tmp_path.iterdir() if each != path}
+    untouched = {each: when for each, when in written(tmp_path).items() if each != path}
     assert completed(tmp_path, batch=3) == []
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"dualball: cannot read {path}: it is ")
     assert line.endswith("; it is set aside, its runs are carried out again")
     assert data(tmp_path) == undisturbed
-    assert untouched.items() <= {each: each.stat().st_mtime_ns for each in tmp_path.iterdir()}.items()
+    assert untouched.items() <= written(tmp_path).items()
 
 
 def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
@@ -163,20 +162,15 @@ def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
 
 
 def test_every_input_is_part_of_the_identity():
-    from mjsim import ContactSettings
-    from model import Flow
-
-    (task,) = tasks(1)
-    p = task.parameters
-    given = {"engine": "mujoco", "parameters": p, "x0": REST, "t_end": 0.2}
+    given = {"engine": "mujoco", "parameters": P, "x0": REST, "t_end": 0.2}
     others = (
-        *({"engine": "event"}, {"parameters": p.replace(mu=0.21)}, {"x0": (*REST[:7], 1e-300)}, {"t_end": 0.3}),
+        *({"engine": "event"}, {"parameters": P.replace(mu=0.21)}, {"x0": (*REST[:7], 1e-300)}, {"t_end": 0.3}),
         *({"sample_interval": 0.1}, {"settings": ContactSettings.at(5e-4)}, {"flow": Flow.ramp(1, 2, 1)}),
     )
-    assert len({task.key, *(Task(**given | other).key for other in others)}) == 1 + len(others)
+    assert len({Task(**given | other).key for other in ({}, *others)}) == 1 + len(others)
     for x0 in (list(REST), np.zeros(8), np.zeros(6), [0] * 6):
         assert Task(**given | {"x0": x0}) == Task(**given)
-    assert Task(**given, flow=Flow.steady(p.omega_0)).key == task.key
+    assert Task(**given, flow=Flow.steady(P.omega_0)).key == Task(**given).key
 
 
 def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path):
@@ -299,10 +293,9 @@ def test_a_scheduler_that_does_not_answer(monkeypatch):
 
 
 def test_bad_campaigns(tmp_path):
-    with pytest.raises(InputError, match="workers = -1"):
-        Campaign(tmp_path, workers=-1)
-    with pytest.raises(InputError, match="batch = 0"):
-        Campaign(tmp_path, batch=0)
+    for bad, words in (({"workers": -1}, "workers = -1"), ({"batch": 0}, "batch = 0")):
+        with pytest.raises(InputError, match=words):
+            Campaign(tmp_path, **bad)
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageError, match="cannot write to"):
         Campaign(tmp_path / "file")
@@ -312,55 +305,31 @@ def test_bad_campaigns(tmp_path):
         Task(engine="mujoco", parameters=P, x0=(0.0, 1.0), t_end=1)
 
 
-def test_workers_end_with_a_killed_campaign(tmp_path):
-    program = tmp_path / "campaign.py"
-    program.write_text("""
-import time
-from compare.kit.workers import processes
-if __name__ == "__main__":
-    work = processes(1).start().submit(time.sleep, 600)
-    while not work.running():
-        time.sleep(0.01)
-    print("works", flush=True)
-    time.sleep(600)
-""")
-    process = subprocess.Popen([sys.executable, str(program)], stdout=subprocess.PIPE, text=True)
-    assert process.stdout
-    assert process.stdout.readline() == "works\n"
-    process.kill()
-    process.communicate(timeout=60)  # the pipe ends once the worker, which holds it, too, is gone
-
-
 def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_path):
     """Interrupted once a batch is whole, then killed, then left alone: each time it goes on from there."""
-
-    def stored():
-        return {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
-
     # Runs of some tenths of a second: however late the signal comes, some of them are still to be done.
     sweep, kept = f"sweep --vary omega_0=5:10:16 --batch 2 --time 15 -o {tmp_path} --workers".split(), {}
-    for by, send in ((signal.SIGINT, os.kill), (signal.SIGKILL, os.killpg)):
+    for by in (signal.SIGINT, signal.SIGKILL):
         process = subprocess.Popen(
             [sys.executable, "-m", "compare", *sweep, "1"],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            start_new_session=True,
             # a shell starts what it runs in the background with SIGINT ignored
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
-        while len(stored()) == len(kept):
+        while len(written(tmp_path)) == len(kept):
             time.sleep(0.02)
-        send(process.pid, by)
-        said, _ = process.communicate(timeout=60)
+        process.send_signal(by)
+        said, _ = process.communicate(timeout=60)  # the pipe ends once the worker, which holds it, too, is gone
         assert "Traceback" not in said
-        assert kept.items() < stored().items()
-        kept = stored()
+        assert kept.items() < written(tmp_path).items()
+        kept = written(tmp_path)
         assert len(data(tmp_path)) == 2 * len(kept) < 16
         if by is signal.SIGINT:
             assert process.returncode == 128 + by
             assert "the same command goes on from there" in said
     assert cli.main([*sweep, "0"]) == 0
     assert len(data(tmp_path)) == 16
-    assert kept.items() <= stored().items()
+    assert kept.items() <= written(tmp_path).items()
     assert not list(tmp_path.glob(".*"))

@@ -21,14 +21,19 @@ P = Parameters.named("reference")
 OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
 
 
+def ran(directory, sets, batch=64, **changes):
+    """A directory with runs of these sets."""
+    tasks = [Task(**{"engine": "event", "parameters": p, "x0": (0.0,) * 8, "t_end": 0.1} | changes) for p in sets]
+    with Campaign(directory, workers=0, batch=batch) as campaign:
+        assert not campaign.complete(tasks)
+    return directory
+
+
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory):
     """The runs of a grid, a batch each."""
-    directory = tmp_path_factory.mktemp("grid")
     sets = [P.replace(omega_0=omega, eta=eta) for omega in OMEGAS for eta in ETAS]
-    with Campaign(directory, workers=0, batch=1) as campaign:
-        assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
-    return directory
+    return ran(tmp_path_factory.mktemp("grid"), sets, batch=1)
 
 
 @pytest.fixture
@@ -71,10 +76,7 @@ def test_the_varied_parameters_of_other_runs_are_coordinates(runs, tmp_path):
 
 
 def test_the_law_of_drag_is_kept(tmp_path):
-    sets = [P, P.replace(drag="quadratic", nu_f=1e-6)]
-    with Campaign(tmp_path / "runs", workers=0) as campaign:
-        assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
-    collection.collect(tmp_path / "runs", tmp_path / "all.h5")
+    collection.collect(ran(tmp_path / "runs", [P, P.replace(drag="quadratic", nu_f=1e-6)]), tmp_path / "all.h5")
     about = collection.describe(tmp_path / "all.h5")
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
     assert collection.table(about).row_count == 6
@@ -85,12 +87,9 @@ def test_the_law_of_drag_is_kept(tmp_path):
 
 def test_theory_stands_beside_what_was_measured(tmp_path):
     """For a ball that slips at both points; its height, which is free in flight along the wall, has no prediction."""
-    sets = {"SS": P.replace(omega_0=25.0), "NR": P.replace(omega_0=40.0)}
-    states = {name: analytic.solution(p, name).state for name, p in sets.items()}
-    states["NR"] = states["NR"]._replace(y=0.01)
-    with Campaign(tmp_path / "runs", workers=0) as campaign:
-        tasks = [Task(engine="event", parameters=p, x0=states[name], t_end=1.0) for name, p in sets.items()]
-        assert not campaign.complete(tasks)
+    for name, omega_0, height in (("SS", 25.0, 0.0), ("NR", 40.0, 0.01)):
+        p = P.replace(omega_0=omega_0)
+        ran(tmp_path / "runs" / name, [p], x0=analytic.solution(p, name).state._replace(y=height), t_end=1.0)
     collection.collect(tmp_path / "runs", tmp_path / "all.h5")
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         data = data.sortby("omega_0")
@@ -133,19 +132,17 @@ def test_what_is_no_run_is_left_out(runs):
 
 
 def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(tmp_path, capsys):
-    tasks = [Task(engine="event", parameters=P.replace(omega_0=omega), x0=(0.0,) * 8, t_end=0.1) for omega in OMEGAS]
-    with Campaign(tmp_path / "runs", workers=0) as campaign:
-        campaign.complete(tasks)
-    (file,) = (tmp_path / "runs").iterdir()
-    paths = [file / task.key for task in tasks]
-    assert cli.main(["inspect", str(paths[0].parent), "--json"]) == 0
+    (file,) = ran(tmp_path / "runs", [P.replace(omega_0=omega) for omega in OMEGAS]).iterdir()
+    assert cli.main(["inspect", str(file), "--json"]) == 0
     about = json.loads(capsys.readouterr().out)
-    assert about["names"] == [str(path) for path in paths]
     assert (about["varied"], about["ranges"]["omega_0"]) == (["omega_0"], [min(OMEGAS), max(OMEGAS)])
-    assert cli.main(["inspect", about["names"][1], "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == OMEGAS[1]
+    for name, omega_0 in zip(about["names"], OMEGAS, strict=True):
+        assert cli.main(["inspect", name, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == omega_0
     assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
-    assert collection.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
+    assert [str(tmp_path / "runs" / name) for name in collection.describe(tmp_path / "all.h5")["names"]] == about[
+        "names"
+    ]
 
 
 def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_path, capsys, monkeypatch):
@@ -153,23 +150,22 @@ def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_pat
     monkeypatch.setattr(collection, "SHARE", 1)
     ranges = ["--vary", "omega_0=5:10:6", "--vary", "eta=0.1,0.3"]
     common = ["sweep", *ranges, "--time", "0.2", "--batch", "4", "--workers", "0", "--quiet"]
-    size, found = {}, {}
+    sizes, found = [], set()
     for name, more in (("whole", []), ("means", ["--means-only"])):
-        where = tmp_path / name
-        assert cli.main([*common, *more, "-o", str(where)]) == 0
-        before = {path: path.stat().st_mtime_ns for path in where.glob("*.h5")}
-        assert cli.main([*common, *more, "-o", str(where)]) == 0
-        assert before == {path: path.stat().st_mtime_ns for path in where.glob("*.h5")}
-        size[name] = sum(path.stat().st_size for path in before)
+        where, before = tmp_path / name, None
+        for _ in range(2):
+            assert cli.main([*common, *more, "-o", str(where)]) == 0
+            files = {path: path.stat().st_mtime_ns for path in where.glob("*.h5")}
+            assert before in (None, files)
+            before = files
+        sizes.append(sum(path.stat().st_size for path in files))
         for workers in (0, 2):
             output = tmp_path / f"{name}-{workers}.h5"
             assert collection.collect(where, output, workers) == 12
             with reading(output) as file:
-                found[name, workers] = {each: column(dataset(file, each)).tolist() for each in file}
-    first, *others = found.values()
-    for other in others:
-        assert repr(other) == repr(first)  # nan, too
-    assert size["means"] < size["whole"] / 3
+                found.add(repr({each: column(dataset(file, each)).tolist() for each in file}))  # nan, too
+    assert len(found) == 1
+    assert sizes[1] < sizes[0] / 3
     (means, *_) = sorted((tmp_path / "means").glob("*.h5"))
     assert collection.describe(means)["varied"] == ["eta", "omega_0"]
     capsys.readouterr()
