@@ -111,18 +111,6 @@ def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ
     assert not (tmp_path / "all.h5").exists()
 
 
-@pytest.mark.parametrize(("damaged", "named"), [(2, 2), (6, 5)])
-def test_what_cannot_be_read_is_named(runs, tmp_path, damaged, named):
-    paths = sorted(runs.glob("*.h5"))[:damaged]
-    for path in paths:
-        path.write_bytes(path.read_bytes()[:-1])
-    with pytest.raises(StorageError) as caught:
-        collection.collect(runs, tmp_path / "all.h5")
-    assert [str(path) in str(caught.value) for path in paths] == [k < named for k in range(damaged)]
-    assert ("and 1 more" in str(caught.value)) == (damaged > named)
-    assert "\n" not in str(caught.value)
-
-
 def test_what_is_no_run_is_left_out(runs):
     """The collection of the last time, and the journal of a run that goes on."""
     (runs / "x.journal").mkdir()
