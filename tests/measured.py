@@ -1,5 +1,7 @@
 """Measurements and motions made up for tests."""
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -39,8 +41,11 @@ def motion(p: Parameters, time: npt.ArrayLike, **columns: npt.ArrayLike) -> Traj
     return Trajectory.from_blocks(Header("made up", p, Flow.steady(p.omega_0)), [block], Events())
 
 
-def thresholds(set: str, p: Parameters, *names: str) -> Records:
-    """Flows at which rolling ends, as if they had been measured before."""
-    known = analytic.thresholds(p)
-    values = {name: getattr(known, name) for name in names}
-    return Records(tuple(measured("thresholds", name, w, 1e-6 * w, p, set) for name, w in values.items()))
+def thresholds(set: str, p: Parameters, *names: str, uncertainty: float = 1e-6) -> Records:
+    """Flows at which rolling ends, those that there are, as if they had been measured before; uncertainty relative."""
+    values = {name: getattr(analytic.thresholds(p), name) for name in names}
+    return Records(
+        tuple(
+            measured("thresholds", name, w, uncertainty * w, p, set) for name, w in values.items() if math.isfinite(w)
+        )
+    )

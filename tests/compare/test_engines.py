@@ -1,21 +1,18 @@
 """Any engine makes a trajectory of the ball in the vessel: the same task in, the same trajectory out."""
 
-import json
 import sys
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import analytic
-from compare.commands import cli
 from compare.kit.engines import ENGINES, NEWCOMER
 from compare.kit.tasks import Task, carry_out, store
 from docs.studies.states import LANDING, STATES
 from model import InputError, Parameters, State
 from model.drag import LAWS
-from model.kinematics import Motion as World
-from model.kinematics import from_world, to_world
+from model.kinematics import to_world
+from tests.commands import refused, told
 from tests.drag_laws import resistance
 
 # Drake loads IPython, which leaves files open.
@@ -102,29 +99,17 @@ def test_cases_are_told_by_gaps_and_slip_where_forces_are_not_known(name):
 @pytest.mark.parametrize("law", LAWS)
 def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
     p = REFERENCE.replace(drag=law, nu_f=1e-5, omega_0=12.0, c=0.3)
-    x0 = (0.02, 0.3, 4.0, 1.0, -2.0, 3.0, 0.02, -0.1)
-    lasts, step = 0.05, 1e-4
-    begin = to_world(x0, 0.0, p)
-
-    def motion(_, now):
-        w = now[3:] - p.omega_0 * np.array([-now[1], now[0], 0.0])
-        return np.concatenate([now[3:], -resistance(np.linalg.norm(w), p) * w - [0.0, 0.0, p.g]])
-
-    ended = solve_ivp(motion, (0, lasts), np.concatenate([begin.position, begin.velocity]), rtol=1e-9, atol=1e-12)
-    truth, theta = from_world(World(ended.y[:3, -1], ended.y[3:, -1], begin.spin), p)
-    seen = run(name, p, x0, lasts, step)
+    x0, lasts, step = (0.02, 0.3, 4.0, 1.0, -2.0, 3.0, 0.02, -0.1), 0.05, 1e-4
+    truth, seen = analytic.simulate(p, x0, lasts), run(name, p, x0, lasts, step)
     assert seen.time[-1] == pytest.approx(lasts)
     assert {case.name for case in seen.cases} == {"NN"}
     # The step is of first order: a speed lacks up to what a step of the largest acceleration gives.
-    speed = np.abs(np.diff(ended.y[3:], axis=1) / np.diff(ended.t)).max() * step
-    assert seen.theta[-1] == pytest.approx(float(theta), abs=lasts * speed / p.R)
-    assert seen.y[-1] == pytest.approx(truth.y, abs=lasts * speed)
-    assert seen.h[-1] == pytest.approx(truth.h, abs=lasts * speed)
-    assert seen.v_y[-1] == pytest.approx(truth.v_y, abs=2 * speed)
-    assert seen.omega_c[-1] == pytest.approx(truth.omega_c, abs=2 * speed / (p.R - truth.h))
-    turned = np.linalg.norm(begin.spin) * lasts * speed / p.R  # the spin keeps its direction in space
-    for slip in ("slip_x", "slip_y", "slip_z"):
-        assert getattr(seen, slip)[-1] == pytest.approx(getattr(truth, slip), abs=2 * speed / p.r + turned)
+    slowed = resistance(np.hypot(x0[1], p.R * p.omega_0), p) * np.hypot(x0[1], p.R * p.omega_0)
+    speed = step * np.hypot(p.g, slowed)
+    spin = 2 * speed / p.r + np.linalg.norm(to_world(x0, 0.0, p).spin) * lasts * speed / p.R  # keeps its way in space
+    allowed = [lasts * speed, 2 * speed, 2 * speed / (p.R - x0[6]), spin, spin, spin, lasts * speed, 2 * speed]
+    assert (np.abs(seen.x[-1] - truth.x[-1]) <= allowed).all()
+    assert seen.theta[-1] == pytest.approx(truth.theta[-1], abs=lasts * speed / p.R)
 
 
 @engines(*NEWCOMERS)
@@ -157,22 +142,13 @@ def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name, monkeypatch):
 def test_what_is_not_installed_says_what_to_install(name, package, monkeypatch, capsys):
     monkeypatch.setattr("compare.adapters.free.version", lambda package: "not installed")
     monkeypatch.setitem(sys.modules, f"compare.adapters.{name.partition('-')[0]}", None)
-    assert cli.main(["simulate", "--engine", name, "--time", "0.05"]) == 2
-    error = capsys.readouterr().err
-    assert error == f"dualball: error: {package} is not installed: pip install {package}\n"
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_settings_out_of_range_are_refused(name):
-    settings = ENGINES[name].settings
-    with pytest.raises(InputError, match="timestep = -1 s"):
-        settings(timestep=-1.0)
+    said = refused(capsys, f"simulate --engine {name} --time 0.05")
+    assert said == f"dualball: error: {package} is not installed: pip install {package}\n"
 
 
 def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
     asked = []
     monkeypatch.setattr("compare.validation.validate", lambda output, **given: asked.append(given["engine"]) or [])
-    assert cli.main(["validate", "--engine", "drake", "--workers", "0", "--json"]) == 0
-    assert cli.main(["validate", "--workers", "0", "--json"]) == 0
+    for words in ("--engine drake", ""):
+        assert told(capsys, f"validate {words} --workers 0 --json") == "[]"
     assert asked == [ENGINES["drake"], None]
-    assert json.loads(capsys.readouterr().out.splitlines()[0]) == []

@@ -69,8 +69,7 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
 
 def test_a_run_that_breaks_down_leaves_out_its_own_pulsation(lab, monkeypatch):
     each, tried, name = Lab.each, [], "rough-wall"
-    flows = thresholds(name, QUICK[name], "omega_01", "omega_02", "omega_04").measurements
-    known = Records(tuple(replace(m, uncertainty=0.0) for m in flows if np.isfinite(m.value)))
+    known = thresholds(name, QUICK[name], "omega_01", "omega_02", "omega_04", uncertainty=0.0)
 
     def breaking(lab, tasks):
         tried.append(tasks)
@@ -108,41 +107,33 @@ def test_sets_without_slip_say_why(lab):
 ROUGH, SAMPLES = QUICK["high-wall-friction"], 50
 
 
-def sliding(**changes):
-    """A ball that slips at both points as (14) and (15) say, with some of it changed."""
+def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
+    """Of a ball that slips at both points as (14) and (15) say, with some of it changed."""
     rng = np.random.default_rng(4)
-    w_x, w_y, w_z = slips = rng.uniform(5.0, 20.0, (3, SAMPLES))
+    w_x, w_y, w_z = rng.uniform(5.0, 20.0, (3, SAMPLES))
     normal = ROUGH.m * ROUGH.g * rng.uniform(0.5, 1.0, SAMPLES)
     (A_x, A_z), (B_y, B_z) = (
         -coefficient * normal * np.stack([first, second]) / np.hypot(first, second)
         for coefficient, first, second in ((ROUGH.mu, w_z, -w_x), (ROUGH.eta, -w_z, w_y))
     )
-    made = dict(zip(("slip_x", "slip_y", "slip_z"), slips, strict=True))
-    made |= {"force_A": np.stack([A_x, normal, A_z], axis=-1), "force_B": np.stack([normal, B_y, B_z], axis=-1)}
-    return replace(motion(ROUGH, np.linspace(0.0, 1.0, SAMPLES), case=Case.SS, **made), **changes)
+    A, B = np.stack([A_x, normal, A_z], axis=-1), np.stack([normal, B_y, B_z], axis=-1)
+    right = {"slip_x": w_x, "slip_y": w_y, "slip_z": w_z, "force_A": A, "force_B": B, "case": Case.SS}
 
+    def found(law, contact, **changes):
+        of = laws.deviations([motion(ROUGH, np.linspace(0.0, 1.0, SAMPLES), **right | changes)])
+        return next(value for (_, name, point), value in of.items() if name.startswith(law) and point == contact)
 
-def values(run):
-    return {(law.split(":")[0], contact): value for (_, law, contact), value in laws.deviations([run]).items()}
-
-
-def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
-    run, ratio, law = sliding(), "friction over normal force", "(14), (15)"
-    worst = values(run)
+    ratio, law, rolls = "friction over normal force", "(14), (15)", "where it rolls it doesn't slip"
     for contact, coefficient in (("A", ROUGH.mu), ("B", ROUGH.eta)):
-        assert worst[law, contact] <= laws.ROUNDING
-        assert worst[ratio, contact] == pytest.approx(coefficient, rel=laws.ROUNDING)
-        # Nothing rolls: that law has no samples.
-        assert np.isnan(worst["where it rolls it doesn't slip", contact])
-    assert values(sliding(force_B=run.force_B * [1.0, 1.01, 1.01]))[ratio, "B"] == pytest.approx(1.01 * ROUGH.eta)
-    assert values(sliding(force_A=run.force_A * [0.99, 1.0, 0.99]))[ratio, "A"] == pytest.approx(0.99 * ROUGH.mu)
-    turned = run.force_B.copy()
-    turned[7, 1] *= -1.0  # one sample is enough
-    assert values(sliding(force_B=turned))[law, "B"] > 0.1 * ROUGH.eta
-    gaps = values(sliding(gap_A=np.full(SAMPLES, 1e-3 * ROUGH.R)))
-    assert gaps["where it is closed there is no gap", "A"] == pytest.approx(1e-3)
-    slow = sliding(slip_z=1e-3 * run.slip_z, slip_x=1e-3 * run.slip_x, case=np.full(SAMPLES, Case.RS, np.int8))
-    assert values(slow)["where it rolls it doesn't slip", "A"] > 0
+        assert found(law, contact) <= laws.ROUNDING
+        assert found(ratio, contact) == pytest.approx(coefficient, rel=laws.ROUNDING)
+        assert np.isnan(found(rolls, contact))  # nothing rolls: that law has no samples
+    assert found(ratio, "B", force_B=B * [1.0, 1.01, 1.01]) == pytest.approx(1.01 * ROUGH.eta)
+    assert found(ratio, "A", force_A=A * [0.99, 1.0, 0.99]) == pytest.approx(0.99 * ROUGH.mu)
+    one = np.where(np.arange(SAMPLES)[:, None] == 7, [1.0, -1.0, 1.0], 1.0)
+    assert found(law, "B", force_B=B * one) > 0.1 * ROUGH.eta
+    assert found("where it is closed there is no gap", "A", gap_A=1e-3 * ROUGH.R) == pytest.approx(1e-3)
+    assert found(rolls, "A", slip_z=1e-3 * w_z, slip_x=1e-3 * w_x, case=Case.RS) > 0
 
 
 def test_first_top_lies_between_samples():

@@ -6,10 +6,10 @@ import pytest
 
 from compare.adapters import siconos
 from compare.adapters.vessel import Settings, Vessel
-from compare.commands import cli
 from compare.kit.engines import ENGINES
 from compare.kit.tasks import Task, carry_out
 from model import Flow, InputError, Parameters, State
+from tests.commands import refused
 
 REFERENCE = Parameters.named("reference")
 ENGINE = ENGINES["siconos"]
@@ -37,8 +37,7 @@ def test_where_it_is_missing_the_program_says_what_to_do(named, says, elsewhere,
         elsewhere.setenv("DUALBALL_SICONOS_PYTHON", named)
     assert ENGINE.missing == says
     assert ENGINE.versions["siconos"] == "not installed"
-    assert cli.main(["simulate", "--engine", "siconos", "--time", "0.05"]) == 2
-    assert capsys.readouterr().err == f"dualball: error: {says}\n"
+    assert refused(capsys, "simulate --engine siconos --time 0.05") == f"dualball: error: {says}\n"
 
 
 def test_a_python_without_its_libraries_is_the_person_s_error(monkeypatch):
@@ -59,20 +58,13 @@ def test_a_python_without_its_libraries_is_the_person_s_error(monkeypatch):
 )
 def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monkeypatch):
     """Whatever it does in the first step; it is gone after that."""
-    script = tmp_path / "program.py"
+    script, started, popen = tmp_path / "program.py", [], siconos.subprocess.Popen
     state = "STATE = '[[0, NaN, 0], [0, 0, 0], [0, 0, 0]]'"
     script.write_text(f"{state}\nfor _ in range(2):\n    input()\n    print('null', flush=True)\ninput()\n{program}\n")
-    started = []
-
-    def start(*args, **options):
-        started.append(popen(*args, **options))
-        return started[-1]
-
-    popen = siconos.subprocess.Popen
     monkeypatch.setattr(siconos, "PROGRAM", script)
     monkeypatch.setattr(siconos, "PATIENCE", 2)  # a loaded machine takes half a second to begin
     monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
-    monkeypatch.setattr(siconos.subprocess, "Popen", start)
+    monkeypatch.setattr(siconos.subprocess, "Popen", lambda *a, **b: started.append(popen(*a, **b)) or started[-1])
     task = Task(engine="siconos", parameters=REFERENCE, x0=(0.0,) * 6, t_end=0.01, settings=Settings())
     (run,) = carry_out([task])
     assert run.header.failure.startswith(says)
