@@ -34,8 +34,10 @@ def program() -> NoReturn:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="spelled")
     os.environ["MPLBACKEND"] = "agg"  # figures go into files: that of a notebook would be looked for here, too
-    if not {"render", "--view"} & {*sys.argv}:  # MuJoCo would load a window library, by way of a Python of its own
-        os.environ.setdefault("MUJOCO_GL", "disable")
+    if "--view" not in sys.argv and (sys.platform == "linux" or "render" not in sys.argv):
+        # MuJoCo would load a window library, by way of a Python of its own; `render` draws by what was chosen.
+        os.environ["DUALBALL_GL"] = os.environ.get("MUJOCO_GL", "")
+        os.environ["MUJOCO_GL"] = "disable"
     with signals.answered(signals.end):
         try:
             code = main()

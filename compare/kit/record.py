@@ -261,15 +261,14 @@ def load(path: Path) -> Records:
         if file.attrs.get("schema") != SCHEMA or file.attrs.get("schema_version") != SCHEMA_VERSION:
             raise StorageError("it does not hold measurements in this program's format")
         columns = {name: column(dataset(file, name)).tolist() for name in file}
-        given = [name for name in _PARAMETERS if name in columns]
-        parameters = functools.cache(lambda *values: Parameters(**dict(zip(given, values, strict=True))))
+        parameters = functools.cache(lambda *values: Parameters(**dict(zip(_PARAMETERS, values, strict=True))))
         rows = []
         for k in range(len(columns["value"])):
             conditions = {name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")}
             row = Measurement(
                 **{name: columns[name][k] for name in _OWN if name != "unit"},
                 runs=tuple(columns["runs"][k].split()),
-                parameters=parameters(*(columns[name][k] for name in given)),
+                parameters=parameters(*(columns[name][k] for name in _PARAMETERS)),
                 conditions={name: value for name, value in conditions.items() if value != "" and value == value},
             )
             rows.append(row)

@@ -318,14 +318,14 @@ def choose_opengl() -> None:
 
     Raises `InputError` if there is none.
     """
-    chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
+    chosen = os.environ.get("DUALBALL_GL", os.environ.get("MUJOCO_GL", "")).strip().lower()
     working = platform.system() != "Linux" or next(filter(works, [chosen] if chosen else OFFSCREEN), None)
     if not working:
         remedy = "on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)"
         if chosen:
             remedy = f"unset MUJOCO_GL = {chosen!r}, or set it to one of {', '.join(OFFSCREEN)}"
         raise InputError(f"there is no OpenGL to draw with; {remedy}")
-    if isinstance(working, str) and not chosen:  # MuJoCo chose one that needs a display when it was imported
+    if isinstance(working, str):  # MuJoCo chose none when it was imported, or one that needs a display
         gl_context.GLContext = importlib.import_module(f"mujoco.{working}").GLContext
 
 

@@ -10,14 +10,18 @@ import pytest
 
 import analytic
 from compare.gallery import FIGURES
+from compare.kit import record
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import GapError
 from compare.kit.engines import EVENT
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.report import report
+from compare.kit.record import Missing, Records
+from compare.report import report, results
+from compare.report.results import Summary
 from model import Parameters, storage
 from tests.commands import METER, SCENE
+from tests.measured import measured
 
 
 def lacking(_: object) -> None:
@@ -46,6 +50,11 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (made / "flow.csv").write_text("time (s); omega_0 (rad/s)\n0; 10,5\n1; 20\n")
     (made / "scene.xml").write_text(SCENE)
     (made / "meter.toml").write_text(METER)
+    file = made / "results" / "measurements" / "settled.h5"
+    file.parent.mkdir(parents=True)
+    rows = measured("settled", "omega_c", 11.9, 1e-9, y=0.1), measured("settled", "force_Ay", 0.1, 1e-9)
+    record.save(Records(rows, (Missing("settled", "x", "it never settles"),)), file, {})
+    results.save(Summary.of([], Level.QUICK, {"mujoco": {1: ["measurements/settled.h5"]}}), made / "results")
     return made
 
 

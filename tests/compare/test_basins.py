@@ -5,13 +5,13 @@ import pytest
 
 from analytic import stable_solutions
 from analytic.simulation.ensemble import interval
-from compare.commands import cli
 from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
 from compare.subjects.attractors.basins import FATES, Basins, basins
 from docs.studies.figures import SEARCHES
 from docs.studies.search import BOX, Searched, confirm, parameters, random_starts, screen
-from model import InputError, Parameters, StorageError, storage
+from model import Parameters, StorageError, storage
+from tests.commands import told
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 
@@ -78,31 +78,13 @@ def test_basins_count_measure_and_keep_their_points(tmp_path):
     np.testing.assert_array_equal(again.fates, b.fates)
 
 
-@pytest.mark.parametrize(("kind", "what", "text"), [(Searched, "search", "{}"), (Basins, "basins", "[]")])
-def test_a_file_of_another_kind(kind, what, text, tmp_path):
-    (tmp_path / "no.json").write_text(text, "utf-8")
-    with pytest.raises(StorageError, match=f"holds no {what}"):
-        kind.load(tmp_path / "no.json")
-
-
-@pytest.mark.parametrize(
-    ("changes", "start", "message"),
-    [
-        ({"c": 0.0}, {}, "there are no basins"),
-        ({}, {"omega": 1.0}, "unknown state variable 'omega'"),
-        ({}, {"h": 0.06}, "h = 0.06 m"),
-    ],
-)
-def test_no_basins(changes, start, message, tmp_path):
-    with pytest.raises(InputError, match=message), Campaign(tmp_path, workers=0) as campaign:
-        basins(campaign, BISTABLE.replace(**changes), start, (Axis("omega_c", (0, 1)), Axis("slip_x", (0, 1))))
-
-
-def test_command_basins(capsys, tmp_path):
-    to = ["--results", str(tmp_path), "--workers", "0"]
-    across = ["--omega-0", "40", "--across", "omega_c=5:45:2", "--up", "slip_x=0:1:2"]
-    assert cli.main(["basins", *across, *to, "--json", "-o", str(tmp_path / "map.png")]) == 0
-    assert '"shares"' in capsys.readouterr().out
+def test_the_command_draws_the_map_or_keeps_its_data(tmp_path, capsys):
+    line = f"basins --omega-0 40 --across omega_c=5:45:2 --up slip_x=0:1:2 --results {tmp_path} --workers 0 --json"
+    assert '"shares"' in told(capsys, f"{line} -o {tmp_path / 'map.png'}")
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
-    assert cli.main(["basins", *across, *to, "-o", str(tmp_path / "map.json")]) == 0
+    told(capsys, f"{line} -o {tmp_path / 'map.json'}")
     assert Basins.load(tmp_path / "map.json").parameters.omega_0 == 40.0
+    (tmp_path / "map.json").write_text("[]", "utf-8")
+    for kind, what in ((Basins, "basins"), (Searched, "search")):
+        with pytest.raises(StorageError, match=f"holds no {what}"):
+            kind.load(tmp_path / "map.json")

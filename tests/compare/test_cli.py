@@ -251,6 +251,8 @@ def test_parameters_are_described_once(capsys):
         ("attractors --c 0 --random 1", "say how long"),
         ("basins --across y=0:1:2 --up y=0:1:3", "across and up are both y: a plane needs two state variables"),
         ("basins --across y=0:1:2 --up h=0:99:2 --results new/map", "h = 99 m is out of range"),
+        ("basins --across y=0:1:2 --up h=0:0.01:2 --c 0", "there are no basins"),
+        ("basins --across w=0:1:2 --up h=0:0.01:2", "unknown state variable 'w'"),
         ("simulate --tme=3 --omega-0 5", "there is no option '--tme' (did you mean '--time'?)"),
         ("predict extra", "'extra' is one argument too many"),
         ("sweep --vary eta=0.1,0.2 --workers 1e5", "--workers: 100000 is out of range: it must be a whole number >= 0"),

@@ -1,26 +1,25 @@
 """The program works in environments that are not a developer's: encodings, backends, closed outputs, no home."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-import analytic
-from compare.commands import cli
 from compare.kit import pages
-from model import Parameters, storage
-from tests.commands import SCENE, refused
+from model import storage
+from tests.commands import SCENE, carried_out, refused
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory):
+def here(tmp_path_factory, stocked):
     """A directory with a run, whose name has a space and letters beyond ASCII."""
     made = tmp_path_factory.mktemp("mit Öl ω")
-    storage.save(analytic.simulate(Parameters.named("reference"), [0] * 6, 0.1), made / "run é.h5")
+    shutil.copy(stocked / "run.h5", made / "run é.h5")
     return made
 
 
@@ -52,9 +51,8 @@ def test_what_cannot_be_shown_is_spelled():
 
 
 def test_any_backend_and_no_home(here):
-    notebook = "module://matplotlib_inline.backend_inline"
-    done = dualball(here, "inspect", "run é.h5", "--plot", "run ü.png", MPLBACKEND=notebook, HOME="/nonexistent")
-    assert done.returncode == 0
+    wild = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "MUJOCO_GL": "x", "HOME": "/nonexistent"}
+    assert dualball(here, "inspect", "run é.h5", "--plot", "run ü.png", **wild).returncode == 0
     assert (here / "run ü.png").stat().st_size > 10_000
 
 
@@ -71,9 +69,7 @@ def test_no_place_for_what_is_compiled(here):
 def test_a_full_output_is_said(here, words):
     done = dualball(here, words, before=">/dev/full")
     assert (done.returncode, done.stdout) == (2, b"")
-    assert done.stderr.startswith(b"dualball: error: cannot write to standard output: ")
-    assert done.stderr.endswith(b"No space left on device\n")
-    assert done.stderr.count(b"\n") == 1
+    assert done.stderr == b"dualball: error: cannot write to standard output: No space left on device\n"
 
 
 def test_a_reader_that_has_gone_is_no_error(here):
@@ -93,20 +89,17 @@ def test_closed_outputs_take_nothing_with_them(here, closed):
 def test_a_directory_in_which_nothing_can_be_written(monkeypatch, capsys):
     """Not even by the superuser."""
     monkeypatch.chdir("/proc")
-    assert cli.main(["simulate", "--start", "omega_c=1e9", "--time", "0.05"]) == 1
-    capsys.readouterr()
-    for words in ("sweep --vary eta=0.1,0.2 --workers 0", "simulate -o run.h5"):
-        assert "cannot write" in refused(capsys, *words.split())
+    assert carried_out(capsys, "simulate --start omega_c=1e9 --time 0.05")[0] == 1
+    for line in ("sweep --vary eta=0.1,0.2 --workers 0", "simulate -o run.h5"):
+        assert "cannot write" in refused(capsys, line)
 
 
 def test_names_beyond_ascii_in_the_c_locale(here):
     (here / "Würfel.xml").write_text(SCENE.replace("<geom type", '<geom name="Tür" type', 1), "utf-8")
-    done = dualball(here, "forecast", "Würfel.xml", "-o", "Würfel.html", LC_ALL="C")
-    assert done.returncode == 0, done.stderr
+    assert dualball(here, "forecast", "Würfel.xml", "-o", "Würfel.html", LC_ALL="C").returncode == 0
     assert "Würfel.xml" in (here / "Würfel.html").read_text("utf-8")
     strict = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}  # as Python takes it only if it is told to
-    done = dualball(here, "simulate", "--time", "0.05", "-o", "läuft.h5", **strict)
-    assert done.returncode == 0, done.stderr
+    assert dualball(here, "simulate", "--time", "0.05", "-o", "läuft.h5", **strict).returncode == 0
     assert storage.load(here / "läuft.h5").complete
     done = dualball(here, "inspect", "weg ä.h5", **strict)
     assert (done.returncode, done.stderr.count(b"\n")) == (2, 1)

@@ -12,14 +12,11 @@ import pytest
 import analytic
 from compare import testing
 from compare.kit import collection, record
-from compare.kit.levels import Level
-from compare.kit.record import Missing, Records
 from compare.report import results
 from compare.view import motions
 from model import InputError, Parameters, State, storage
 from model.hdf5 import seal
 from tests.commands import refused, told
-from tests.measured import measured
 
 P = Parameters.named("reference")
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
@@ -41,11 +38,10 @@ def mutated(data, rng):
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
+def files(tmp_path_factory, stocked):
     """A file of every kind, by what it is; the run of theory has several chunks."""
     made = tmp_path_factory.mktemp("whole")
-    names = "theory", "mujoco", "batch", "collection", "means", "measurements"
-    kept = {name: made / f"{name}.h5" for name in names}
+    kept = {name: made / f"{name}.h5" for name in ("theory", "mujoco", "batch", "collection", "means")}
     theory = analytic.simulate(P, State(), 5.0, sample_interval=1e-3)
     runs = {"a": theory, "b": analytic.simulate(P.replace(mu=0.3), State(), 1.0)}
     storage.save(theory, kept["theory"])
@@ -54,9 +50,7 @@ def files(tmp_path_factory):
     (made / "runs").mkdir()
     shutil.copy(kept["batch"], made / "runs")
     collection.collect(made / "runs", kept["collection"])
-    rows = (measured("settled", name, value, 1e-9, y=0.1) for name, value in (("omega_c", 11.9), ("force_Ay", 0.1)))
-    record.save(Records(tuple(rows), (Missing("settled", "x", "it never settles"),)), kept["measurements"], {})
-    return kept
+    return kept | {"measurements": stocked / "results" / "measurements" / "settled.h5"}
 
 
 @contextmanager
@@ -106,14 +100,6 @@ def test_all_damage_is_noticed(tmp_path, files, kind, read, count):
     assert len([line for line in said if str(path) in line]) == count
 
 
-def results_of(measurements):
-    """A results directory with these measurements, before they are damaged."""
-    directory = measurements.parents[1]
-    names = [measurements.relative_to(directory).as_posix()]
-    results.save(results.Summary.of([], Level.QUICK, {"mujoco": {1: names}}), directory)
-    return directory
-
-
 @pytest.mark.parametrize(
     ("kind", "command"),
     [
@@ -129,13 +115,13 @@ def results_of(measurements):
         ("measurements", "figures --results RESULTS -o DIRECTORY"),
     ],
 )
-def test_every_command_names_the_damaged_file(tmp_path, files, capsys, kind, command):
-    path = tmp_path / "results" / "measurements" / "bad.h5"
-    path.parent.mkdir(parents=True)
+def test_every_command_names_the_damaged_file(tmp_path, stocked, files, capsys, kind, command):
+    directory = shutil.copytree(stocked / "results", tmp_path / "results")
+    path = directory / "measurements" / "settled.h5"
     content = bytearray(files[kind].read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
-    places = {"FILE": path, "DIRECTORY": tmp_path, "RUNS": path.parent, "RESULTS": results_of(path)}
+    places = {"FILE": path, "DIRECTORY": tmp_path, "RUNS": path.parent, "RESULTS": directory}
     for word, place in places.items():
         command = command.replace(word, str(place))
     reason = "it is damaged (its content does not match its checksum)"
@@ -163,18 +149,17 @@ def test_a_header_that_says_something_else_is_shown_or_refused(tmp_path, files, 
 
 
 @pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.slow)])
-def test_a_damaged_summary_is_one_line(tmp_path, files, count):
-    path = tmp_path / "measurements" / "settled.h5"
-    path.parent.mkdir()
-    shutil.copy(files["measurements"], path)
-    summary = results_of(path) / results.SUMMARY
+def test_a_damaged_summary_is_one_line(tmp_path, stocked, count):
+    directory = shutil.copytree(stocked / "results", tmp_path / "results")
+    summary = directory / results.SUMMARY
 
     def judged(_):
-        stored = results.load(tmp_path)
-        results.testimony(tmp_path, stored.measurements)
+        kept = results.load(directory).measurements
+        results.testimony(directory, kept)
         # What is not a reference to measurements is made anew by judging.
-        named = [name for steps in stored.measurements.values() for names in steps.values() for name in names]
-        assert {tmp_path / name for name in named} <= {path}
+        assert {name for steps in kept.values() for names in steps.values() for name in names} <= {
+            "measurements/settled.h5"
+        }
 
     assert len(refusals(summary, mutants(summary.read_bytes(), 3, count), judged)) > count / 2
 

@@ -1,5 +1,6 @@
 """Ctrl-C and SIGTERM end every command and every long call, with one line, and leave nothing that is half written."""
 
+import contextlib
 import os
 import shutil
 import signal
@@ -11,12 +12,7 @@ from pathlib import Path
 import pytest
 
 from compare.commands import signals
-from compare.kit import record
-from compare.kit.levels import Level
-from compare.kit.record import Records
-from compare.report import results
 from tests.commands import COMMANDS
-from tests.measured import measured
 
 ROOT = Path(__file__).parents[2]
 SIGNALS = signal.SIGINT, signal.SIGTERM
@@ -41,18 +37,6 @@ LONG = {
 """What takes each command long."""
 
 
-@pytest.fixture
-def here(stocked, tmp_path):
-    """A directory with what commands read."""
-    made = Path(shutil.copytree(stocked, tmp_path / "here"))
-    file = made / "results" / "measurements" / "settled.h5"
-    file.parent.mkdir(parents=True)
-    record.save(Records((measured("settled", "omega_c", 11.9, 1e-9, case="RR"),)), file, {})
-    summary = results.Summary.of([], Level.QUICK, {"mujoco": {1: ["measurements/settled.h5"]}})
-    results.save(summary, made / "results")
-    return made
-
-
 def catches(process, number):
     """Whether it has a handler for a signal, or has ended."""
     try:
@@ -63,12 +47,21 @@ def catches(process, number):
     return bool(int(caught, 16) >> (number - 1) & 1)
 
 
-def end(command, number, after, here):
-    """Send a signal so many seconds after the first moment at which the program can answer.
+ALL = [(command, number, after) for command in COMMANDS for number in SIGNALS for after in (0.0, 0.4, 1.5, 4.0, 10.0)]
 
-    To all that belongs to it, as a terminal and a cluster do; but to `render` alone while it may be importing MuJoCo,
-    whose window library asks a Python of its own for its version.
-    """
+
+@pytest.mark.parametrize(
+    ("command", "number", "after"),
+    [
+        *(("attractors", signal.SIGINT, 3.0), ("basins", signal.SIGTERM, 3.0)),
+        # Python and packages are being loaded, each time a little further: no traceback of theirs.
+        *((command, SIGNALS[k % 2], 0.03 * k) for k, command in enumerate(COMMANDS)),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in ALL),
+    ],
+)
+def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, after):
+    """To all that belongs to it, as a terminal and a cluster send it, so many seconds after it first can answer."""
+    here = Path(shutil.copytree(stocked, tmp_path / "here"))
     before = set(here.rglob("*"))
     process = subprocess.Popen(
         [sys.executable, "-m", "compare", command, *LONG.get(command, "").split()],
@@ -85,41 +78,18 @@ def end(command, number, after, here):
         time.sleep(0.001)
     time.sleep(after)
     running = process.poll() is None
-    try:
-        (os.kill if command == "render" and after <= 2 else os.killpg)(process.pid, number)
-    except ProcessLookupError:
-        running = False
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, number)
     out, err = process.communicate(timeout=60)
-    said = [line for line in err.splitlines() if line.startswith("dualball")]
     assert "Traceback" not in out + err, err
     assert "leaked" not in err
     if running and process.returncode not in (0, -number):  # it may just have been done
-        assert process.returncode == 128 + number, (command, err)
-        assert len(said) == 1, err
-        assert "interrupted" in said[0] or "was stopped at t =" in said[0]
+        assert process.returncode == 128 + number, err
+        (said,) = (line for line in err.splitlines() if line.startswith("dualball"))
+        assert "interrupted" in said or "was stopped at t =" in said
         assert not out or command in ("simulate", "validate", "figures", "judge", "explore"), out  # no result
     new = set(here.rglob("*")) - before
     assert not [path for path in new if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))]
-
-
-@pytest.mark.parametrize(("command", "number"), [("attractors", signal.SIGINT), ("basins", signal.SIGTERM)])
-def test_work_ends(here, command, number):
-    end(command, number, 3.0, here)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_ends_while_it_begins(here, command):
-    """Python and packages are being loaded, each time a little further: no traceback of theirs."""
-    k = COMMANDS.index(command)
-    end(command, SIGNALS[k % 2], 0.03 * k, here)
-
-
-@pytest.mark.slow
-@BOTH
-@pytest.mark.parametrize("after", [0.0, 0.4, 1.5, 4.0, 10.0])
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_ends_at_any_moment(here, command, after, number):
-    end(command, number, after, here)
 
 
 INTERRUPTED = """
