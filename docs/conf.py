@@ -135,6 +135,13 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
     for said in list(tree.findall(addnodes.desc_annotation)):
         if said.astext().startswith(" = ") and len(said.astext()) > 100:  # a table, which its module shows better
             said.parent.remove(said)
+    entry: addnodes.desc | None = None
+    for each in list(tree.findall(addnodes.desc)):  # constants that are declared together have one text
+        if entry and each["objtype"] == entry["objtype"] == "data" and each[-1].astext() == entry[-1].astext() != "":
+            entry[-1:-1] = each[:-1]
+            each.parent.remove(each)
+        else:
+            entry = each
     for formula in tree.findall(lambda node: isinstance(node, nodes.math | nodes.math_block)):
         try:
             latex2mathml.tex2mathml(formula.astext())
