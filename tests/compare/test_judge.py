@@ -27,8 +27,8 @@ def measured(value, uncertainty, name="omega_c"):
     return Records((tests.measured.measured("settled", name, value, uncertainty, P, "mine"),))
 
 
-def claim(bearing=None):
-    bearing = bearing or Bearing(protocol="settled", quantity="omega_c", predict=lambda m: m.parameters.omega_0)
+def claim(predict=lambda m: m.parameters.omega_0, quantity="omega_c", **more):
+    bearing = Bearing(protocol="settled", quantity=quantity, predict=predict, **more)
     return Claim(id="it", section="Stationary states", source="(1)", statement="It goes round.", bearings=(bearing,))
 
 
@@ -69,9 +69,8 @@ def test_most_numbers_must_be_fine_enough_to_tell(fine, expected):
 
 
 def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only():
-    predictions = (lambda m: {}["no such state"], lambda m: 1 / 0)
-    claims = [claim(replace(claim().bearings[0], predict=predict)) for predict in predictions]
-    unknown, broken, right = judge([*claims, claim()], measured(P.omega_0, FINE))
+    claims = [claim(lambda m: {}["no such state"]), claim(lambda m: 1 / 0), claim()]
+    unknown, broken, right = judge(claims, measured(P.omega_0, FINE))
     assert [v.outcome for v in (unknown, broken, right)] == [Outcome.REFUTED, Outcome.ERROR, Outcome.CONFIRMED]
     assert unknown.worst == math.inf
     assert "division by zero" in broken.error
@@ -79,17 +78,16 @@ def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own
 
 def test_bounds_hold_on_one_side_and_what_must_be_equal_has_no_tolerance():
     for relation, agrees in ((Relation.AT_MOST, -1), (Relation.AT_LEAST, 1)):
-        of = claim(replace(claim().bearings[0], relation=relation))
+        of = claim(relation=relation)
         assert outcome(of, measured(P.omega_0 * (1 + agrees), FINE)) is Outcome.CONFIRMED
         assert outcome(of, measured(P.omega_0 * (1 - agrees / 2), FINE)) is Outcome.REFUTED
-    of = claim(Bearing(protocol="settled", quantity="cases", predict=lambda m: 5.0))
+    of = claim(lambda m: 5.0, "cases")
     assert outcome(of, measured(5.0, 0.0, "cases")) is Outcome.CONFIRMED
     assert outcome(of, measured(4.0, 0.0, "cases")) is Outcome.REFUTED
 
 
 def test_a_prediction_may_be_uncertain_itself():
-    of = claim(replace(claim().bearings[0], predict=lambda m: Measured(m.parameters.omega_0 + 1e-7, 1e-7)))
-    (verdict,) = judge([of], measured(P.omega_0, FINE / 100))
+    (verdict,) = judge([claim(lambda m: Measured(P.omega_0 + 1e-7, 1e-7))], measured(P.omega_0, FINE / 100))
     assert verdict.outcome is Outcome.CONFIRMED
     assert verdict.checks[0].tolerance == pytest.approx(COVERAGE * 1e-7, rel=1e-3)
 
@@ -99,13 +97,12 @@ def test_resolving_power_is_the_error_of_theory_that_would_be_noticed():
     (verdict,) = judge([claim()], records)
     power = verdict.resolving_power["omega_c"]
     for error, noticed in ((0.9 * power, Outcome.CONFIRMED), (1.1 * power, Outcome.REFUTED)):
-        wrong = replace(claim().bearings[0], predict=lambda m, error=error: m.parameters.omega_0 * (1 + error))
-        assert outcome(claim(wrong), records) is noticed
+        assert outcome(claim(lambda m, error=error: P.omega_0 * (1 + error)), records) is noticed
 
 
 def test_predictions_are_forgotten_between_judgements():
     values = {"omega_c": P.omega_0}
-    of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: theory(values.__getitem__, "omega_c")))
+    of = claim(lambda m: theory(values.__getitem__, "omega_c"))
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.CONFIRMED
     values["omega_c"] *= 1.01
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.REFUTED
@@ -113,7 +110,7 @@ def test_predictions_are_forgotten_between_judgements():
 
 def test_claims_that_are_none_are_refused():
     with pytest.raises(InputError, match="omega_c"):
-        Bearing(protocol="settled", quantity="omega_cc", predict=lambda m: 0.0)
+        claim(quantity="omega_cc")
     assert Claim(id="it", section="", source="", statement="", algebra=lambda: []).text is Text.FORMAL
     with pytest.raises(ValueError, match="formal"):
         Claim(id="it", section="", source="", statement="")
@@ -122,17 +119,15 @@ def test_claims_that_are_none_are_refused():
 
 
 def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
-    false = replace(claim(), expected=Outcome.REFUTED)
-    (mine,) = judge([false], measured(P.omega_0, FINE))
-    assert mine.outcome is Outcome.CONFIRMED
-    assert mine.passed
-    of_the_study = [replace(m, set="reference") for m in measured(P.omega_0, FINE).measurements]
-    assert not judge([false], Records(tuple(of_the_study)))[0].passed
+    false, (row,) = replace(claim(), expected=Outcome.REFUTED), measured(P.omega_0, FINE).measurements
+    for name, passed in (("mine", True), ("reference", False)):
+        (verdict,) = judge([false], Records((replace(row, set=name),)))
+        assert (verdict.outcome, verdict.passed) == (Outcome.CONFIRMED, passed)
 
 
 def test_judging_a_claim_takes_no_longer_than_it_may(monkeypatch):
     """Whatever the files say; the judge takes every `Exception` of a prediction for a breakdown of the theory."""
-    endless = claim(replace(claim().bearings[0], predict=lambda m: sum(0 for _ in itertools.count())))
+    endless = claim(lambda m: sum(0 for _ in itertools.count()))
     monkeypatch.setattr(validation, "JUDGING", 0.1)
     told = validation._in_time(endless, {"mujoco": {1: measured(P.omega_0, FINE)}})
     assert (told.outcome, told.error) == (Outcome.ERROR, "it took longer than 0.1 s")

@@ -60,12 +60,11 @@ def test_runs_that_are_undecided_or_break_down_leave_the_place_open():
     assert broken.failure == "broke"
 
 
-@pytest.mark.parametrize(("eta", "lost"), [(0.99, False), (1.01, True)])
-def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(eta, lost):
+@pytest.mark.parametrize(("eta", "end", "lost"), [(0.99, "omega_01", False), (1.01, "omega_03", True)])
+def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(eta, end, lost):
     """Beyond the end of rolling, on walls a little smoother and rougher than the inertia j."""
     p = REFERENCE.replace(eta=eta * REFERENCE.j)
-    t = analytic.thresholds(p)
-    p = p.replace(omega_0=1.002 * (t.omega_03 if lost else t.omega_01))
+    p = p.replace(omega_0=1.002 * getattr(analytic.thresholds(p), end))
     run = analytic.simulate(p, State(omega_c=p.omega_0), 2.0)
     assert answers.lifts(Bracket(0.0, 1.0, (None, run))) is lost
     assert run.force_A[-1, 1] < PRESSES * p.m * p.g
@@ -97,27 +96,18 @@ def test_a_line_has_no_maximum(bend):
     assert not math.isfinite(turning(where - bend * where**2, order).value)
 
 
-def _settled(name, p, flows):
-    """In which cases balls settle at a few flows, as the protocol `settled` has it."""
-    for flow in flows:
+def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):
+    """Of a set without fold, and the cases in which balls settle there."""
+    monkeypatch.setattr(thresholds, "extrapolated", lambda *what: None)
+    p, rows = sets(Level.QUICK)["thick-fluid"], []
+    for flow in (0.6, 1.4, 2.5):
         q = p.replace(omega_0=flow / time_unit(p))
         cases = {s.case for s in analytic.stable_solutions(q)}
-        floor = Case.RR if Case.RR in cases else Case.SS if Case.SS in cases else Case.NR
+        floor = next(case for case in (Case.RR, Case.SS, Case.NR) if case in cases)
         wall = Case.NR if Case.NR in cases else Case.NS
         for start, case in (("rest", floor), ("with the fluid", floor), ("on the wall", wall)):
-            yield measured("settled", "case", float(case), 0.0, q, name, start=start, case=case.name)
-
-
-def _thick(lab):
-    """Thresholds of a set without fold."""
-    sets_of_one = {name: p for name, p in sets(Level.QUICK).items() if name == "thick-fluid"}
-    known = (row for name, p in sets_of_one.items() for row in _settled(name, p, (0.6, 1.4, 2.5)))
-    return Records.of(thresholds.measure(lab, sets_of_one, Records(tuple(known))))
-
-
-def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):
-    monkeypatch.setattr(thresholds, "extrapolated", lambda *what: None)
-    records = _thick(lab)
+            rows.append(measured("settled", "case", float(case), 0.0, q, "thick-fluid", start=start, case=case.name))
+    records = Records.of(thresholds.measure(lab, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
     assert [m.value for m in records.select("thresholds", "folds")] == [1.0]  # an end is seen, and no smooth one
 
