@@ -37,7 +37,8 @@ test-all: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist worksteal -m "slow or not slow"
 
 benchmarks: $(VENV)/installed-dev
-	$(BIN)/python -m tests.benchmarks
+	$(BIN)/python -m docs.studies.speed docs/speed.md
+	$(BIN)/python -m docs.studies.costs docs/campaigns.md
 
 verdicts: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)

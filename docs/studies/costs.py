@@ -1,4 +1,7 @@
-"""What runs of MuJoCo, campaigns and commands cost: the tables of docs/campaigns.md."""
+"""What runs of MuJoCo, campaigns and commands cost, as ratios in one run.
+
+``python -m docs.studies.costs docs/campaigns.md`` writes the tables of that page, in some ten minutes.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +30,7 @@ from compare.kit.pages import Rows
 from compare.kit.sweep import MOST
 from compare.kit.tasks import Task, carry_out
 from compare.kit.workers import Workers, dask, processes
+from docs.studies.tables import write_all
 from mjsim import scene
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
@@ -255,3 +259,8 @@ def resuming() -> float:
             storage.save_batch({task.key: run for task in tasks[k : k + BATCH]}, Path(directory) / f"runs-{k:024x}.h5")
         with Campaign(Path(directory), workers=0) as campaign:
             return seconds(partial(campaign.complete, tasks))
+
+
+if __name__ == "__main__":
+    tables = {"growth": growth, "costs": costs, "study": study, "start": start_up}
+    sys.exit(write_all(tables, "Write the tables on the costs of runs, campaigns and commands.", "docs/campaigns.md"))

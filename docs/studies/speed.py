@@ -1,4 +1,4 @@
-"""What theory costs: the tables of docs/speed.md."""
+"""What theory costs: ``python -m docs.studies.speed docs/speed.md`` writes the tables of that page, in ten minutes."""
 
 from __future__ import annotations
 
@@ -25,11 +25,12 @@ from analytic.stationary.solutions import solution
 from compare.kit.engines import engine
 from compare.kit.pages import Rows
 from compare.kit.tasks import Task, carry_out
+from docs.studies.costs import REPEATS, two_against_one
+from docs.studies.costs import seconds as clocked
+from docs.studies.tables import write_all
 from model import Case, Flow, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ, TURNING
-from tests.benchmarks.program import REPEATS, two_against_one
-from tests.benchmarks.program import seconds as clocked
 
 LEAST, BEST = 0.3, 1e-13
 """Seconds that the runs of which the quickest counts take at least, and the tolerance of the run that others are held
@@ -281,3 +282,8 @@ def many() -> Rows:
         ["speed of two threads divided by that of one", "", f"{ratio:.2f}"],
         ["two processes of bare arithmetic at that time: the machine's limit", "", f"{limit:.2f}"],
     ]
+
+
+if __name__ == "__main__":
+    tables = {"event-driven": event_driven, "states": states, "siconos": stepped, "many": many}
+    sys.exit(write_all(tables, "Write the tables on the speed of theory.", "docs/speed.md"))
