@@ -79,6 +79,7 @@ class WholeFile:
         self._finished = True
 
     def _check(self) -> None:
+        """Raise `StorageError` if something could not be written."""
         if self._disk.error:
             raise StorageError(f"cannot write {self.path}: {self._disk.error.strerror}") from self._disk.error
 
@@ -201,7 +202,7 @@ def _check_seal(content: BinaryIO) -> None:
 
 
 def _checksum(content: BinaryIO, size: int) -> bytes:
-    """Of the first `size` bytes."""
+    """The checksum of the first `size` bytes of a file."""
     digest = hashlib.sha256()
     content.seek(0)
     for start in range(0, size, _BLOCK):

@@ -158,7 +158,9 @@ def to_world(x: npt.ArrayLike, theta: npt.ArrayLike, p: Parameters) -> Motion:
     position = np.broadcast_arrays(rho * np.cos(theta), rho * np.sin(theta), p.r + state.y)
     velocity = np.stack([state.v_h, state.v_y, rho * state.omega_c], axis=-1)
     turn = np.swapaxes(frame(theta), -1, -2)
-    return Motion(np.stack(position, axis=-1), _times(turn, velocity), _times(turn, angular_velocity(x, p)))
+    return Motion(
+        np.stack(position, axis=-1), _matrix_product(turn, velocity), _matrix_product(turn, angular_velocity(x, p))
+    )
 
 
 def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
@@ -169,15 +171,16 @@ def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
     px, py, pz = np.moveaxis(motion.position, -1, 0)
     theta, rho = np.arctan2(py, px), np.hypot(px, py)
     axes = frame(theta)
-    v_h, v_y, v_k = np.moveaxis(_times(axes, motion.velocity), -1, 0)
-    o_x, o_y, o_z = np.moveaxis(_times(axes, motion.spin), -1, 0)
+    v_h, v_y, v_k = np.moveaxis(_matrix_product(axes, motion.velocity), -1, 0)
+    o_x, o_y, o_z = np.moveaxis(_matrix_product(axes, motion.spin), -1, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         omega_c = np.where(rho > 0, v_k / rho, np.nan)
     # v_k is rho omega_c: the rolling part needs no division by rho.
     return State(pz - p.r, v_y, omega_c, o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, p.R - rho, v_h), theta
 
 
-def _times(matrix: Array, vector: Array) -> Array:
+def _matrix_product(matrix: Array, vector: Array) -> Array:
+    """Vectors (..., 3) multiplied by matrices (..., 3, 3)."""
     return np.asarray(np.einsum("...ab,...b->...a", matrix, vector))
 
 

@@ -40,7 +40,7 @@ class Range:
     def __str__(self) -> str:
         """As a person reads it: ``> 0 and <= 2/3``."""
         ends = ((">" if self.open else ">=", self.low), ("<" if self.below else "<=", self.high))
-        limits = " and ".join(f"{sign} {_shown(end)}" for sign, end in ends if math.isfinite(end))
+        limits = " and ".join(f"{sign} {_exact_text(end)}" for sign, end in ends if math.isfinite(end))
         return f"{'a whole number' * self.whole} {limits}".strip() or "any"
 
 
@@ -94,14 +94,14 @@ def check_names(given: Collection[str], known: Sequence[str], kind: str, needed:
         raise InputError(f"missing {kind} {', '.join(repr(name) for name in missing)}")
 
 
-def _shown(number: float) -> str:
-    """Short and exact where that can be: 0.1, 2/3."""
+def _exact_text(number: float) -> str:
+    """A number as text, short and exact where that can be: 0.1, 2/3."""
     fraction = Fraction(number).limit_denominator(9)
     return f"{number:g}" if float(f"{number:g}") == number or float(fraction) != number else str(fraction)
 
 
 def _quantity(symbol: str, unit: str, meaning: str, allowed: Range, **default: Any) -> Any:
-    """Declare a parameter."""
+    """Declare a parameter of the model, with what a reader and the range check need."""
     return dataclasses.field(
         metadata={"symbol": symbol, "unit": unit, "meaning": meaning, "allowed": allowed}, **default
     )
@@ -272,11 +272,11 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise StorageError(f"{path} is not valid TOML: it must be text in UTF-8") from error
     except tomllib.TOMLDecodeError as error:
-        hint = "; a number takes a point, not a comma" if _comma(text, str(error)) else ""
+        hint = "; a number takes a point, not a comma" if _has_decimal_comma(text, str(error)) else ""
         raise StorageError(f"{path} is not valid TOML: {error}{hint}") from error
 
 
-def _comma(text: str, error: str) -> bool:
+def _has_decimal_comma(text: str, error: str) -> bool:
     """Whether the line of a TOML text that an error names has a number with a decimal comma."""
     line = re.search(r"at line (\d+)", error)
     return bool(line and re.search(r"=\s*[-+]?\d+,\d", text.splitlines()[int(line[1]) - 1]))

@@ -65,14 +65,14 @@ class TrajectoryWriter(WholeFile):
         self._flow = header.flow
         with ExitStack() as begun:
             begun.push(self)  # removes the file if this fails
-            scales = _begin(self.file, SCHEMA, SCHEMA_VERSION)
+            scales = _write_common(self.file, SCHEMA, SCHEMA_VERSION)
             self.file.attrs.update(header.attributes())
             self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
             for of, time in ((Trajectory, "time"), (Events, "event_time")):
                 for meta in [*columns(of).values(), *([FLUID] if of is Trajectory else [])]:
                     shape = meta["shape"]
                     sizes = {"shape": (0, *shape), "maxshape": (None, *shape), "chunks": (1024, *shape)}
-                    _create(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
+                    _create_column(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
             begun.pop_all()
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
@@ -103,7 +103,7 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
     """
     with WholeFile(path) as whole:
         file = whole.file
-        scales = _begin(file, BATCH, BATCH_VERSION)
+        scales = _write_common(file, BATCH, BATCH_VERSION)
         file.attrs.update(Conventions=CONVENTIONS, title=f"Motions of dual-point contact balls: {len(runs)} runs")
         file.attrs["versions"] = json.dumps(dict(current_versions()))
         scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
@@ -123,7 +123,7 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
                 for row, count, table in zip(values, counts, tables, strict=True):
                     row[:count] = getattr(table, name)
                 packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size else {}
-                _create(file, meta, ("run", dimension, "axis"), scales, data=values, **packed)
+                _create_column(file, meta, ("run", dimension, "axis"), scales, data=values, **packed)
         whole.finish()
 
 
@@ -184,8 +184,8 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
         return runs
 
 
-def _begin(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
-    """What all files have; the scales of dimensions by name, so far that of the axes."""
+def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
+    """Write schema and axes, which all files have; return the scales of dimensions by name: so far that of the axes."""
     file.attrs.update(schema=schema, schema_version=version)
     axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
     axis.attrs.update(AXIS_ATTRIBUTES)
@@ -193,10 +193,10 @@ def _begin(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset
     return {"axis": axis}
 
 
-def _create(
+def _create_column(
     file: h5py.File, meta: Mapping[str, Any], dimensions: Sequence[str], scales: dict[str, h5py.Dataset], **layout: Any
 ) -> None:
-    """A column whose dimensions are the first of these names; without a scale for one, it is the scale itself."""
+    """Create a column whose dimensions are the first of these names; where one has no scale yet, the column is it."""
     column = file.create_dataset(meta["name"], dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
     column.attrs.update(attributes(meta))
     for dimension, scale in zip(column.dims, dimensions, strict=False):
@@ -217,6 +217,7 @@ def _read(file: h5py.File, part: slice) -> Trajectory:
 
 
 def _check_schema(file: h5py.File, name: str, newest: int) -> None:
+    """Raise `StorageError` unless a file is of the schema `name`, in a version up to `newest`."""
     schema, version = file.attrs.get("schema"), file.attrs.get("schema_version")
     if schema != name:
         raise StorageError(f"it is an HDF5 file, but not a {name}")

@@ -29,7 +29,7 @@ def is_number(text: str) -> bool:
 
 
 def columns(head: Sequence[str], known: Mapping[str, tuple[str, Sequence[str]]]) -> dict[str, int]:
-    """Where in a table the quantities are that its head names; `known` has the unit and other names of each.
+    """The column of each quantity in a table, from its head; `known` has the unit and other names of each quantity.
 
     Labels are as ``time``, ``t (s)``, ``omega_0 [rad/s]`` or ``t in s``. Raises `InputError` for another unit, a
     quantity that comes twice, or one that there isn't.

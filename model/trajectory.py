@@ -232,7 +232,7 @@ COMPONENTS: dict[str, tuple[str, str]] = {
 
 
 def component(of: Any, name: str) -> Array:
-    """One of `COMPONENTS` at each sample of a trajectory, or of its data set in xarray, shape (n,)."""
+    """A number by its name, such as omega_c or force_Ax, at each sample of a trajectory or its data set, shape (n,)."""
     column, axis = COMPONENTS[name]
     values = np.asarray(getattr(of, column))
     return values[:, AXES.index(axis)] if axis else values

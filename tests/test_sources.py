@@ -44,15 +44,15 @@ EXCEPTIONS = {
     *("mjsim/engine.py:__init__", "mjsim/engine.py:simulate", "mjsim/engine.py:simulate_many"),
     *("compare/validation.py:validate", "compare/view/render.py:write"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
-    *("analytic/simulation/equations.py:forces", "analytic/simulation/equations.py:straight"),
-    *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_dense", "_first_fall", "_explicit")),
-    *(f"analytic/simulation/solvers.py:{name}" for name in ("_extrapolated", "_implicit")),
-    *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_continued", "both")),
+    *("analytic/simulation/equations.py:forces", "analytic/simulation/equations.py:is_straight"),
+    *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_interpolant", "_first_fall")),
+    *(f"analytic/simulation/solvers.py:_{name}" for name in ("extrapolation_step", "explicit_steps", "implicit_steps")),
+    *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
     *("mjsim/corrections.py:corrections", "mjsim/landing.py:through"),
     *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_hand_on", "_holds", "_put_back")),
     "mjsim/world_axes.py:driven",
     # what an exact case is made of
-    "compare/bench/one_contact.py:closed",
+    "compare/bench/one_contact.py:closed_form",
     # all that a measured number is made of
     "compare/kit/record.py:measurement",
 }

@@ -63,7 +63,7 @@ def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, relea
 
 
 def curves_without_drag(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False) -> dict[str, Array]:
-    """Those of `threshold_curves` in which drag plays no part: omega_01, omega_02 and omega_03."""
+    """omega_01, omega_02 and omega_03, in which drag plays no part, as `threshold_curves` gives them."""
     mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
     divisor = mu * eta * (1 + j) + j - eta
     real = (divisor > 0) & ((eta <= j) | released)
@@ -191,7 +191,7 @@ closed form any more."""
 
 
 def thresholds_with_inertia(p: Parameters) -> dict[str, float]:
-    """`SHIFTED` with the added mass and the pressure gradient of the swirl, rad s-1, nan for what doesn't exist.
+    """omega_01 and omega_02 with the added mass and the pressure gradient of the swirl, rad s-1; nan if there is none.
 
     The paper leaves both out, and so do the simulators. A ball that goes round with the fluid needs a centripetal force
     of its own mass less that of the fluid it displaces, while its spin is turned as before: (1 - s) m takes the place

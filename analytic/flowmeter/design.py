@@ -107,7 +107,7 @@ def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
         return flows, flows
     t, turn, unit = bifurcation.thresholds(p), slipping_branch.fold(p), np.sqrt(p.g / p.R)
     end, ends_in_fold = (slipping_branch.END, False) if np.isnan(turn) else (float(turn), True)
-    s = roots.crossing(lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end)
+    s = roots.sign_change(lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end)
     lagging = np.where(np.isnan(s), flows, slipping_branch.branch(s, p).Omega_c * unit)
     slips = (flows > t.omega_01) & ~(flows > (t.omega_04 if ends_in_fold else t.omega_02))
     return np.where(slips, lagging, flows), np.where(slips & ~(flows > t.omega_02), lagging, flows)
@@ -123,7 +123,7 @@ def response_time(p: Parameters) -> float:
 
 @dataclass(frozen=True)
 class Choice:
-    """A meter for flows up to a given one."""
+    """A meter with its limits and response, judged for flows up to a given one."""
 
     values: dict[str, float]
     """What `make` needs to make it."""
@@ -169,12 +169,12 @@ def best(
     ends = np.array([bounds[name] for name in open_names]).reshape(-1, 2)
     exact = {name: low for name, (low, _) in bounds.items()}
 
-    def at(unit: npt.ArrayLike) -> Choice:
+    def meter_at(unit: npt.ArrayLike) -> Choice:
         chosen = ends[:, 0] + np.asarray(unit) * (ends[:, 1] - ends[:, 0])
         return choice(make, {**exact, **dict(zip(open_names, chosen.tolist(), strict=True))}, tolerances, fastest)
 
     def cost(unit: Array) -> float:
-        c = at(unit)
+        c = meter_at(unit)
         delay = math.log(c.response) if math.isfinite(c.response) else 0.0
         late = c.response > slowest_response
         return 100 + delay if late else _TIE * delay - c.margin
@@ -184,9 +184,9 @@ def best(
         cube = Bounds(np.zeros(len(ends)), np.ones(len(ends)))
         result = differential_evolution(cost, cube, rng=seed, popsize=each, tol=1e-5, polish=False)
         at_bounds = np.where(np.abs(result.x - 0.5) > 0.49, np.round(result.x), result.x)
-        chosen = at(min(at_bounds, result.x, key=cost))
+        chosen = meter_at(min(at_bounds, result.x, key=cost))
     else:
-        chosen = at([])
+        chosen = meter_at([])
     if chosen.response > slowest_response:
         raise InputError(
             f"response = {slowest_response:g} s excludes everything: within the bounds the quickest ball has a time "

@@ -41,6 +41,7 @@ def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLik
 
 
 def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], phase: Array) -> tuple[Array, Array]:
+    """As `swing`, from the harmonics of the lag."""
     omega_0 = p.omega_0 + amplitude * np.sin(phase)
     waves = np.exp(1j * phase[..., None] * np.arange(1, 2 * len(lag), 2))
     return omega_0 + (waves * lag).sum(axis=-1).real, omega_0

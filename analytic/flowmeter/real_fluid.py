@@ -32,7 +32,7 @@ _SHARES = 2001
 
 @dataclass(frozen=True)
 class Rolling:
-    """Two-point rolling with the fluid's torque."""
+    """Steady rolling at both points of a ball whose spin the fluid's torque brakes."""
 
     omega_c: float
     """rad s-1"""
@@ -47,7 +47,7 @@ class Rolling:
 
 
 def torque_rate(spin: Real, p: Parameters, layer: bool = True) -> Real:
-    """k in s-1 for a ball that turns at `spin` rad s-1 relative to the fluid; by Stokes unless `layer`.
+    """The rate k in s-1 at which the fluid's torque brakes a spin of `spin` rad s-1; by Stokes unless `layer`.
 
     p.fluid_torque takes the place of both if it is given.
     """
@@ -59,7 +59,7 @@ def torque_rate(spin: Real, p: Parameters, layer: bool = True) -> Real:
 
 
 def rolling(p: Parameters, layer: bool = True) -> Rolling:
-    """The stationary RR at p.omega_0 with the torque; nan where nothing moves (omega_0 = 0, or no drag).
+    """The stationary RR at p.omega_0 with the fluid's torque on the spin; nan where nothing moves (omega_0 or c = 0).
 
     In RR the spin is (R omega_c/r, -R omega_c/r, 0) (4). It is steady if friction balances the torque,
     A_z = -j k m R omega_c and B_z = -j k m (R omega_c + r omega_0), and drag these,
@@ -77,7 +77,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
         held = p.j * torque_rate(spin(omega_c), p, layer) * (2 * p.R * omega_c + p.r * flow)
         return np.asarray(held - drag.coefficient(lag, p) * lag)
 
-    omega_c = float(roots.crossing(excess, -flow * max(1.0, p.r / (2 * p.R)), flow))
+    omega_c = float(roots.sign_change(excess, -flow * max(1.0, p.r / (2 * p.R)), flow))
     k, Re = float(torque_rate(spin(omega_c), p, layer)), spin(omega_c) * p.r**2 / p.nu_f if p.nu_f else math.nan
     u, z_A, z_B = p.R * omega_c**2 / p.g, *(p.j * k * (p.R * omega_c + more) / p.g for more in (0.0, p.r * flow))
     # As in `rolling_forces`, with B_y = s m g free, but with forces along the orbit that differ.
@@ -89,7 +89,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
 
 
 def model_error(p: Parameters) -> float:
-    """Relative error of omega_c in RR at p.omega_0 for want of the torque; 0 if the fluid isn't known.
+    """Relative error of the model for want of the fluid's torque and inertia; 0 if the fluid isn't known.
 
     The larger of what Stokes and the boundary layer say, or the largest shift by the fluid's inertia if that is more.
     """

@@ -39,7 +39,7 @@ def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray
     About the stable motion of the case; its modulus is the gain, its argument the phase lead (negative: a lag).
     Raises `InputError` if there is no such motion.
     """
-    J, b, own = _linear(p, case)
+    J, b, own = _linearised(p, case)
     s = 2j * np.pi * np.asarray(frequency)[..., None, None]
     return np.asarray(np.linalg.solve(s * np.eye(len(b)) - J, b[:, None])[..., own, 0], dtype=np.complex128)
 
@@ -49,7 +49,7 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
     About the stable motion of the case at p.omega_0, as in `transfer`.
     """
-    J, b, own = _linear(p, case)
+    J, b, own = _linearised(p, case)
     rates, modes = np.linalg.eig(J)
     shares = modes[own] * np.linalg.solve(modes, b.astype(complex))
     return np.asarray(np.real(np.expm1(np.asarray(t)[..., None] * rates) / rates @ shares))
@@ -57,7 +57,7 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
     """Time in s and height of the top of the `step_response`, relative to its end; inf, 1 without overshoot."""
-    slowest = 1 / np.abs(np.linalg.eigvals(_linear(p, case)[0]).real).min()
+    slowest = 1 / np.abs(np.linalg.eigvals(_linearised(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
     y = step_response(p, case, t) / (end := np.real(transfer(p, case, 0.0)))
     if (k := int(y.argmax())) == 0 or y[k] <= 1:
@@ -84,8 +84,8 @@ def ramp_coefficient(p: Parameters) -> float:
     return float(AIRY_ZERO * (-(slope**2) / (2 * curvature)) ** (-1 / 3))
 
 
-def _linear(p: Parameters, case: Case) -> tuple[Array, Array, int]:
-    """J (d, d) and b (d,) of the stable motion of a case, and the row of omega_c."""
+def _linearised(p: Parameters, case: Case) -> tuple[Array, Array, int]:
+    """J (d, d), b (d,) of x' = J x + b (omega_0 - mean) about the stable motion of a case, and the row of omega_c."""
     x = stationary.solution(p, case).x
     active = TRAITS[case].active
     rates = dynamics.rates(case, State(*x), p, p.omega_0 + 1j * dynamics.STEP)

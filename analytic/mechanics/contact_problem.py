@@ -124,7 +124,7 @@ def solve(
     if A.closed and B.closed:
         scale = max(abs(v_h), abs(v_y), abs(v_k), p.r * abs(o_x), p.r * abs(o_y), p.r * abs(o_z))
         guess = Impulse(start.B_x / p.m, start.B_y / p.m, start.B_z / p.m)
-        at_A, at_B, change = both(a, b, guess, mu, eta, p.j, tolerance * scale)
+        at_A, at_B, change = solve_pair(a, b, guess, mu, eta, p.j, tolerance * scale)
         largest = max(abs(at_A.n), abs(at_A.s), abs(at_A.t), abs(at_B.n), abs(at_B.s), abs(at_B.t))
         settled = change <= tolerance * max(scale, largest) < math.inf
     elif A.closed:
@@ -136,8 +136,8 @@ def solve(
 
 
 def project(need: Impulse, friction: Friction) -> Impulse:
-    """The impulse that Coulomb's law allows: friction is the point of its disk next to the need, or opposes a known
-    slip."""
+    """The impulse nearest to the one a contact needs that Coulomb's law allows: friction within its disk, or against a
+    known slip."""
     n, s, t = need
     if n <= 0:
         return Impulse(0.0, 0.0, 0.0)
@@ -150,8 +150,9 @@ def project(need: Impulse, friction: Friction) -> Impulse:
     return need if size <= limit else Impulse(n, s * (limit / size), t * (limit / size))
 
 
-def _held(need: Impulse, friction: Friction) -> Impulse:
-    """Share of a need that `project` meets along the disk, and the direction there: none if open, 0, or sticking, 1."""
+def _share_met(need: Impulse, friction: Friction) -> Impulse:
+    """Share of the friction a contact needs that it gets from `project`, and its direction if it slides; 1 if it
+    sticks, 0 if it is open, without a direction."""
     if need.n <= 0:
         return Impulse(0.0, 0.0, 0.0)
     if friction.s != 0 or friction.t != 0:
@@ -161,7 +162,7 @@ def _held(need: Impulse, friction: Friction) -> Impulse:
 
 
 def _project_rate(held: Impulse, friction: Friction, by: Impulse) -> Impulse:
-    """Derivative of `project` in the direction `by`, at a need that is so `_held`."""
+    """Derivative of `project` in the direction `by`, where `_share_met` gave `held`."""
     share, e_s, e_t = held
     if share == 1 or (e_s == 0 and e_t == 0):
         return Impulse(share * by.n, share * by.s, share * by.t)
@@ -169,15 +170,15 @@ def _project_rate(held: Impulse, friction: Friction, by: Impulse) -> Impulse:
     return Impulse(by.n, share * by.s + along * e_s, share * by.t + along * e_t)
 
 
-def _less(a: Impulse, other: Impulse, k: float) -> Impulse:
-    """a - C other: what a contact needs, given the impulse of the other."""
+def _need(a: Impulse, other: Impulse, k: float) -> Impulse:
+    """The impulse that a contact needs once the other one gives `other`: a - C other."""
     return Impulse(a.n - other.s, a.s - (1 - k) * other.n + k * other.s, a.t - (1 - k) * other.t)
 
 
 def _sweep_rate(at_A: Impulse, at_B: Impulse, by: Impulse, A: Friction, B: Friction, k: float) -> Impulse:
     """How the impulse at B after a sweep changes if that before it changes in the direction `by`."""
     still = Impulse(0.0, 0.0, 0.0)
-    return _project_rate(at_B, B, _less(still, _project_rate(at_A, A, _less(still, by, k)), k))
+    return _project_rate(at_B, B, _need(still, _project_rate(at_A, A, _need(still, by, k)), k))
 
 
 def _cross(a: Impulse, b: Impulse) -> Impulse:
@@ -188,11 +189,11 @@ def _dot(a: Impulse, b: Impulse) -> float:
     return a.n * b.n + a.s * b.s + a.t * b.t
 
 
-def _continued(
+def _implicit_step(
     need_A: Impulse, need_B: Impulse, step: Impulse, span: float, A: Friction, B: Friction, k: float
 ) -> Impulse:
     """An implicit Euler step of length `span` of dB/dt = f(B) - B, where a sweep f takes B on by `step`."""
-    at_A, at_B = _held(need_A, A), _held(need_B, B)
+    at_A, at_B = _share_met(need_A, A), _share_met(need_B, B)
     x = _sweep_rate(at_A, at_B, Impulse(1.0, 0.0, 0.0), A, B, k)
     y = _sweep_rate(at_A, at_B, Impulse(0.0, 1.0, 0.0), A, B, k)
     z = _sweep_rate(at_A, at_B, Impulse(0.0, 0.0, 1.0), A, B, k)
@@ -203,17 +204,17 @@ def _continued(
     return Impulse(_dot(step, yz) / size, _dot(x, _cross(step, z)) / size, _dot(x, _cross(y, step)) / size)
 
 
-def _sense(need: Impulse, given: Impulse) -> int:
+def _contact_state(need: Impulse, given: Impulse) -> int:
     """State of a contact from the impulse it needs and the one it gets: 0 open, 1 sticking, 2 sliding."""
     if given.n == 0:
         return 0
     return 1 if given.s == need.s and given.t == need.t else 2
 
 
-def both(
+def solve_pair(
     a: Impulse, b: Impulse, start: Impulse, A: Friction, B: Friction, j: float, enough: float
 ) -> tuple[Impulse, Impulse, float]:
-    """Impulses of A and B that obey Coulomb's law, from a first guess of B; and by how much they still changed.
+    """Impulses of two closed contacts that obey Coulomb's law, from a guess of that at B; how much they still changed.
 
     That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough. Sweeps with Newton's method count from
     -`EAGER` up to 0, those after it from 0 on.
@@ -226,15 +227,15 @@ def both(
         if count >= 0 and sweeps == 0:
             last, span, growth = math.inf, SPAN, GROWTH
             at_B = start if attempt == 0 else zero if attempt == 1 else at_B
-        need_A = _less(a, at_B, k)
+        need_A = _need(a, at_B, k)
         at_A = project(need_A, A)
-        need_B = _less(b, at_A, k)
+        need_B = _need(b, at_A, k)
         after = project(need_B, B)
         step = Impulse(after.n - at_B.n, after.s - at_B.s, after.t - at_B.t)
         change = abs(step.n) + abs(step.s) + abs(step.t)
         pace = DAMPED if attempt > 0 else 1.0
         if count < 0:
-            sense = 3 * _sense(need_A, at_A) + _sense(need_B, after)
+            sense = 3 * _contact_state(need_A, at_A) + _contact_state(need_B, after)
             if before != -1 and sense != before:  # a contact begins to stick, slide or open
                 count = 0
                 continue
@@ -242,18 +243,21 @@ def both(
         if change <= enough:
             return at_A, after, change
         if count < 0:
-            step = _continued(need_A, need_B, step, WHOLE, A, B, k)
+            step = _implicit_step(need_A, need_B, step, WHOLE, A, B, k)
         elif sweeps >= PLAIN_SWEEPS * (1 + attempt):
             if change <= last * (BOLD if attempt % 2 else WARY):
                 span = min(span * growth, LONGEST_SPAN)
             else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
                 span, growth = max(span / SHORTER, 1 / (10 + rough)), max(growth**CALMER, LEAST_GROWTH)
-            step, pace = _continued(need_A, need_B, step, span, A, B, k), 1.0
+            step, pace = _implicit_step(need_A, need_B, step, span, A, B, k), 1.0
         last = change
         at_B = Impulse(at_B.n + pace * step.n, at_B.s + pace * step.s, at_B.t + pace * step.t)
         count += 1
     return at_A, at_B, change
 
 
-TEXT = (both, project, _continued, _sense, _cross, _dot, _sweep_rate, _less, _project_rate, _held, solve)
+TEXT = (
+    solve_pair, project, _implicit_step, _contact_state, _cross, _dot, _sweep_rate, _need, _project_rate, _share_met,
+    solve,
+)  # fmt: skip
 """What is compiled where numba is installed."""

@@ -98,7 +98,7 @@ def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
     if case.B is Contact.N:
         _refuse(state.h < 0, state.h, "h", f"must be >= 0 in case {case.name}")
         _refuse(state.h >= p.R, state.h, "h", f"must be < R = {p.R:g} m")
-    for point, contact, slide in zip("AB", (case.A, case.B), slides(state, p), strict=True):
+    for point, contact, slide in zip("AB", (case.A, case.B), sliding_velocities(state, p), strict=True):
         if contact is Contact.S:
             speed = np.hypot(*slide)
             _refuse(speed == 0, speed, f"slip speed at {point}", f"must be > 0 in case {case.name}")
@@ -121,7 +121,7 @@ def newton_euler(case: Case, x: Sequence[Real], f: Sequence[Real], p: Parameters
     """
     _, v_y, omega_c, w_x, _, w_z, h, v_h = x
     A_x, A_y, A_z, B_x, B_y, B_z = f
-    rho, jmr, c = p.R - h, p.j * p.m * p.r, _drag(x, p, omega_0)
+    rho, jmr, c = p.R - h, p.j * p.m * p.r, _drag_rate(x, p, omega_0)
     push = (A_z + B_z) / p.m - c * rho * (omega_c - omega_0)
     dv_y = (A_y + B_y) / p.m - p.g - c * v_y
     dv_h = (A_x + B_x) / p.m - c * v_h - rho * omega_c**2
@@ -154,7 +154,7 @@ def forces(
         _, _, omega_c, *_ = x
         B_y = rolling_forces.least_utilisation(omega_c, p, omega_0).B_y
         return rolling_family(omega_c, p, omega_0, np.where(np.isnan(B_y), 0.0, B_y))
-    given = zip((case.A, case.B), (slip_A, slip_B), slides(x, p), strict=True)
+    given = zip((case.A, case.B), (slip_A, slip_B), sliding_velocities(x, p), strict=True)
     slips = (slip or direction(*slide) for contact, slip, slide in given if contact is Contact.S)
     return FORCES[case](x, p, omega_0, *slips)
 
@@ -167,8 +167,8 @@ def rolling_family(omega_c: Real, p: Parameters, omega_0: Real, B_y: Real) -> Fo
     return Forces(B_y - p.j * u, p.m * p.g - B_y, z, (1 + p.j) * u - B_y, B_y, z)
 
 
-def _drag(x: Sequence[Real], p: Parameters, omega_0: Real) -> Real:
-    """c(|w|) in a state, s-1."""
+def _drag_rate(x: Sequence[Real], p: Parameters, omega_0: Real) -> Real:
+    """The rate c(|w|) of drag in a state, s-1."""
     _, v_y, omega_c, _, _, _, h, v_h = x
     return drag.of_velocity(v_h, v_y, (p.R - h) * (omega_c - omega_0), p)
 
@@ -179,7 +179,7 @@ def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> F
     u = p.m * p.R * omega_c**2
     B_x = (1 + p.j) * u
     B_z = -p.eta * B_x * sine
-    A_z = p.j * (p.m * p.R * _drag(x, p, omega_0) * (omega_c - omega_0) - B_z) / (1 + p.j)
+    A_z = p.j * (p.m * p.R * _drag_rate(x, p, omega_0) * (omega_c - omega_0) - B_z) / (1 + p.j)
     return Forces(-p.j * u, p.m * p.g, A_z, B_x, 0.0, B_z)
 
 
@@ -189,7 +189,7 @@ def _sr(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> F
     B_y = p.j * p.m * (p.R * omega_c**2 + p.r * omega_c * w_x)
     A_y = p.m * p.g - B_y
     A_z = p.mu * A_y * sine
-    B_z = p.j * (p.m * p.R * _drag(x, p, omega_0) * (omega_c - omega_0) - A_z) / (1 + p.j)
+    B_z = p.j * (p.m * p.R * _drag_rate(x, p, omega_0) * (omega_c - omega_0) - A_z) / (1 + p.j)
     return Forces(0.0, A_y, A_z, p.m * p.R * omega_c**2, B_y, B_z)
 
 
@@ -206,7 +206,7 @@ def _ss(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction, slip
 
 def _nr(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     """Forces of NR: (27)."""
-    (_, v_y, omega_c, w_x, *_), c = x, _drag(x, p, omega_0)
+    (_, v_y, omega_c, w_x, *_), c = x, _drag_rate(x, p, omega_0)
     B_y = p.j * p.m * (p.g + c * v_y + p.R * omega_c**2 + p.r * omega_c * w_x) / (1 + p.j)
     B_z = p.j * p.m * p.R * c * (omega_c - omega_0) / (1 + p.j)
     return Forces(0.0, 0.0, 0.0, p.m * p.R * omega_c**2, B_y, B_z)
@@ -222,7 +222,7 @@ def _ns(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> F
 def _rn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     """Forces of a ball that rolls on the floor away from the wall: drag alone drives the friction."""
     _, _, omega_c, _, _, _, h, v_h = x
-    share = p.j * p.m * _drag(x, p, omega_0) / (1 + p.j)
+    share = p.j * p.m * _drag_rate(x, p, omega_0) / (1 + p.j)
     return Forces(share * v_h, p.m * p.g, share * (p.R - h) * (omega_c - omega_0))
 
 
@@ -250,7 +250,7 @@ _HELD = {
 """Indices of the variables that a case holds at zero."""
 
 
-def slides(x: Sequence[Real], p: Parameters) -> tuple[Direction, Direction]:
+def sliding_velocities(x: Sequence[Real], p: Parameters) -> tuple[Direction, Direction]:
     """Sliding speeds in m s-1 at A and B along the directions of sine and cosine of alpha and beta: (6), (8)."""
     _, v_y, _, w_x, w_y, w_z, _, v_h = x
     return (p.r * w_x, v_h + v_y + p.r * w_z), (p.r * w_y, p.r * w_z)
@@ -267,6 +267,7 @@ def direction(along_sine: Real, along_cosine: Real) -> Direction:
 
 
 def _checked(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[State, Array]:
+    """States, as columns, and the flow, rad s-1; `InputError` if one of them violates the case."""
     check_type("p", p, Parameters)
     state = check_state(case, x, p)
     fluid = np.asarray(p.omega_0 if omega_0 is None else omega_0, dtype=float)

@@ -77,7 +77,7 @@ def _last_share(u: Array, z: Array, p: Parameters) -> Array:
 
 
 def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> LeastUtilisation:
-    """The member of the family with the least larger utilisation, see `LeastUtilisation`.
+    """The forces of RR whose larger friction utilisation, of floor or wall, is the least over the family.
 
     Each utilisation falls and then rises along B_y, so that the least maximum is at the lowest point of one of them
     or at their only crossing in between. The search runs in q = 1/(1 + A_y/G), which is finite for all A_y >= 0.
@@ -97,7 +97,7 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
         return at_A, limit_A, at_B, limit_B, at_A * limit_B - at_B * limit_A
 
     def excess_of_A(q: Array) -> tuple[Array, Array]:
-        """The last of those, and its derivative."""
+        """What is positive where the utilisation of A is larger, and its derivative."""
         at_A, limit_A, at_B, limit_B, excess = friction(q)
         turn_A = (steep_A * q - rise) / np.where(at_A > 0, at_A, np.inf)
         turn_B = (steep_B * q - 2) / np.where(at_B > 0, at_B, np.inf)
@@ -109,13 +109,13 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
     end = np.where(A_binds, q_A, q_B)
     start = np.where(A_binds | B_binds, end, q_A)
     guess = start + first / np.where(first == last, np.inf, first - last) * (end - start)
-    q = roots.rising(excess_of_A, start, end, guess)
+    q = roots.zero_of_rising(excess_of_A, start, end, guess)
     at_A, limit_A, at_B, limit_B, _ = friction(q)
     use_A, use_B, B_alone = _ratio(at_A, limit_A), _ratio(at_B, limit_B), B_binds & ~A_binds
     if np.any(A_binds):
-        use_A = np.where(A_binds, _least_alone(a, z, p.mu), use_A)
+        use_A = np.where(A_binds, _least_utilisation_alone(a, z, p.mu), use_A)
     if np.any(B_alone):
-        use_B = np.where(B_alone, _least_alone(k, z, p.eta), use_B)
+        use_B = np.where(B_alone, _least_utilisation_alone(k, z, p.eta), use_B)
     jams = q == 0
     B_y = np.asarray(p.m * p.g * (2 - 1 / np.where(jams, 1.0, q)))
     if np.any(jams):
@@ -150,8 +150,8 @@ def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
     return low, high
 
 
-def _least_alone(d: Array, z: Array, friction: float) -> Array:
-    """Least utilisation of one contact alone over the family."""
+def _least_utilisation_alone(d: Array, z: Array, friction: float) -> Array:
+    """Least utilisation of friction that one contact has over the family of forces, whatever the other's."""
     hyp = np.hypot(d, z)
     return _ratio(np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0)), np.asarray(friction))
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from model.arrays import Array, Real
 
 
-def crossing(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
-    """Where f (arrays of any shape, element by element) changes sign between start and end, to the last digit.
+def sign_change(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
+    """Where f changes sign between start and end, element by element of arrays of any shape, to the last digit.
 
     nan where it has one sign at both. By inverse quadratic interpolation where that can be trusted, else by halving
     (Chandrupatla, Adv. Eng. Software 28 (1997) 145); the root finders of scipy take half a second to load.
@@ -43,7 +43,7 @@ _MOST, _SHORT = 200, 1e-10
 of Newton's, relative to the root, after which nothing is left."""
 
 
-def rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, guess: Array) -> Array:
+def zero_of_rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, guess: Array) -> Array:
     """Where f, given with its derivative, rises through zero on the way from start to end, to the last digits.
 
     By Newton's method from a guess, or halving where that leaves what is known to hold the root. A step of Newton's

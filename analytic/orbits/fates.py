@@ -65,7 +65,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Fate:
-    """What one run came to, and what it did last."""
+    """The attractor that one run came to, and the last part of the run."""
 
     kind: Kind
     last: Trajectory
@@ -87,12 +87,12 @@ class Fate:
             return False
         if self.solution and other.solution:
             return self.solution.case is other.solution.case
-        return self.kind is Kind.UNDECIDED or _alike(self.last, other.last)
+        return self.kind is Kind.UNDECIDED or _windows_agree(self.last, other.last)
 
 
 @dataclass(frozen=True)
 class Attractor:
-    """What some of the starts came to."""
+    """An attractor, and how many of the starts came to it."""
 
     fate: Fate
     """Of the one that settled first."""
@@ -102,7 +102,7 @@ class Attractor:
 
     @property
     def share(self) -> float:
-        """Share of the starts."""
+        """Share of the starts that came to it."""
         return self.count / self.starts
 
     @property
@@ -112,15 +112,15 @@ class Attractor:
 
     @property
     def run(self) -> Trajectory:
-        """What it does: a period by theory where there is an orbit, else the last window of that run."""
+        """The motion on it: a period by theory where there is an orbit, else the last window of a run."""
         return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
 
 
 def event_driven(
     p: Parameters, x0s: Array, duration: float, interval: float, threads: int | None = None
 ) -> list[Trajectory]:
-    """Event-driven simulations as `Runs`, on all cores unless `threads` says how many: each is a compiled call where
-    numba is installed."""
+    """Event-driven simulations from states x0s (n, 8), on all cores unless `threads` says how many; one that breaks
+    down as far as it came."""
 
     def motion(x0: Array) -> Trajectory:
         try:
@@ -157,7 +157,7 @@ def attractors(
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
     groups, window = list[list[Fate]](), WINDOW * natural_units(p)[0]
-    todo = (_settling(p, x, duration, run, groups) for x in states)
+    todo = (_follow_to_attractor(p, x, duration, run, groups) for x in states)
     following = [(each, next(each)) for each in islice(todo, SIDE_BY_SIDE)]
     while following:
         windows = run(p, np.array([x for _, x in following]), window, window / WINDOW_SAMPLES)
@@ -176,7 +176,7 @@ def attractors(
     return [Attractor(group[0], len(group), len(states)) for group in groups]
 
 
-def _settling(
+def _follow_to_attractor(
     p: Parameters, x: Array, lasting: float, run: Runs, known: Sequence[Sequence[Fate]]
 ) -> Generator[Array, Trajectory, Fate]:
     """The attractor that the motion from x approaches within `lasting` seconds: asks for windows from states.
@@ -195,21 +195,21 @@ def _settling(
             continue
         before = seen[0]
         if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
-            return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
-        if recurrent := _alike(before, now):
-            same = (fate for fate, *_ in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
-            if fate := next(same, None) or periodic(now):
+            return Fate(Kind.STATIONARY, now, solution=_nearest_solution(now, solutions))
+        if recurrent := _windows_agree(before, now):
+            same = (fate for fate, *_ in known if fate.kind is not Kind.UNDECIDED and _windows_agree(fate.last, now))
+            if fate := next(same, None) or periodic_fate(now):
                 return fate
     if not recurrent:
         return Fate(Kind.UNDECIDED, seen[-1])
     try:
-        exponent, deviation = lyapunov(p, _state(seen[-1]), GROWING * unit, unit, run=run)
+        exponent, deviation = lyapunov(p, _highest_state(seen[-1]), GROWING * unit, unit, run=run)
     except (SimulationError, InputError) as reason:
         return Fate(Kind.UNDECIDED, seen[-1], failure=str(reason))
     return Fate(Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC, seen[-1], exponent=exponent)
 
 
-def _alike(a: Trajectory, b: Trajectory) -> bool:
+def _windows_agree(a: Trajectory, b: Trajectory) -> bool:
     """Whether means and extremes of two windows agree, relative to the range of the motion."""
     size = state_units(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
     return all(
@@ -217,7 +217,7 @@ def _alike(a: Trajectory, b: Trajectory) -> bool:
     )
 
 
-def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> StationarySolution | None:
+def _nearest_solution(last: Trajectory, solutions: Sequence[StationarySolution]) -> StationarySolution | None:
     """The stationary solution nearest to the last state, free variables aside; of two in one state that of its case."""
     x, case = last.x[-1], last.cases[-1]
     size = state_units(last.header.parameters)
@@ -230,8 +230,8 @@ def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> Stati
     return min(near, key=lambda each: (each.case is not case, distance(each)), default=None)
 
 
-def periodic(last: Trajectory) -> Fate | None:
-    """A recurrent motion that closes: with the stable orbit that theory has near it, or as the window shows.
+def periodic_fate(last: Trajectory) -> Fate | None:
+    """The periodic motion that a window of a run shows, with the stable orbit that theory has near it.
 
     None if it doesn't close. Candidates for the period are the first three good minima of the distance between the last
     quarter of the window and what was a lag of up to half the window earlier.
@@ -245,7 +245,7 @@ def periodic(last: Trajectory) -> Fate | None:
     seen = [(float(k * interval), float(away[k])) for k in good[:3]]
     for period, _ in seen:
         try:
-            orbit = orbits.refine(p, _state(last), period)
+            orbit = orbits.refine(p, _highest_state(last), period)
         except NoOrbitError:
             continue
         if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
@@ -254,8 +254,8 @@ def periodic(last: Trajectory) -> Fate | None:
     return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
 
 
-def _state(last: Trajectory) -> Array:
-    """The highest state of a window, with what its case holds at zero exactly there."""
+def _highest_state(last: Trajectory) -> Array:
+    """The state of a window in which the ball is highest; what its case holds at zero is set to exactly that."""
     k = int(np.argmax(last.y))
     held = TRAITS[last.cases[k]].constraints
     return np.where([name in held for name in VARIABLES], 0.0, last.x[k])

@@ -21,8 +21,8 @@ from analytic.orbits.periodic import (
     Changes,
     NoOrbitError,
     Orbit,
-    close,
-    closed,
+    close_loop,
+    closed_orbit,
     defect_jacobian,
     extent,
     landings,
@@ -69,7 +69,7 @@ class Bifurcation(StrEnum):
 
 @dataclass(frozen=True)
 class Place:
-    """A place on a branch."""
+    """Where something happens to a branch of orbits: a bifurcation, or its end."""
 
     kind: Bifurcation
     value: float
@@ -113,7 +113,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
     if not low <= (value := start.loop.value(name)) <= high or value == 0:
         raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")
-    down, up = ([*_way(start, name, (low, high), sign, most)] for sign in (-1.0, 1.0))
+    down, up = ([*_one_way(start, name, (low, high), sign, most)] for sign in (-1.0, 1.0))
     every: list[Orbit | Place] = [*down[::-1], start, *up]
     return OrbitBranch(
         name,
@@ -122,8 +122,8 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     )
 
 
-def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: int) -> Iterator[Orbit | Place]:
-    """Orbits and places one way from an orbit, to the end."""
+def _one_way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: int) -> Iterator[Orbit | Place]:
+    """Follow the branch from an orbit towards larger (sign 1) or smaller values: orbits and places, to its end."""
     here, step, before, reason = start, FIRST_STEP, [start], ""
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
@@ -137,13 +137,13 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         there = None
         while there is None and step > LEAST_STEP:
             try:
-                there = _beside(here, step * along, name, matrix)
+                there = _next_orbit(here, step * along, name, matrix)
             except NoOrbitError as error:
                 step, reason = step / 2, str(error)
         if there is None:
             yield Place(Bifurcation.LOST, here.loop.value(name), here, reason)
             return
-        met = _between(here, there, step * along, name, matrix)
+        met = _places_between(here, there, step * along, name, matrix)
         yield from (place for place in met if span[0] <= place.value <= span[1])
         if not span[0] <= there.loop.value(name) <= span[1]:
             # The orbit where the branch leaves the range, between the last within it and the first outside.
@@ -153,7 +153,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
             x, period = here.loop.x + share * (there.loop.x - here.loop.x), (1 - share) * here.period
             try:
                 loop = here.loop.with_value(name, value)
-                orbit = close(replace(loop, x=x, period=period + share * there.period))
+                orbit = closed_orbit(replace(loop, x=x, period=period + share * there.period))
             except NoOrbitError as error:
                 yield Place(Bifurcation.LOST, inside, here, str(error))
             else:
@@ -180,46 +180,46 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
     yield Place(Bifurcation.LOST, here.loop.value(name), here, f"not followed beyond {most} orbits")
 
 
-def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
-    """The orbit of the branch a step further; `NoOrbitError` also where a long step comes to other landings."""
-    orbit = close(here.loop.moved(by, name), name, matrix)
-    if _strays(here, by, orbit.changes):
+def _next_orbit(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
+    """The next orbit on the branch, a step `by` away; `NoOrbitError` also if it is one of another branch."""
+    orbit = closed_orbit(here.loop.moved(by, name), name, matrix)
+    if _on_other_branch(here, by, orbit.changes):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return orbit
 
 
-def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
-    """What happens between an orbit and the next, a step away."""
+def _places_between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
+    """Bifurcations between an orbit and the next one on the branch, each located."""
     for kind, sign in _TESTS.items():
         outside = [np.sum(np.abs(each.multipliers) > 1) for each in (here, there)]
         if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
             continue
 
         def test(share: float, sign: Callable[[Any], float] = sign) -> float:
-            return sign(_beside(here, share * step, name, matrix).multipliers)
+            return sign(_next_orbit(here, share * step, name, matrix).multipliers)
 
         try:
-            orbit = _beside(here, brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
+            orbit = _next_orbit(here, brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
         except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
             orbit = there
         yield Place(kind, orbit.loop.value(name), orbit)
-    before = _sequence(here.changes)
-    if before == _sequence(there.changes):
+    before = _rotated_to_least(here.changes)
+    if before == _rotated_to_least(there.changes):
         return
     # Where the sequence of cases changes, by halving as far as orbits are found.
     low, high, loop = 0.0, 1.0, there.loop
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         try:
-            found, back, _ = closed(here.loop.moved(middle * step, name), name, matrix)
+            found, back, _ = close_loop(here.loop.moved(middle * step, name), name, matrix)
         except NoOrbitError:
             break
-        if _strays(here, middle * step, back.changes):
+        if _on_other_branch(here, middle * step, back.changes):
             break
         loop = found
-        low, high = (middle, high) if _sequence(back.changes) == before else (low, middle)
+        low, high = (middle, high) if _rotated_to_least(back.changes) == before else (low, middle)
     try:
-        nearest = close(loop)
+        nearest = closed_orbit(loop)
     except NoOrbitError:  # disturbances there land where others don't
         nearest = there
     same = sum(landings(here.changes)) == sum(landings(there.changes))
@@ -227,14 +227,14 @@ def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -
     yield Place(kind, loop.value(name), nearest)
 
 
-def _sequence(changes: Changes) -> Changes:
-    """The changes of case of a period, rotated so that they come first in order."""
+def _rotated_to_least(changes: Changes) -> Changes:
+    """The changes of case of a period in a form that doesn't depend on where the period begins."""
     turns = [changes[k:] + changes[:k] for k in range(len(changes))]
     return min(turns, default=())
 
 
-def _strays(here: Orbit, by: Array, changes: Changes) -> bool:
-    """Whether a long step came to other landings than those of the orbit it began at."""
+def _on_other_branch(here: Orbit, by: Array, changes: Changes) -> bool:
+    """Whether a long step from an orbit led to one with another number of landings, so to another branch."""
     return bool(np.linalg.norm(by) > GRAZING) and sum(landings(changes)) != sum(landings(here.changes))
 
 

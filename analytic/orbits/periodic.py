@@ -101,17 +101,17 @@ class Loop:
         return cls(p, case, run.x[inner][at], period, active[int(fixed)], size, restitution)
 
     def value(self, name: str) -> float:
-        """A parameter, or the coefficient of restitution."""
+        """The value of a parameter, or of the coefficient of restitution, by its name."""
         return self.restitution if name == RESTITUTION else float(getattr(self.p, name))
 
     def with_value(self, name: str, value: float) -> Loop:
-        """The same with another value of a parameter, or of the coefficient of restitution."""
+        """The loop with another value of a parameter, or of the coefficient of restitution."""
         changed = {RESTITUTION: value} if name == RESTITUTION else {"p": self.p.replace(**{name: value})}
         return replace(self, **changed)
 
     @property
     def free(self) -> list[int]:
-        """Indices of the coordinates among the state variables."""
+        """Indices of the state variables that are coordinates of the section."""
         return [k for k in active_variables(self.case) if k != self.fixed]
 
     def coordinates(self, x: Array) -> Array:
@@ -119,7 +119,7 @@ class Loop:
         return np.asarray(x[..., self.free] / state_units(self.p)[self.free])
 
     def moved(self, by: Array, varied: str | None = None) -> Loop:
-        """Moved by coordinates (d - 1,) and, if a parameter is `varied`, by its logarithm, (d,).
+        """The loop moved by coordinates (d - 1,) and, if a parameter is `varied`, by its logarithm, (d,).
 
         Raises `NoOrbitError` where that leads out of the range of the parameter.
         """
@@ -134,7 +134,7 @@ class Loop:
             raise NoOrbitError(str(error)) from error
 
     def back(self) -> Return:
-        """The motion up to its return to the section; `NoOrbitError` if it doesn't come back.
+        """Where the motion returns to the section; `NoOrbitError` if it doesn't come back.
 
         It is simulated for the period, and then followed to the section nearby, forwards or backwards, by the
         equations of the case.
@@ -203,7 +203,7 @@ class Orbit:
 
     @property
     def p(self) -> Parameters:
-        """Its parameters."""
+        """The parameters of the ball on it."""
         return self.loop.p
 
     @cached_property
@@ -224,7 +224,7 @@ class Orbit:
 
     @cached_property
     def cycle(self) -> Trajectory:
-        """One period, `ORBIT_SAMPLES` equal parts of it."""
+        """The motion over one period, sampled in `ORBIT_SAMPLES` equal parts."""
         return _simulated(self.p, self.loop.x, self.period, ORBIT_SAMPLES, self.loop.restitution)
 
     @property
@@ -243,21 +243,21 @@ def refine(p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 
     Raises `NoOrbitError` if Newton's method does not converge to `CLOSED` within `ITERATIONS` steps, or the ball
     doesn't come back from beside the orbit, so that the return map has no derivative.
     """
-    return close(Loop.of(p, x, period, restitution))
+    return closed_orbit(Loop.of(p, x, period, restitution))
 
 
-def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> Orbit:
-    """`refine` from a loop that is nearly closed; a parameter that is `varied` is one more unknown.
+def closed_orbit(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> Orbit:
+    """The closed orbit near a loop, by Newton's method; a parameter that is `varied` is one more unknown.
 
     There is then one unknown more than equations: the place on a branch. Newton's step is the shortest one (Moore and
     Penrose), across the branch. The `defect_jacobian` of a neighbour, if given, does until the defect falls slowly.
     """
-    loop, back, steps = closed(loop, varied, neighbour)
+    loop, back, steps = close_loop(loop, varied, neighbour)
     return Orbit(loop, back.changes, back.turn, steps, loop.derivative())
 
 
-def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> tuple[Loop, Return, int]:
-    """The loop of `close`, its return, and the steps that Newton's method took."""
+def close_loop(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> tuple[Loop, Return, int]:
+    """The closed loop near a loop, its return, and how many steps Newton's method took; arguments of `closed_orbit`."""
     before = math.inf
     for step in range(ITERATIONS + 1):
         back = loop.back()
@@ -277,7 +277,7 @@ def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None
 
 
 def defect_jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
-    """Derivative (d - 1, d - 1) of the defect of a loop; with one more column if a parameter is varied."""
+    """Derivative (d - 1, d - 1) of by how much a loop isn't closed; with one more column if a parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
     return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state
 

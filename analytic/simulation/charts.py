@@ -70,7 +70,7 @@ TURNING = ((0, 0), (0, 0), (0, 0), (0, 0), (2, 6), (4, 6), (0, 0), (5, 7), (0, 0
 """Of each case where among the coordinates slips begin and end that turn; each is followed by its direction."""
 
 
-def count_ends(k: Motion) -> int:
+def count_guards(k: Motion) -> int:
     """How many guards the motion has; the landing of a fall that is known needs none."""
     if k.case == NN:
         return 1 if k.fall.landing < math.inf else 2
@@ -82,14 +82,14 @@ def count_ends(k: Motion) -> int:
 
 
 def begin(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
-    """The motion in a case from a moment on; its coordinates then and their natural sizes are written; their number."""
+    """Begin a case at a moment: write coordinates z and their natural sizes; return its constants and their number."""
     if case % 3 == AWAY:
-        return _away_from_wall(case, at, k, z, scale)
-    return _at_wall(case, at, k, z, scale)
+        return _begin_off_wall(case, at, k, z, scale)
+    return _begin_on_wall(case, at, k, z, scale)
 
 
-def _at_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
-    """(theta; omega_c, off the floor y, v_y, omega_c, slip_x; speed and direction of each slip; work)."""
+def _begin_on_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+    """As `begin`: z = (theta; omega_c, off the floor y, v_y, omega_c, slip_x; size and direction of slips; work)."""
     x, turns, side, n = at.x, case in (SS, NS), 0.0, 2
     z[0], scale[0] = at.theta, 1.0
     if case // 3 == AWAY:
@@ -110,12 +110,12 @@ def _at_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Moti
             z[n], scale[n] = at.beta, 1.0
             n += 1
     z[n], scale[n] = at.work, k.m * k.g * k.R
-    return equations.changed(k, case, side, k.line, NO_FALL), n + 1
+    return equations.in_case(k, case, side, k.line, NO_FALL), n + 1
 
 
-def _away_from_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
-    """(Z, dZ/dt; in SN speed of the lowest point and its direction in the resting frame; in NN y, v_y; work).
-
+def _begin_off_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+    """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point in the frame at rest; in NN y, v_y;
+    work).
     In RN the spin follows; in NN all of it rests, and with Stokes' drag the fall is known (`drag.fall`). With another
     law c depends on all components of the velocity.
     """
@@ -132,14 +132,16 @@ def _away_from_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tup
     elif case == NN:
         z[4], z[5], scale[4], scale[5], n = at.x.y, at.x.v_y, k.R, speed, 6
     z[n], scale[n] = at.work, k.m * k.g * k.R
-    return equations.changed(k, case, 0.0, k.line, fall), n + 1
+    return equations.in_case(k, case, 0.0, k.line, fall), n + 1
 
 
 def moment(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
-    """The moment at a time with coordinates z in a case that began `at` another; or moments, from times (m,) and z
-    (n, m), as a `Moment` of arrays and of numbers that stay. An azimuth off the wall is one of many."""
+    """The state with azimuth and work at a time t, from coordinates z of a case that began at the moment `at`.
+
+    Or those at times (m,) from z (n, m). An azimuth off the wall is given up to whole turns.
+    """
     if k.case % 3 == AWAY:
-        return _off_the_wall(t, z, at, k)
+        return _moment_off_wall(t, z, at, k)
     y, v_y, omega_c, w_x, w_y, w_z, alpha, beta = 0.0, 0.0, z[1], 0.0, 0.0, 0.0, math.nan, math.nan
     if k.case // 3 == AWAY:
         y, v_y, omega_c, w_x = z[1], z[2], z[3], z[4]
@@ -156,7 +158,8 @@ def moment(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
     return Moment(t, z[0], State(y, v_y, omega_c, w_x, w_y, w_z, 0.0, 0.0), alpha, beta, z[-1])
 
 
-def _off_the_wall(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
+def _moment_off_wall(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
+    """As `moment`, for a ball away from the wall."""
     turn, u = cmath.exp(1j * at.theta), rigid_body.velocities(at.x, k)
     place, moves, y, v_y, alpha, slide = z[0] + 1j * z[1], z[2] + 1j * z[3], 0.0, 0.0, math.nan, 0j
     rho = np.abs(place)
@@ -184,14 +187,14 @@ def _off_the_wall(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
 
 
 def least_slip(z: Any, scale: Any, case: int) -> float:
-    """The smallest slip that turns, in natural units; inf if there is none."""
+    """The smallest slip whose direction may turn, in natural units; inf if there is none."""
     least = math.inf
     for i in range(TURNING[case][0], TURNING[case][1], 2):
         least = min(least, z[i] / scale[i])
     return least
 
 
-def hop(at: Moment, z: Any, k: Motion, rate: Any) -> float:
+def rebound_time(at: Moment, z: Any, k: Motion, rate: Any) -> float:
     """How long a rebound that begins at a moment will last by the accelerations then, s; inf if none begins."""
     x, lasts = at.x, math.inf
     equations.rates(at.time, z, k, rate)
@@ -204,8 +207,8 @@ def hop(at: Moment, z: Any, k: Motion, rate: Any) -> float:
     return lasts
 
 
-def levels(values: Any, k: Motion, arm: Any, level: Any) -> bool:
-    """Above which values guards are armed, and at which they fire, from their values at first; whether a gap is zero.
+def arm_guards(values: Any, k: Motion, arm: Any, level: Any) -> bool:
+    """Set the values above which guards are armed, and those at which they fire; whether a gap is zero at first.
 
     A guard that starts at zero, where round-off mustn't end the case, has to rise above the absolute tolerance first,
     or to fall below -`rtol`; a gap is armed by any height.
@@ -219,5 +222,8 @@ def levels(values: Any, k: Motion, arm: Any, level: Any) -> bool:
     return opens
 
 
-TEXT = (count_ends, begin, _at_wall, _away_from_wall, moment, _off_the_wall, least_slip, hop, levels)
+TEXT = (
+    count_guards, begin, _begin_on_wall, _begin_off_wall, moment, _moment_off_wall, least_slip, rebound_time,
+    arm_guards,
+)  # fmt: skip
 """What is compiled where numba is installed."""

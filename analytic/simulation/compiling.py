@@ -21,8 +21,8 @@ _CALLED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper
 _registered = set[Callable[..., Any]]()
 
 
-def read(*modules: ModuleType) -> str:
-    """Have the `TEXT` of modules compiled wherever compiled functions call it; a digest of their sources."""
+def register(*modules: ModuleType) -> str:
+    """Let compiled functions call the functions that modules list as `TEXT`; return a digest of their sources."""
     for function in (each for module in modules for each in module.TEXT):
         if numba is not None and function not in _registered:
             _registered.add(register_jitable(**_CALLED)(function))
@@ -30,7 +30,7 @@ def read(*modules: ModuleType) -> str:
 
 
 def compiled(digest: str) -> Callable[[F], F]:
-    """A function compiled at its first call, so that threads can run it at once; the function itself without numba.
+    """A decorator: compiles a function at its first call, for threads to run it at once; without numba leaves it as is.
 
     Numba keeps what it compiles on disk by name and compiles it again when its own file has changed, but not when that
     of a function has which it calls: the name contains the digest of those.
@@ -42,15 +42,15 @@ def compiled(digest: str) -> Callable[[F], F]:
         own: Any = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         own.__qualname__, own.__doc__ = f"{function.__qualname__}_{digest}", function.__doc__
         try:
-            return _alone(numba.njit(cache=True, nogil=True, error_model="numpy")(own))  # type: ignore[no-any-return]
+            return _compiled_by_one_process(numba.njit(cache=True, nogil=True, error_model="numpy")(own))  # type: ignore[no-any-return]
         except RuntimeError:  # no place for a cache
             return numba.njit(nogil=True, error_model="numpy")(own)  # type: ignore[no-any-return]
 
     return compile_
 
 
-def _alone(function: Any) -> Any:
-    """Of processes that begin at once one compiles a function, and the others wait for what it keeps on disk."""
+def _compiled_by_one_process(function: Any) -> Any:
+    """A compiled function: of processes that need it at once one compiles, the others take what it keeps on disk."""
     compile_ = function._compile_for_args
 
     def compile_alone(*given: Any, **named: Any) -> Any:
@@ -70,7 +70,7 @@ def _alone(function: Any) -> Any:
 
 
 def in_place_of(function: Callable[..., Any]) -> Callable[[F], F]:
-    """A function that is compiled where compiled functions call another one."""
+    """A decorator: where compiled functions call `function`, the decorated one is compiled in its place."""
 
     def register(other: F) -> F:
         overload(function, strict=False, jit_options=_CALLED)(lambda *types: other)

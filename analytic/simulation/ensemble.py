@@ -94,7 +94,7 @@ def simulate_many(
     over, shape, t_end = np.zeros(1, bool), (count, len(times)), float(times[-1])
     x, case, landings = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
     x[:, 0], end, failure = states, np.zeros(count), [""] * count
-    carry_out = _stepped if settings.method == "time-stepping" else _event_driven
+    carry_out = _run_time_stepping if settings.method == "time-stepping" else _run_event_driven
 
     steady = {p: Flow.steady(p.omega_0) for p in dict.fromkeys(sets)}
     fluids = [flow or steady[p] for p, flow in zip(sets, flows, strict=True)]
@@ -103,7 +103,7 @@ def simulate_many(
     todo = iter(range(count))
 
     def work() -> None:
-        """One run after the other, of those that no thread has begun: a task each would take longer than short runs."""
+        """In a thread: carry out one run after the other of those that no thread has begun."""
         try:
             for n in todo:
                 if over[0]:
@@ -140,12 +140,12 @@ class _Run:
     """Whether nobody wants it any more."""
 
     def rests(self, row: int) -> tuple[float, str]:
-        """It is quiet from a row on, or that is its last; what `_stepped` returns."""
+        """Repeat the state of a row to the end; when the run ended there, s, without a failure."""
         self.x[row:], self.case[row:] = self.x[row], self.case[row]
         return float(self.times[row]), ""
 
 
-def _stepped(run: _Run) -> tuple[float, str]:
+def _run_time_stepping(run: _Run) -> tuple[float, str]:
     """A run by time stepping, into its rows; when it ended, and why it failed, if it did."""
     from analytic.simulation import stepping, time_stepping  # here, since numba takes a while to load
 
@@ -158,14 +158,14 @@ def _stepped(run: _Run) -> tuple[float, str]:
     return -end, f"stopped at t = {-end:g} s: the velocities don't settle; a shorter step may help"
 
 
-def _event_driven(run: _Run) -> tuple[float, str]:
-    """The same by event-driven simulation."""
+def _run_event_driven(run: _Run) -> tuple[float, str]:
+    """A run by event-driven simulation, into its rows; when it ended, and why it failed, if it did."""
     from analytic.simulation import hybrid  # here, since scipy and numba take a while to load
 
     blow = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
     each = run.times, run.x, run.case, run.landings, hybrid.Stop(blow, run.quiet, run.over)
-    given = hybrid.given(run.p, run.flow, run.settings, float(run.times[-1]))
-    rows, failure = hybrid.carry_out(Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Kept.of, *each, whole=False))
+    given = hybrid.prepare(run.p, run.flow, run.settings, float(run.times[-1]))
+    rows, failure = hybrid.carry_out(Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Record.of, *each, whole=False))
     last = int(rows.taken[0]) - 1
     if failure:
         return float(run.times[max(last, 0)]), f"stopped at t = {rows.reached[0]:g} s: {failure}"

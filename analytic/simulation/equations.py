@@ -91,8 +91,8 @@ class Motion(NamedTuple):
     fall: Fall
 
 
-def changed(k: Motion, case: int, side: float, line: Line, fall: Fall) -> Motion:
-    """The motion in another case or flow."""
+def in_case(k: Motion, case: int, side: float, line: Line, fall: Fall) -> Motion:
+    """The constants of the motion, changed to another case, side, line of the flow or known fall."""
     return Motion(
         k.m, k.r, k.R, k.j, k.mu, k.eta, k.g, k.c, k.law, k.stokes, k.rtol, k.restitution, k.leaves, k.unit, k.spin,
         k.waves, line, case, side, fall,
@@ -109,7 +109,7 @@ def fluid(t: float, k: Motion) -> float:
     return omega_0
 
 
-def resistance(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
+def drag_rate(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
     """c(|w|) of a velocity relative to the fluid, s-1."""
     if k.stokes:
         return k.c
@@ -164,8 +164,8 @@ def forces(case: int, omega_c: float, v_y: float, w_x: float, c: float, lag: flo
     return 0.0, 0.0, 0.0, u, k.eta * u * c_B, -k.eta * u * s_B
 
 
-def _at_wall(z: Any, k: Motion) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
-    """omega_c, v_y, slip_x, slip_z, q_A, sine and cosine of alpha, q_B, those of beta, slip_y."""
+def _wall_state(z: Any, k: Motion) -> tuple[float, ...]:
+    """Of a ball at the wall: omega_c, v_y, slip_x, slip_z, q_A, sin and cos of alpha, q_B, those of beta, slip_y."""
     v_y = w_x = w_z = q_A = s_A = c_A = q_B = s_B = c_B = 0.0
     omega_c = z[1]
     if k.case == SR:
@@ -187,9 +187,9 @@ def _at_wall(z: Any, k: Motion) -> tuple[float, float, float, float, float, floa
 
 def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
     omega_0 = fluid(t, k)
-    omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, _ = _at_wall(z, k)
+    omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, _ = _wall_state(z, k)
     lag = omega_c - omega_0
-    c = resistance(0.0, v_y, k.R * lag, k)
+    c = drag_rate(0.0, v_y, k.R * lag, k)
     A_x, A_y, A_z, B_x, B_y, B_z = forces(k.case, omega_c, v_y, w_x, c, lag, s_A, c_A, s_B, c_B, k)
     jmr = k.j * k.m * k.r
     push = (A_z + B_z) / k.m - c * k.R * lag
@@ -226,9 +226,9 @@ def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
 
 
 def _guards_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
-    omega_c, v_y, w_x, _, q_A, s_A, c_A, q_B, s_B, c_B, _ = _at_wall(z, k)
+    omega_c, v_y, w_x, _, q_A, s_A, c_A, q_B, s_B, c_B, _ = _wall_state(z, k)
     lag = omega_c - fluid(t, k)
-    c = resistance(0.0, v_y, k.R * lag, k)
+    c = drag_rate(0.0, v_y, k.R * lag, k)
     if k.case == RR:
         out[0] = rolls_on(omega_c, t, k)
         return
@@ -248,18 +248,18 @@ def _guards_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
 def loads(omega_c: float, t: float, k: Motion) -> tuple[float, float]:
     """As `rolling_forces._loads`: centrifugal load and friction of RR, in units of the weight."""
     lag = abs(omega_c - fluid(t, k))
-    friction = k.j * resistance(0.0, 0.0, k.R * lag, k) * k.R / k.g * lag / (1 + 2 * k.j)
+    friction = k.j * drag_rate(0.0, 0.0, k.R * lag, k) * k.R / k.g * lag / (1 + 2 * k.j)
     return k.R / k.g * omega_c * omega_c, friction
 
 
 def last_share(u: float, z: float, k: Motion) -> float:
-    """As `rolling_forces._last_share`."""
+    """B_y in units of the weight at which RR ends, from its loads, as `rolling_forces._last_share`."""
     at_B = (1 + k.j) * u
     return min(max(at_B - _normal_forces(at_B, z, k.eta)[0], 0.0), k.j * u)
 
 
 def slip_margin(u: float, z: float, k: Motion) -> float:
-    """As `rolling_forces.slip_margin`, of loads."""
+    """How far RR is from a slip that lasts, in units of the weight, from its loads, as `rolling_forces.slip_margin`."""
     share = last_share(u, z, k)
     return min(k.eta * (1 + k.j) * u - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z))
 
@@ -279,25 +279,25 @@ def rolls_on(omega_c: float, t: float, k: Motion) -> float:
 
 
 def _normal_forces(d: float, z: float, friction: float) -> tuple[float, float]:
-    """As `rolling_forces._normal_forces`."""
+    """Least and greatest normal force that one cone admits, as `rolling_forces._normal_forces`."""
     square = d * d + z * z
     top = d + math.sqrt(max((friction - 1) * (friction + 1) * z * z + (friction * d) ** 2, 0.0))
     low = 0.0 if square == 0 else square / top if top > 0 else math.inf
     return low, (top / (1 - friction * friction) if friction < 1 else math.inf)
 
 
-def _pull(t: float, z: Any, rise: float, k: Motion) -> tuple[complex, complex, float]:
-    """Horizontal velocity, that relative to the fluid, m s-1, and c(|w|), s-1."""
+def _horizontal_drag(t: float, z: Any, rise: float, k: Motion) -> tuple[complex, complex, float]:
+    """Off the wall: complex horizontal velocity, that relative to the fluid, m s-1, and the drag rate c(|w|), s-1."""
     V = complex(z[2], z[3])
     lag = V - 1j * fluid(t, k) * complex(z[0], z[1])
-    return V, lag, resistance(lag.real, rise, lag.imag, k)
+    return V, lag, drag_rate(lag.real, rise, lag.imag, k)
 
 
 def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
     rise = 0.0
     if k.case == NN:
         rise = fall_speed(t, k) if k.fall.landing < math.inf else z[5]
-    V, lag, c = _pull(t, z, rise, k)
+    V, lag, c = _horizontal_drag(t, z, rise, k)
     power, push, last = -k.m * c * ((lag * V.conjugate()).real + rise * rise), -c * lag, 4
     if k.case == RN:
         push /= 1 + k.j
@@ -316,7 +316,7 @@ def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
 def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
     gap = 1 - math.sqrt(z[0] * z[0] + z[1] * z[1]) / k.R
     if k.case == RN:
-        _, lag, c = _pull(t, z, 0.0, k)
+        _, lag, c = _horizontal_drag(t, z, 0.0, k)
         out[0], out[1] = k.mu - k.j * (c / (1 + k.j)) * abs(lag) / k.g, gap
     elif k.case == SN:
         out[0], out[1] = z[4] / math.sqrt(k.R * k.g), gap
@@ -327,7 +327,7 @@ def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
 
 
 def fall_speed(t: float, k: Motion) -> float:
-    """As `drag.fall_speed`."""
+    """v_y of a free flight with Stokes' drag at a time, m s-1, as `drag.fall_speed`."""
     since, v_y, _ = k.fall
     return v_y - (k.c * v_y + k.g) * (math.expm1(-k.c * (t - since)) / -k.c if k.c > 0 else t - since)
 
@@ -335,13 +335,13 @@ def fall_speed(t: float, k: Motion) -> float:
 def smooth_rates(u: Velocities, h: float, t: float, k: Motion) -> Velocities:
     """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the gap at B."""
     turn, w_k = u.v_k / (k.R - h), u.v_k - fluid(t, k) * (k.R - h)
-    c = resistance(u.v_h, u.v_y, w_k, k)
+    c = drag_rate(u.v_h, u.v_y, w_k, k)
     return Velocities(
         -turn * u.v_k - c * u.v_h, -k.g - c * u.v_y, turn * u.v_h - c * w_k, -turn * u.o_z, 0.0, turn * u.o_x
     )
 
 
-def straight(
+def is_straight(
     t: float, until: float, z: Any, scale: Any, k: Motion, rate: Any, guards_now: Any, there: Any, other: Any
 ) -> bool:
     """Whether a straight line with the rates that this writes solves the equations up to a time, and no guard fires.
@@ -368,7 +368,8 @@ def straight(
 
 
 TEXT = (
-    changed, fluid, resistance, forces, _at_wall, _rates_at_wall, _guards_at_wall, loads, last_share, slip_margin,
-    rolls_on, _normal_forces, _pull, _rates_away, _guards_away, fall_speed, smooth_rates, rates, guards, straight,
+    in_case, fluid, drag_rate, forces, _wall_state, _rates_at_wall, _guards_at_wall, loads, last_share,
+    slip_margin, rolls_on, _normal_forces, _horizontal_drag, _rates_away, _guards_away, fall_speed, smooth_rates, rates,
+    guards, is_straight,
 )  # fmt: skip
 """What is compiled where numba is installed."""

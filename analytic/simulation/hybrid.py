@@ -39,7 +39,7 @@ ENDLESS = 2**62
 
 
 class Stage(NamedTuple):
-    """How far a run has come."""
+    """How far a run has come: the moment, the case, and what is counted."""
 
     at: Moment
     case: int = NONE
@@ -60,8 +60,8 @@ class Stop(NamedTuple):
     """Whether nobody wants it any more, shape (1,)."""
 
 
-class Kept(NamedTuple):
-    """What is kept of a run, a row a sample or event."""
+class Record(NamedTuple):
+    """Arrays with what is kept of a run, a row a sample or event."""
 
     times: Array
     """Of the samples, s, shape (n,)."""
@@ -84,16 +84,17 @@ class Kept(NamedTuple):
 
     @classmethod
     def of(cls, times: Array, x: Array, case: Any, landings: Any, stop: Stop, whole: bool) -> Self:
-        """Those of a run that begins, with paths and events if it is to be kept as a `whole`."""
+        """Empty arrays for a run that begins, with those for paths and events if it is to be kept as a `whole`."""
         n, events = (len(times), 3 * STRIDES) if whole else (0, 0)
-        path, z, reached = np.empty((n, 5)), np.empty(len(times) * charts.MOST), [0.0, _still(0.0, times, stop.quiet)]
+        path, z = np.empty((n, 5)), np.empty(len(times) * charts.MOST)
+        reached = [0.0, _quiet_from(0.0, times, stop.quiet)]
         landings[:] = 0
         taken = np.zeros(2, np.int64)
         return cls(times, x, case, landings, path, z, np.empty((events, 9)), taken, np.array(reached), stop)
 
 
-def go_through(stage: Stage, k: Motion, pieces: Any, run: Kept, strides: int, steps: int) -> tuple[Any, ...]:
-    """On to the last sample, or to when the run is stopped: whether it is, and the stage, or that after some strides.
+def run_through_flow(stage: Stage, k: Motion, pieces: Any, run: Record, strides: int, steps: int) -> tuple[Any, ...]:
+    """Follow a run to its last sample, to where it is stopped, or for some strides: whether it is over, and its stage.
 
     The stage is in parts, plain tuples: a signal would be answered while numba makes named ones, which doesn't look
     whether it has got them.
@@ -105,51 +106,52 @@ def go_through(stage: Stage, k: Motion, pieces: Any, run: Kept, strides: int, st
     for n in range(max(begun - 1, 0), len(pieces)):
         piece = pieces[n]
         end = piece[1]
-        k = equations.changed(k, k.case, k.side, equations.Line(piece[2], piece[3], piece[4]), k.fall)
+        k = equations.in_case(k, k.case, k.side, equations.Line(piece[2], piece[3], piece[4]), k.fall)
         if begun <= n:
             begun = n + 1
             if case == NONE or piece[5] != 0:
                 before = at
                 after, at, impulse = transitions.settle(at, k)
                 if impulse.A_y > 0 or impulse.B_x > 0 or (case != NONE and after != case):
-                    _note(run, before, after if case == NONE else case, after, impulse)
+                    _keep_event(run, before, after if case == NONE else case, after, impulse)
                 case = after
         while at.time < min(end, run.reached[1]):
             if strides == 0:
-                return False, _parts(at), case, begun, at_once
+                return False, _moment_parts(at), case, begun, at_once
             strides -= 1
             since = at.time
             guard, at = follow(case, at, min(end, run.reached[1]), k, run, steps)
             if guard != NONE:
                 before = at
                 after, at, impulse = transitions.react(guard, case, before, k)
-                _note(run, before, case, after, impulse)
+                _keep_event(run, before, case, after, impulse)
                 case = after
             at_once = at_once + 1 if at.time - since <= 1e-14 * end else 0
             if at_once > MAX_EVENTS_AT_ONCE:
                 raise StalledError("no way on: one change of case follows the other")
-    return True, _parts(at), case, begun, at_once
+    return True, _moment_parts(at), case, begun, at_once
 
 
-def _parts(at: Moment) -> tuple[Any, ...]:
+def _moment_parts(at: Moment) -> tuple[Any, ...]:
+    """The fields of a moment as a plain tuple."""
     return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
 
 
-def follow(case: int, at: Moment, until: float, k: Motion, run: Kept, steps: int) -> tuple[int, Moment]:
-    """One case up to the first guard, for so many steps, or up to a time; what ended it, and the moment then."""
+def follow(case: int, at: Moment, until: float, k: Motion, run: Record, steps: int) -> tuple[int, Moment]:
+    """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and the moment then."""
     room = np.empty((6, charts.MOST))
     k, n = charts.begin(case, at, k, room[0], room[1])
-    z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], charts.count_ends(k)
+    z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], charts.count_guards(k)
     values, arm, level = room[3, :count], room[4, :count], room[5, :count]
     lands, until = k.fall.landing <= until, min(until, k.fall.landing)
     equations.guards(at.time, z, k, values)
-    opens, lasts = charts.levels(values, k, arm, level), charts.hop(at, z, k, rate)
+    opens, lasts = charts.arm_guards(values, k, arm, level), charts.rebound_time(at, z, k, rate)
     pace = first_pace(at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0)
     if run.taken[0] == 0:
-        _sample(at, k, run)
+        _keep_sample(at, k, run)
     of = Stretch(k, until, z, scale, run.times, run.z[: n * len(run.times)].reshape(-1, n), arm, level)
     why, pace, guard, taken = stretch(of, pace, run.taken[0], steps)
-    near = keep(of, at, taken, run)
+    near = keep_samples(of, at, taken, run)
     now = until if why == DONE else max(pace[0] + pace[1], run.times[taken - 1])
     run.reached[0] = now
     if run.stop.over[0]:
@@ -157,10 +159,10 @@ def follow(case: int, at: Moment, until: float, k: Motion, run: Kept, steps: int
     if why == STUCK:
         raise StalledError("steps become too short")
     fired = charts.ENDS[case][guard] if why == FIRED else A_LANDS if lands and why == DONE else NONE
-    return fired, _turned(charts.moment(now, z, at, k), k, near)
+    return fired, _with_nearest_azimuth(charts.moment(now, z, at, k), k, near)
 
 
-def _turned(at: Moment, k: Motion, near: float) -> Moment:
+def _with_nearest_azimuth(at: Moment, k: Motion, near: float) -> Moment:
     """The same moment; of the azimuths that it may have off the wall that which is nearest to another."""
     if k.case % 3 != AWAY:
         return at
@@ -168,8 +170,8 @@ def _turned(at: Moment, k: Motion, near: float) -> Moment:
     return Moment(at.time, theta, at.x, at.alpha, at.beta, at.work)
 
 
-def keep(of: Stretch, at: Moment, taken: int, run: Kept) -> float:
-    """Keep samples up to a number of a stretch that began at a moment; the azimuth at the last of them, or then."""
+def keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
+    """Store samples up to number `taken` of a stretch that began at `at`; return the azimuth at the last, or `at`'s."""
     k, these, near = of.k, slice(int(run.taken[0]), taken), at.theta
     if taken > these.start:
         t = run.times[these]
@@ -183,8 +185,8 @@ def keep(of: Stretch, at: Moment, taken: int, run: Kept) -> float:
     return near
 
 
-def _sample(at: Moment, k: Motion, run: Kept) -> None:
-    """Keep the next sample."""
+def _keep_sample(at: Moment, k: Motion, run: Record) -> None:
+    """Store a moment as the next sample."""
     row = run.taken[0]
     for i in range(8):
         run.x[row, i] = at.x[i]
@@ -196,11 +198,11 @@ def _sample(at: Moment, k: Motion, run: Kept) -> None:
     run.taken[0] += 1
 
 
-def _note(run: Kept, at: Moment, case: int, after: int, impulse: Forces) -> None:
-    """Keep an event."""
+def _keep_event(run: Record, at: Moment, case: int, after: int, impulse: Forces) -> None:
+    """Store a change of case or an impact, and count landings."""
     if max(impulse.A_y, impulse.B_x) > run.stop.blow:
         run.landings[min(run.taken[0], len(run.times) - 1)] += 1
-        run.reached[1] = _still(at.time, run.times, run.stop.quiet)
+        run.reached[1] = _quiet_from(at.time, run.times, run.stop.quiet)
     if run.taken[1] < len(run.events):
         event = run.events[run.taken[1]]
         event[0], event[1], event[2] = at.time, case, after
@@ -209,19 +211,19 @@ def _note(run: Kept, at: Moment, case: int, after: int, impulse: Forces) -> None
         run.taken[1] += 1
 
 
-def _still(landed: float, times: Array, quiet: float) -> float:
+def _quiet_from(landed: float, times: Array, quiet: float) -> float:
     """The sample at which a run is quiet if nothing lands after a time; inf if there is none."""
     row = np.searchsorted(times, landed + quiet, side="right")
     return float(times[row]) if row < len(times) else math.inf
 
 
-TEXT = (follow, _parts, _turned, _sample, _note, _still)
-"""What is compiled beside `go_through`."""
+TEXT = (follow, _moment_parts, _with_nearest_azimuth, _keep_sample, _keep_event, _quiet_from)
+"""What is compiled beside `run_through_flow`."""
 
 
 @cache
 def compiled() -> Callable[..., Any] | None:
-    """The same as `go_through`, where numba is installed."""
+    """`run_through_flow`, compiled; None where numba isn't installed."""
     try:
         import numba
 
@@ -234,8 +236,8 @@ def compiled() -> Callable[..., Any] | None:
 
 
 @lru_cache
-def given(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[Motion, Array]:
-    """What runs of one ball in one flow share: its motion, and the pieces of the flow, as `go_through` takes them."""
+def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[Motion, Array]:
+    """What runs of one ball in one flow share: constants of the motion, and pieces of the flow as rows of an array."""
     k, rows = motion.of_ball(p, Fluid.of(flow, 0.0), settings), []
     for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
         jump = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
@@ -244,14 +246,14 @@ def given(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[
 
 
 def carry_out(
-    start: Moment, k: Motion, pieces: Array, rows: Callable[[], Kept], look: Callable[[Kept], None] | None = None
-) -> tuple[Kept, Exception | None]:
-    """A run into new rows, and why it broke down, if it did; `look` has a look at them from time to time.
+    start: Moment, k: Motion, pieces: Array, rows: Callable[[], Record], look: Callable[[Record], None] | None = None
+) -> tuple[Record, Exception | None]:
+    """Simulate a run into new arrays: these, and why it broke down, if it did; `look` sees them from time to time.
 
     In plain Python where the compiled text isn't there or can't go on.
     """
     failure: Exception | None = None
-    for way, waves in ((compiled(), np.array(k.waves, dtype=float).reshape(-1, 3)), (go_through, k.waves)):
+    for way, waves in ((compiled(), np.array(k.waves, dtype=float).reshape(-1, 3)), (run_through_flow, k.waves)):
         if not way:
             continue
         k = k._replace(waves=waves)
@@ -278,18 +280,18 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     """
     times, events = recorder.times, recorder.events
 
-    def rows() -> Kept:
+    def rows() -> Record:
         events.clear()
         n = len(times)
         each = np.empty((n, 8)), np.empty(n, np.int8), np.empty(n, np.int64)
-        return Kept.of(times, *each, Stop(math.inf, math.inf, np.zeros(1, bool)), whole=True)
+        return Record.of(times, *each, Stop(math.inf, math.inf, np.zeros(1, bool)), whole=True)
 
-    def look(run: Kept) -> None:
-        _hand_over(run, recorder)
+    def look(run: Record) -> None:
+        _record_events(run, recorder)
         recorder.reached(float(run.reached[0]))
 
-    done, failure = carry_out(Moment(0.0, theta_0, x0), *given(p, flow, settings, float(times[-1])), rows, look)
-    _hand_over(done, recorder)
+    done, failure = carry_out(Moment(0.0, theta_0, x0), *prepare(p, flow, settings, float(times[-1])), rows, look)
+    _record_events(done, recorder)
     recorder.time = max(recorder.time, float(done.reached[0]))
     if count := int(done.taken[0]):
         path = done.path[:count]
@@ -299,8 +301,8 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
         raise failure
 
 
-def _hand_over(run: Kept, recorder: Recorder) -> None:
-    """Record the events since the last look."""
+def _record_events(run: Record, recorder: Recorder) -> None:
+    """Hand the events since the last look to the recorder."""
     for time, before, after, *impulse in run.events[: run.taken[1]].tolist():
         recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
     run.taken[1] = 0

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from analytic.simulation import equations
 from analytic.simulation.charts import TURNING, least_slip
-from analytic.simulation.equations import FINER, LOCAL, ONSET_SLIP, PATIENCE, SMALL_SLIP, Motion, straight
+from analytic.simulation.equations import FINER, LOCAL, ONSET_SLIP, PATIENCE, SMALL_SLIP, Motion, is_straight
 from model.arrays import Array
 
 DONE, FIRED, STUCK, PAUSED = range(4)
@@ -46,7 +46,7 @@ class Stretch(NamedTuple):
     samples: Array
     """Coordinates then (m, n)."""
     arm: Array
-    """Above which values guards are armed, and at which they fire (guards,), as `charts.levels` says."""
+    """Above which values guards are armed, and at which they fire (guards,), as `charts.arm_guards` says."""
     level: Array
 
 
@@ -55,7 +55,7 @@ class StalledError(ArithmeticError):
 
 
 def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float) -> Pace:
-    """That of a stretch; it may be a straight line from the start on if a contact opens there."""
+    """The `Pace` at the start of a stretch, which may be a straight line from there on if a contact opens."""
     small = least_slip(z, scale, case) < ONSET_SLIP
     return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 
@@ -65,14 +65,14 @@ TEXT = (first_pace,)
 
 
 def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
-    """Go on in a case, of whose samples so many are taken, for so many steps: why that ended, pace, guard, `taken`.
+    """Integrate a case for at most so many steps: why that ended, the pace, the guard, and how many samples are taken.
 
     Where a solver's steps become shorter than its time can resolve, the other one goes on with a time that starts from
     zero again; after `MAX_RESTARTS` it is stuck.
     """
     start, tau, first, small, slow = pace
     t, steps, failures = start + tau, 0, 0
-    if slow and _straight(t, of, taken):
+    if slow and _finish_straight(t, of, taken):
         return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
     while t < of.until:
         slow, method = 0, BDF if small else LSODA
@@ -83,7 +83,7 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
                     return FIRED, (t, 0.0, 0.0, small, 0), guard, taken
                 grown = least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP
                 slow = 0 if grown else slow + 1
-                if slow % PATIENCE == PATIENCE - 1 and _straight(t, of, taken):
+                if slow % PATIENCE == PATIENCE - 1 and _finish_straight(t, of, taken):
                     return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
                 if steps >= most and t < of.until:
                     return PAUSED, (t, 0.0, 0.0, small, 0), -1, taken
@@ -97,11 +97,11 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
     return DONE, pace, -1, taken
 
 
-def _straight(t: float, of: Stretch, taken: int) -> bool:
-    """Go all the rest along a straight line, if that solves the equations."""
+def _finish_straight(t: float, of: Stretch, taken: int) -> bool:
+    """Whether a straight line solves the equations for the rest of a stretch, which is then filled in."""
     k, until, z, scale, times, samples, arm, _ = of
     rate, there, other, values = (np.zeros(len(z)) for _ in range(4))
-    if len(k.waves) or k.line.slope or not straight(t, until, z, scale, k, rate, values[: len(arm)], there, other):
+    if len(k.waves) or k.line.slope or not is_straight(t, until, z, scale, k, rate, values[: len(arm)], there, other):
         return False
     due = slice(taken, int(np.searchsorted(times, until, side="right")))
     samples[due] = z + np.outer(times[due] - t, rate)
@@ -110,8 +110,8 @@ def _straight(t: float, of: Stretch, taken: int) -> bool:
 
 
 def _steps(method: Any, start: float, of: Stretch, taken: int, first: float) -> Iterator[tuple[float, int, int]]:
-    """Steps of one solver: time, guard, `taken`; its time runs from zero, for directions settle in less than the
-    round-off of `start`."""
+    """Steps of one of scipy's solvers: time, guard that fired, samples taken. Its time runs from zero, since directions
+    settle in less than the round-off of `start`."""
     k, until, z, scale, times, samples, arm, level = of
     least, armed, levels = np.array(scale), arm.tolist(), level.tolist()
     least[slice(*TURNING[k.case], 2)] *= k.rtol

@@ -39,12 +39,12 @@ class Fluid:
         return omega_0
 
     def line(self) -> Line:
-        """Without the waves."""
+        """The flow without its waves."""
         return Line(float(self.start), float(self.value), float(self.slope))
 
     @classmethod
     def of(cls, flow: Flow, start: float) -> Self:
-        """That of a flow from one of its knots, or from 0, on."""
+        """The piece of a flow that begins at one of its knots, or at 0."""
         k = int(np.searchsorted(flow.start, start, side="right")) - 1
         waves = tuple((a, 2 * math.pi * f, phase) for a, f, phase in flow.waves.tolist())
         if k < 0:
@@ -73,7 +73,7 @@ def natural_units(p: Parameters) -> tuple[float, float, float, float]:
 
 
 def of_ball(p: Parameters, omega_0: Fluid, settings: Settings) -> Motion:
-    """What the motion of a ball depends on, as plain numbers; in whatever case."""
+    """All that the motion of a ball depends on, as plain numbers, for compiled functions; the case is set later."""
     m, r, R, j, mu, eta, g, c = map(float, (p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, p.c))
     law, (unit, _, spin, _) = drag.Law(*map(float, drag.law(p))), natural_units(p)
     leaves = {"slip-stability": equations.STABILITY, "infeasible": equations.FEASIBILITY}[settings.leave_rolling]

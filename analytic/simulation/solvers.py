@@ -1,9 +1,9 @@
 """Steps through one case, compiled by numba, and the moments at which it ends.
 
-`_explicit` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
-`scipy.integrate.DOP853`; guards are looked at four times in each step. `_implicit` is for a slip that has just set in,
-whose direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer &
-Wanner, Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
+`_explicit_steps` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
+`scipy.integrate.DOP853`; guards are looked at four times in each step. `_implicit_steps` is for a slip that has just
+set in, whose direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505;
+Hairer & Wanner, Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ def _copy(given: Array, out: Array) -> None:
         out[i] = given[i]
 
 
-def _between(x: float, z: Array, F: Array, out: Array) -> None:
-    """Coordinates at a share x of a step that began at z."""
+def _interpolate(x: float, z: Array, F: Array, out: Array) -> None:
+    """Coordinates at a share x of a step that began at z, from the coefficients F of its interpolant."""
     for i in range(len(z)):
         value = 0.0
         for n in range(len(F)):
@@ -64,10 +64,10 @@ def _root(
 
     By the rule of false position, whose end that stays counts half the next time (Illinois); halved where that is slow.
     """
-    _between(low, z, F, now)
+    _interpolate(low, z, F, now)
     equations.guards(t + low * h, now, k, values)
     above = values[guard] - level
-    _between(high, z, F, now)
+    _interpolate(high, z, F, now)
     equations.guards(t + high * h, now, k, values)
     below = values[guard] - level
     if above <= 0:
@@ -81,7 +81,7 @@ def _root(
         x = (low * below - high * above) / (below - above)
         if n % 3 == 2 or not low < x < high:
             x = (low + high) / 2
-        _between(x, z, F, now)
+        _interpolate(x, z, F, now)
         equations.guards(t + x * h, now, k, values)
         value = values[guard] - level
         if value > 0:
@@ -95,8 +95,8 @@ def _root(
     return high
 
 
-def _pass(guard_values: Array, arm: Array, level: Array) -> int:
-    """Arm guards that have risen; the first that has fallen through its level, or -1."""
+def _fallen_guard(guard_values: Array, arm: Array, level: Array) -> int:
+    """The first guard that has fallen through its level, or -1; guards that have risen are armed."""
     for guard in range(len(arm)):
         if guard_values[guard] > arm[guard]:
             level[guard] = 0.0
@@ -105,8 +105,8 @@ def _pass(guard_values: Array, arm: Array, level: Array) -> int:
     return -1
 
 
-def _combined(weights: Array, count: int, K: Array, out: Array) -> None:
-    """The sum of so many rows of K (s, n) by their weights."""
+def _weighted_sum(weights: Array, count: int, K: Array, out: Array) -> None:
+    """The sum of the first `count` rows of K (s, n), each times its weight."""
     for i in range(len(out)):
         out[i] = 0.0
     for j in range(count):
@@ -114,10 +114,10 @@ def _combined(weights: Array, count: int, K: Array, out: Array) -> None:
             out[i] += weights[j] * K[j, i]
 
 
-def _dense(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: Array, F: Array) -> None:
-    """Coefficients of `_between` for a step from z to `new` with its stages K, three more of which it fills in."""
+def _interpolant(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: Array, F: Array) -> None:
+    """Coefficients F of the interpolant of a step from z to `new`, from its stages K; three of these it computes."""
     for s in range(len(C_MORE)):
-        _combined(A_MORE[s], STAGES + 1 + s, K, now)
+        _weighted_sum(A_MORE[s], STAGES + 1 + s, K, now)
         for i in range(len(z)):
             now[i] = z[i] + h * now[i]
         equations.rates(t + C_MORE[s] * h, now, k, K[STAGES + 1 + s])
@@ -126,7 +126,7 @@ def _dense(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: A
         F[0, i], F[1, i] = change, h * K[0, i] - change
         F[2, i] = 2 * change - h * (K[STAGES, i] + K[0, i])
     for j in range(len(D)):
-        _combined(D[j], ALL, K, F[3 + j])
+        _weighted_sum(D[j], ALL, K, F[3 + j])
         for i in range(len(z)):
             F[3 + j, i] *= h
 
@@ -140,7 +140,7 @@ def _first_fall(
     """
     fired, end = -1, 2.0
     for look in range(1, LOOKS_A_STEP):
-        _between(look / LOOKS_A_STEP, z, F, now)
+        _interpolate(look / LOOKS_A_STEP, z, F, now)
         equations.guards(t + look / LOOKS_A_STEP * h, now, k, seen[look])
     for guard in range(len(arm)):
         for look in range(1, LOOKS_A_STEP + 1):
@@ -154,7 +154,7 @@ def _first_fall(
                 away = (one - three) / (2 * bend) if bend > 0 else 2.0
                 if abs(away) < 1 and two - bend * away * away / 2 < level[guard] + bend:
                     lowest = share + (away - 1) / LOOKS_A_STEP
-                    _between(lowest, z, F, now)
+                    _interpolate(lowest, z, F, now)
                     equations.guards(t + lowest * h, now, k, values)
                     if not values[guard] < level[guard]:
                         lowest = share
@@ -168,7 +168,7 @@ def _first_fall(
     return fired, end
 
 
-def _left(z: Array, rate: Array, slips: range, scale: Array, rtol: float) -> float:
+def _time_to_stop(z: Array, rate: Array, slips: range, scale: Array, rtol: float) -> float:
     """The time that a slip which dies has left, along a straight line; inf if a direction turns too much for it."""
     left = math.inf
     for i in slips:
@@ -180,16 +180,16 @@ def _left(z: Array, rate: Array, slips: range, scale: Array, rtol: float) -> flo
     return left
 
 
-def _passed(time: float, start: float, tau: float) -> bool:
-    """Whether start + tau is at a time or later, however that is rounded: a stretch that ends there reaches it."""
+def _is_past(time: float, start: float, tau: float) -> bool:
+    """Whether start + tau is at a time or later, however that is rounded."""
     return time <= start + tau or time - start <= tau
 
 
-def _explicit(
+def _explicit_steps(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
     rtol: float, scale: Array, arm: Array, level: Array, slips: range, most: int,
 ) -> tuple[int, float, float, int, int]:  # fmt: skip
-    """At most so many steps from the time start + tau towards start + span: why they end, tau, h, guard, `taken`.
+    """Up to `most` explicit steps from start + tau towards start + span: why they end, tau, h, guard, samples taken.
 
     A slip (coordinates `slips`) below `SMALL_SLIP` for more than `PATIENCE` steps is for the other method.
     A step is interpolated where a sample is due, or a guard not `CLEAR`.
@@ -214,19 +214,19 @@ def _explicit(
         if h <= 4 * EPS * tau or h < 1e-300:
             return STUCK, tau, h, -1, taken
         for s in range(1, STAGES):
-            _combined(A[s], s, K, now)
+            _weighted_sum(A[s], s, K, now)
             for i in range(n):
                 now[i] = z[i] + h * now[i]
             equations.rates(start + (tau + C[s] * h), now, k, K[s])
             if s == INSIDE:
                 equations.guards(start + (tau + C[s] * h), now, k, values)
-        _combined(B, STAGES, K, new)
+        _weighted_sum(B, STAGES, K, new)
         for i in range(n):
             new[i] = z[i] + h * new[i]
         after = span if last else tau + h
         equations.rates(start + after, new, k, K[STAGES])
-        _combined(E5, STAGES + 1, K, five)
-        _combined(E3, STAGES + 1, K, three)
+        _weighted_sum(E5, STAGES + 1, K, five)
+        _weighted_sum(E3, STAGES + 1, K, three)
         fifth = third = 0.0
         for i in range(n):
             size = rtol * (scale[i] / FINER + max(abs(z[i]), abs(new[i])))
@@ -247,15 +247,15 @@ def _explicit(
             low = min(one, two, end)
             clear = clear and low > CLEAR * (max(one, two, end) - low)
         fired, until = -1, after
-        if not clear or (taken < len(times) and _passed(times[taken], start, after)):
-            _dense(start + tau, h, k, z, new, K, now, F)
+        if not clear or (taken < len(times) and _is_past(times[taken], start, after)):
+            _interpolant(start + tau, h, k, z, new, K, now, F)
             fired, share = _first_fall(start + tau, h, k, z, F, arm, level, seen, now, values)
             until = tau + share * h if fired >= 0 else after
-            while taken < len(times) and _passed(times[taken], start, until):
-                _between(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
+            while taken < len(times) and _is_past(times[taken], start, until):
+                _interpolate(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
                 taken += 1
             if fired >= 0:
-                _between(share, z, F, now)
+                _interpolate(share, z, F, now)
                 _copy(now, z)
                 return FIRED, until, h, fired, taken
         _copy(new, z)
@@ -267,18 +267,18 @@ def _explicit(
         rejected = False
         least = charts.least_slip(z, scale, k.case)
         slow = slow + 1 if least <= SMALL_SLIP else 0
-        left = _left(z, K[0], slips, scale, rtol) if least < DYING else math.inf
-        if tau + left <= span and (taken == len(times) or not _passed(times[taken], start, tau + left)):
+        left = _time_to_stop(z, K[0], slips, scale, rtol) if least < DYING else math.inf
+        if tau + left <= span and (taken == len(times) or not _is_past(times[taken], start, tau + left)):
             for i in range(n):
                 z[i] += left * K[0, i]
             equations.guards(start + tau + left, z, k, values)
-            return FIRED, tau + left, h, _lowest(values), taken
+            return FIRED, tau + left, h, _index_of_least(values), taken
         if slow > PATIENCE:
             return OTHER, tau, h, -1, taken
     return PAUSED, tau, h, -1, taken
 
 
-def _lowest(values: Array) -> int:
+def _index_of_least(values: Array) -> int:
     lowest = 0
     for i in range(1, len(values)):
         if values[i] < values[lowest]:
@@ -286,8 +286,8 @@ def _lowest(values: Array) -> int:
     return lowest
 
 
-def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
-    """A matrix as its triangles, rows exchanged."""
+def _lu_factor(M: Array, order: npt.NDArray[np.int64]) -> None:
+    """LU factors of M in its place, with the exchanges of rows in `order`."""
     n = len(M)
     for i in range(n):
         best = i
@@ -303,8 +303,8 @@ def _factored(M: Array, order: npt.NDArray[np.int64]) -> None:
                 M[r, c] -= M[r, i] * M[i, c]
 
 
-def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
-    """What such a matrix makes b of, in its place."""
+def _lu_solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
+    """The solution of M x = b in the place of b, from what `_lu_factor` left."""
     n = len(M)
     for i in range(n):
         b[i], b[order[i]] = b[order[i]], b[i]
@@ -317,11 +317,11 @@ def _solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
         b[i] /= M[i, i]
 
 
-def _extrapolated(
+def _extrapolation_step(
     t: float, h: float, k: Motion, z: Array, J: Array, rtol: float, scale: Array, table: Array, M: Array,
     order: npt.NDArray[np.int64], rate: Array,
 ) -> tuple[float, int]:  # fmt: skip
-    """A step by 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error, and how many columns that took."""
+    """A step extrapolated from 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error, and columns taken."""
     n, error = len(z), math.inf
     for column in range(COLUMNS):
         steps = column + 1
@@ -329,13 +329,13 @@ def _extrapolated(
         for i in range(n):
             for c in range(n):
                 M[i, c] = (i == c) - part * J[i, c]
-        _factored(M, order)
+        _lu_factor(M, order)
         _copy(z, y)
         for s in range(steps):
             equations.rates(t + (s + 1) * part, y, k, rate)
             for i in range(n):
                 rate[i] *= part
-            _solve(M, order, rate)
+            _lu_solve(M, order, rate)
             for i in range(n):
                 y[i] += rate[i]
         square = 0.0
@@ -351,11 +351,11 @@ def _extrapolated(
     return error, COLUMNS
 
 
-def _implicit(
+def _implicit_steps(
     k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
     rtol: float, scale: Array, arm: Array, level: Array, slips: range,
 ) -> tuple[int, float, float, int, int]:  # fmt: skip
-    """As `_explicit`, for `PATIENCE` steps, until all slips are `GROWN_SLIP`.
+    """As `_explicit_steps`, by implicit ones: for `PATIENCE` steps, or until all slips are `GROWN_SLIP`.
 
     A Jacobian shifts z by a share of it, or at least of its natural size, or of `rtol` of that for a slip.
     """
@@ -383,19 +383,19 @@ def _implicit(
             length = min(h, stop - tau)
             if length <= 4 * EPS * tau or length < 1e-300:
                 return STUCK, tau, h, -1, taken
-            error, columns = _extrapolated(start + tau, length, k, z, J, rtol, scale, table, M, order, rate)
+            error, columns = _extrapolation_step(start + tau, length, k, z, J, rtol, scale, table, M, order, rate)
             if error <= 1:
                 break
             h = length / 4
         after = stop if length == stop - tau else tau + length
         _copy(table[0], now)
         equations.guards(start + after, now, k, values)
-        guard = _pass(values, arm, level)
+        guard = _fallen_guard(values, arm, level)
         if guard >= 0:  # halve the step until it ends at the guard
             low, high = 0.0, length
             while high - low > 4 * EPS * max(tau, length):
                 middle = (low + high) / 2
-                _extrapolated(start + tau, middle, k, z, J, rtol, scale, table, M, order, rate)
+                _extrapolation_step(start + tau, middle, k, z, J, rtol, scale, table, M, order, rate)
                 equations.guards(start + (tau + middle), table[0], k, values)
                 fell = -1
                 for each in range(len(arm)):
@@ -410,7 +410,7 @@ def _implicit(
             return FIRED, tau + high, h, guard, taken
         _copy(now, z)
         tau = after
-        while taken < len(times) and _passed(times[taken], start, tau):
+        while taken < len(times) and _is_past(times[taken], start, tau):
             _copy(z, samples[taken])
             taken += 1
         if length == h or error < 0.01:
@@ -422,7 +422,7 @@ def _implicit(
 
 
 def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
-    """As `integrator.stretch`, by the steps above."""
+    """Integrate a case as `integrator.stretch` does, in a form that numba compiles."""
     k, until, z, scale, times, samples, arm, level = of
     n, steady = len(z), len(k.waves) == 0 and k.line.slope == 0
     slips = range(charts.TURNING[k.case][0], charts.TURNING[k.case][1], 2)
@@ -432,7 +432,7 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
     while why == OTHER or (why == PAUSED and left > 0):
         left -= PATIENCE if small else most
         now = start + tau
-        if steady and slow % 2 == 1 and equations.straight(now, until, z, scale, k, rate, values, there, other):
+        if steady and slow % 2 == 1 and equations.is_straight(now, until, z, scale, k, rate, values, there, other):
             while taken < len(times) and times[taken] <= until:
                 for i in range(n):
                     samples[taken, i] = z[i] + (times[taken] - now) * rate[i]
@@ -442,12 +442,12 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
         span = until - start
         if small:
             rtol = max(LOCAL * k.rtol, FINEST_STIFF)
-            why, tau, h, guard, taken = _implicit(
+            why, tau, h, guard, taken = _implicit_steps(
                 k, start, tau, h, span, z, times, taken, samples, rtol, scale, arm, level, slips
             )
         else:
             rtol = max(LOCAL * k.rtol, FINEST)
-            why, tau, h, guard, taken = _explicit(
+            why, tau, h, guard, taken = _explicit_steps(
                 k, start, tau, h, span, z, times, taken, samples, rtol, scale, arm, level, slips, most
             )
         total = 0.0
@@ -462,7 +462,7 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
 
 
 TEXT = (
-    _copy, _between, _root, _pass, _combined, _dense, _first_fall, _left, _passed, _explicit, _lowest, _factored,
-    _solve, _extrapolated, _implicit,
+    _copy, _interpolate, _root, _fallen_guard, _weighted_sum, _interpolant, _first_fall, _time_to_stop, _is_past,
+    _explicit_steps, _index_of_least, _lu_factor, _lu_solve, _extrapolation_step, _implicit_steps,
 )  # fmt: skip
 """What is compiled."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.mechanics import contact_problem, drag, rigid_body
-from analytic.mechanics.contact_problem import Friction, Impulse, both, project
+from analytic.mechanics.contact_problem import Friction, Impulse, project, solve_pair
 from analytic.mechanics.rigid_body import Forces, Velocities, mean
 from analytic.simulation import compiling
 from analytic.simulation.equations import AWAY, ROLLS, SLIPS
@@ -59,7 +59,7 @@ class FlowArrays(NamedTuple):
     waves: Array
 
 
-class At(NamedTuple):
+class BallState(NamedTuple):
     """Where the ball is, and its velocities along the axes there."""
 
     theta: float
@@ -71,7 +71,7 @@ class At(NamedTuple):
 class Ball(NamedTuple):
     """The ball at the end of a step."""
 
-    at: At
+    at: BallState
     P: Forces
     """Impulses of the step, N s."""
     impact: Forces
@@ -86,10 +86,10 @@ class Ball(NamedTuple):
     """0, or by how much the velocities of a step that did not converge still changed, m s-1."""
 
 
-def whole(parts: Any) -> Ball:
-    """The ball that `advance` returns in parts."""
+def ball_from_parts(parts: Any) -> Ball:
+    """The ball from the plain tuples that `advance` returns."""
     (place, u), P, impact, rest = parts
-    return Ball(At._make([*place, Velocities(*u)]), Forces(*P), Forces(*impact), *rest)
+    return Ball(BallState._make([*place, Velocities(*u)]), Forces(*P), Forces(*impact), *rest)
 
 
 class Touching(NamedTuple):
@@ -112,7 +112,7 @@ class Stretches(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """Steps of dt each, of which the first begins at `start`, from one on and up to another."""
+    """Steps number `first` up to `end` of a row of equal steps dt that begins at the time `start`."""
 
     start: float
     dt: float
@@ -129,8 +129,8 @@ class Rows(NamedTuple):
     over: npt.NDArray[np.bool_]
 
 
-class Solved(NamedTuple):
-    """Velocities after a step or an impact, and what brought them about."""
+class StepSolution(NamedTuple):
+    """Velocities after a step or an impact, and the impulses and work that made them."""
 
     new: Velocities
     P: Forces
@@ -141,7 +141,7 @@ class Solved(NamedTuple):
     residual: float
 
 
-def solve(at: At, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants) -> Solved:
+def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants) -> StepSolution:
     """Velocities after dt, 0 for an impact, with closed contacts.
 
     Smooth forces, at the mean of both velocities, and contacts are iterated together; `start` guesses the impulses.
@@ -150,12 +150,12 @@ def solve(at: At, dt: float, omega_0: float, touching: Touching, start: Forces, 
     (in_A, in_B, to_A, to_B), m, r, j = touching, p.m, p.r, p.j
     fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
     rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
-    slip_A, slip_B = _sliding(at, dt, p)
+    slip_A, slip_B = _old_slip(at, dt, p)
     on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
     for tolerance in (TOLERANCE, BARELY):
         enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
         still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
-        A, B = _guess(touching, start, m)
+        A, B = _first_guess(touching, start, m)
         new, last, change = old, 0.0, p.g * dt
         for _ in range(MAX_ITERATIONS):
             u = mean(old, new)
@@ -174,7 +174,7 @@ def solve(at: At, dt: float, omega_0: float, touching: Touching, start: Forces, 
             b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * turn_y + slip_B[1]))
             residual, aim = 0.0, max(enough, ROUGH * change)
             if in_A and in_B:
-                A, B, residual = both(a, b, B, on_A, on_B, j, aim)
+                A, B, residual = solve_pair(a, b, B, on_A, on_B, j, aim)
             elif in_A:
                 A = project(a, on_A)
             elif in_B:
@@ -201,10 +201,10 @@ def solve(at: At, dt: float, omega_0: float, touching: Touching, start: Forces, 
     # A loaded contact has met its target, and round-off must not open it again.
     new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
     P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
-    return Solved(new, P, work, spin, 0.0 if converged else _worse(change, residual))
+    return StepSolution(new, P, work, spin, 0.0 if converged else _larger_or_nan(change, residual))
 
 
-def _sliding(at: At, dt: float, p: Constants) -> tuple[tuple[float, float], tuple[float, float]]:
+def _old_slip(at: BallState, dt: float, p: Constants) -> tuple[tuple[float, float], tuple[float, float]]:
     """Old slip at floor and wall, m s-1, that is added to the new, since friction opposes the mean of both where a
     contact slides on. None where it may stop within the step: friction then opposes the final slip, so that it can't
     reverse.
@@ -213,14 +213,14 @@ def _sliding(at: At, dt: float, p: Constants) -> tuple[tuple[float, float], tupl
     r, rest = p.r, p.j / (1 + p.j)
     slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
     load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
-    if dt == 0 or rest * _size(slip_A[0], slip_A[1]) <= p.mu * load:
+    if dt == 0 or rest * _length(slip_A[0], slip_A[1]) <= p.mu * load:
         slip_A = (0.0, 0.0)
-    if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
+    if dt == 0 or rest * _length(slip_B[0], slip_B[1]) <= p.eta * load:
         slip_B = (0.0, 0.0)
     return slip_A, slip_B
 
 
-def _guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impulse]:
+def _first_guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impulse]:
     """The impulses per mass from which a solution is looked for; none at an open contact."""
     A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
     if touching.A:
@@ -230,7 +230,7 @@ def _guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impuls
     return A, B
 
 
-def _size(x: float, y: float) -> float:
+def _length(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)  # several times as fast as math.hypot
 
 
@@ -238,32 +238,32 @@ def _sum(a: Forces, b: Forces) -> Forces:
     return Forces(a.A_x + b.A_x, a.A_y + b.A_y, a.A_z + b.A_z, a.B_x + b.B_x, a.B_y + b.B_y, a.B_z + b.B_z)
 
 
-def _moved(at: At, dt: float, s: Solved, touching: Touching, R: float) -> At:
+def _moved(at: BallState, dt: float, s: StepSolution, touching: Touching, R: float) -> BallState:
     """Where the ball comes within dt; a closed contact that carries load stays, or is now, closed."""
     u, new = mean(at.u, s.new), s.new
     y = 0.0 if touching.A and s.P.A_y > 0 else at.y + dt * u.v_y
     if touching.B:
-        return At(at.theta + dt * s.spin, y, 0.0 if s.P.B_x > 0 else at.h + dt * u.v_h, new)
+        return BallState(at.theta + dt * s.spin, y, 0.0 if s.P.B_x > 0 else at.h + dt * u.v_h, new)
     x_i, x_k = at.h - R + dt * u.v_h, dt * u.v_k
-    rho = _size(x_i, x_k)
+    rho = _length(x_i, x_k)
     cos, sin = -x_i / rho, x_k / rho
     v_h, v_k = new.v_h * cos - new.v_k * sin, new.v_k * cos + new.v_h * sin
     o_x, o_z = new.o_x * cos - new.o_z * sin, new.o_z * cos + new.o_x * sin
     turned = Velocities(v_h, new.v_y, v_k, o_x, new.o_y, o_z)
-    return At(at.theta + math.atan2(x_k, -x_i), y, R - rho, turned)
+    return BallState(at.theta + math.atan2(x_k, -x_i), y, R - rho, turned)
 
 
 def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
-    """When a gap that is `end` after dt passes zero, by the parabola through that and the start."""
+    """When within dt a gap passes zero, by the parabola with its value and rate at first and its value `end` then."""
     bend = 2 * (end - gap - rate * dt) / (dt * dt)
     root = math.sqrt(max(0.0, rate * rate - 2 * bend * gap))
     time = 2 * gap / (root - rate) if rate < 0 else (rate + root) / -bend
     return min(max(time, 0.0), dt)
 
 
-def _stretch(
-    at: At, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants
-) -> tuple[At, Solved, float]:
+def _step_to_landing(
+    at: BallState, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants
+) -> tuple[BallState, StepSolution, float]:
     """The ball after dt, or at its first landing on floor or wall; and the time of that."""
     time = dt
     s = solve(at, dt, omega_0, touching, start, p)
@@ -282,7 +282,7 @@ def _stretch(
         better = _crossing(at.y, at.u.v_y, after.y, time) if floor else _crossing(at.h, at.u.v_h, after.h, time)
         if abs(better - time) <= 1e-12 * dt:
             break
-    return At(after.theta, 0.0 if floor else after.y, after.h if floor else 0.0, after.u), s, time
+    return BallState(after.theta, 0.0 if floor else after.y, after.h if floor else 0.0, after.u), s, time
 
 
 def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
@@ -296,26 +296,26 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
         in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0
         speed = max(-at.u.v_y if in_A else 0.0, -at.u.v_h if in_B else 0.0)
         if speed > 0:
-            hit = _hit(at, dt, in_A, in_B, p)
-            at, P, impact = At(at.theta, at.y, at.h, hit.new), _sum(P, hit.P), _sum(impact, hit.P)
-            work, residual = work + hit.work, _worse(hit.residual, residual)
+            hit = _impact(at, dt, in_A, in_B, p)
+            at, P, impact = BallState(at.theta, at.y, at.h, hit.new), _sum(P, hit.P), _sum(impact, hit.P)
+            work, residual = work + hit.work, _larger_or_nan(hit.residual, residual)
             landings += speed > LANDED * math.sqrt(p.g * p.R)
             in_A, in_B = in_A and at.u.v_y <= 0, in_B and at.u.v_h <= 0
         touching = Touching(in_A, in_B, 0.0, 0.0)
         if count < LANDINGS:
-            at, s, time = _stretch(at, left, omega_0, touching, start, p)
+            at, s, time = _step_to_landing(at, left, omega_0, touching, start, p)
         else:
             after, time = _moved(at, left, solve(at, left, omega_0, touching, start, p), touching, p.R), left
             touching = Touching(in_A or after.y < 0, in_B or after.h < 0, 0.0, 0.0)
             s = solve(at, left, omega_0, touching, start, p)
             after = _moved(at, left, s, touching, p.R)
-            at = At(after.theta, max(after.y, 0.0), max(after.h, 0.0), after.u)
-        P, work, residual = _sum(P, s.P), work + s.work, _worse(s.residual, residual)
-        left, count, case = left - time, count + 1, _told(s, touching, p)
+            at = BallState(after.theta, max(after.y, 0.0), max(after.h, 0.0), after.u)
+        P, work, residual = _sum(P, s.P), work + s.work, _larger_or_nan(s.residual, residual)
+        left, count, case = left - time, count + 1, _case_of(s, touching, p)
     return Ball(at, P, impact, case, work, landings, residual)
 
 
-def _hit(at: At, dt: float, in_A: bool, in_B: bool, p: Constants) -> Solved:
+def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> StepSolution:
     """An impact, with Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
     nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
@@ -326,24 +326,25 @@ def _hit(at: At, dt: float, in_A: bool, in_B: bool, p: Constants) -> Solved:
     return hit
 
 
-def _told(s: Solved, touching: Touching, p: Constants) -> int:
-    """The case as a solution tells it: a contact is open if it leaves with a velocity, and rolls if nothing slides."""
+def _case_of(s: StepSolution, touching: Touching, p: Constants) -> int:
+    """The case from velocities and impulses: a contact that leaves with a velocity is open, one that doesn't slide
+    rolls."""
     (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, AWAY, AWAY
     still = ZERO_SLIP * math.sqrt(p.g * p.R)
     if touching.A and (s.P.A_y > 0 or v_y <= 0):
-        A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
+        A = ROLLS if _length(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
     if touching.B and (s.P.B_x > 0 or v_h <= 0):
-        B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
+        B = ROLLS if _length(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
     return 3 * A + B
 
 
-def _worse(new: float, residual: float) -> float:
+def _larger_or_nan(new: float, residual: float) -> float:
     """The larger one, or nan."""
     return new if new > residual or math.isnan(new) else residual
 
 
-def _fluid(flow: FlowArrays, time: float) -> float:
-    """`model.Flow` at a time."""
+def _flow_at(flow: FlowArrays, time: float) -> float:
+    """omega_0 of a flow at a time, rad s-1."""
     k = 0
     if len(flow.start) > 1:
         k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
@@ -354,23 +355,24 @@ def _fluid(flow: FlowArrays, time: float) -> float:
 
 
 TEXT = (
-    solve, _sliding, _guess, _size, _sum, _moved, _crossing, _stretch, step, _hit, _told, _worse, _fluid,
+    solve, _old_slip, _first_guess, _length, _sum, _moved, _crossing, _step_to_landing, step, _impact,
+    _case_of, _larger_or_nan, _flow_at,
 )  # fmt: skip
 """What is compiled where numba is installed, with the two loops below."""
-compiled = compiling.compiled(compiling.read(contact_problem, drag, rigid_body, sys.modules[__name__]))
+compiled = compiling.compiled(compiling.register(contact_problem, drag, rigid_body, sys.modules[__name__]))
 
 
 @compiled
 def advance(ball: Ball, steps: Steps, flow: FlowArrays, p: Constants, events: Array) -> tuple[Any, int, int]:
     """Go on through steps; return the ball, the next step, and events noted.
 
-    The ball is in parts, plain tuples (`whole`): a signal would be answered while numba makes named ones, which doesn't
-    look whether it has got them. A row of `events` takes time, code of the case before and after, impulses of landings.
-    It ends early when no row is left, or when a step doesn't converge.
+    The ball is in parts, plain tuples (`ball_from_parts`): a signal would be answered while numba makes named ones,
+    which doesn't look whether it has got them. A row of `events` takes time, code of the case before and after,
+    impulses of landings. It ends early when no row is left, or when a step doesn't converge.
     """
     (start, dt, k, end), noted = steps, 0
     while k < end and noted < len(events):
-        before, ball = ball.case, step(ball, dt, _fluid(flow, start + (k + 0.5) * dt), p)
+        before, ball = ball.case, step(ball, dt, _flow_at(flow, start + (k + 0.5) * dt), p)
         k += 1
         if ball.residual != 0:
             break
@@ -394,7 +396,7 @@ def follow(ball: Ball, stretches: Stretches, quiet: float, flow: FlowArrays, p: 
     for s in range(len(starts)):
         for k in range(counts[s]):
             now = float(starts[s] + (k + 1) * dts[s])
-            ball = step(ball, dts[s], _fluid(flow, now - dts[s] / 2), p)
+            ball = step(ball, dts[s], _flow_at(flow, now - dts[s] / 2), p)
             if ball.residual != 0 or over[0]:
                 return -now
             if ball.landings > known:

@@ -55,7 +55,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
             while taken < count:
                 steps = stepping.Steps(start, dt, taken, min(count, taken + AT_ONCE))
                 parts, taken, noted = stepping.advance(now, steps, fluid, given, events)
-                now = stepping.whole(parts)
+                now = stepping.ball_from_parts(parts)
                 for time, before, after, *impulse in events[:noted].tolist():
                     recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
                 recorder.reached(start + taken * dt)
@@ -86,7 +86,7 @@ def prepared(
     knots = np.union1d(times, flow.knots(t_end))
     length = np.diff(knots)
     steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)
-    at = stepping.At(theta, x.y, x.h, rigid_body.velocities(x, p))
+    at = stepping.BallState(theta, x.y, x.h, rigid_body.velocities(x, p))
     given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution, p.fluid_torque
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),

@@ -55,14 +55,14 @@ def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Fo
     x, A, B = at.x, case // 3, case % 3
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
     if guard in (A_SLIPS, B_SLIPS):
-        alpha, beta = _held(case, at, k)
+        alpha, beta = _slip_directions(case, at, k)
         if guard == A_SLIPS:
-            return 3 * SLIPS + B, aimed(at, x, alpha, at.beta), NOTHING
-        return 3 * A + SLIPS, aimed(at, x, at.alpha, beta), NOTHING
+            return 3 * SLIPS + B, with_directions(at, x, alpha, at.beta), NOTHING
+        return 3 * A + SLIPS, with_directions(at, x, at.alpha, beta), NOTHING
     if guard == A_LIFTS:
-        return 3 * AWAY + B, aimed(at, x, math.nan, at.beta), NOTHING
+        return 3 * AWAY + B, with_directions(at, x, math.nan, at.beta), NOTHING
     if guard == B_OPENS:
-        return 3 * A + AWAY, aimed(at, x, at.alpha, math.nan), NOTHING
+        return 3 * A + AWAY, with_directions(at, x, at.alpha, math.nan), NOTHING
     if guard == RR_ENDS:
         after, at = leave(at, k)
         return after, at, NOTHING
@@ -79,7 +79,7 @@ def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Fo
         y = 0.0
     else:
         h = 0.0
-    return settle(aimed(at, State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h), at.alpha, at.beta), k)
+    return settle(with_directions(at, State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h), at.alpha, at.beta), k)
 
 
 def settle(at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
@@ -91,18 +91,18 @@ def settle(at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
     return case, at, impulse
 
 
-def aimed(at: Moment, x: State, alpha: float, beta: float) -> Moment:
+def with_directions(at: Moment, x: State, alpha: float, beta: float) -> Moment:
     """The moment with another state and directions of slip."""
     return Moment(at.time, at.theta, x, alpha, beta, at.work)
 
 
-def _held(case: int, at: Moment, k: Motion) -> tuple[float, float]:
-    """Directions in which contacts will slip that roll by the forces of a case: against their friction."""
+def _slip_directions(case: int, at: Moment, k: Motion) -> tuple[float, float]:
+    """Directions alpha, beta in which contacts that roll will begin to slip: against their friction, rad."""
     x = at.x
     lag = x.omega_c - equations.fluid(at.time, k)
     if case == RN:
         return math.atan2((k.R - x.h) * lag, -x.v_h), math.nan
-    c = equations.resistance(x.v_h, x.v_y, k.R * lag, k)
+    c = equations.drag_rate(x.v_h, x.v_y, k.R * lag, k)
     A_x, _, A_z, _, B_y, B_z = equations.forces(
         case, x.omega_c, x.v_y, x.slip_x, c, lag, math.sin(at.alpha), math.cos(at.alpha), math.sin(at.beta),
         math.cos(at.beta), k,
@@ -125,7 +125,7 @@ def choose(at: Moment, k: Motion) -> tuple[int, Moment]:
     if slips or not (A.closed and B.closed):
         return _by_accelerations(at, A, B, NOTHING, k)
     if equations.rolls_on(x.omega_c, at.time, k) >= 0:
-        return RR, aimed(at, x, math.nan, math.nan)
+        return RR, with_directions(at, x, math.nan, math.nan)
     return leave(at, k)
 
 
@@ -138,7 +138,7 @@ def leave(at: Moment, k: Motion) -> tuple[int, Moment]:
     """
     omega_c, lag = at.x.omega_c, at.x.omega_c - equations.fluid(at.time, k)
     u, z = equations.loads(omega_c, at.time, k)
-    B_y, c = equations.last_share(u, z, k) * k.m * k.g, equations.resistance(0.0, 0.0, k.R * lag, k)
+    B_y, c = equations.last_share(u, z, k) * k.m * k.g, equations.drag_rate(0.0, 0.0, k.R * lag, k)
     A_x, A_y, A_z, B_x, _, B_z = equations.forces(RR, omega_c, 0.0, 0.0, c, lag, 0.0, 0.0, 0.0, 0.0, k)
     A_x, A_y, B_x = A_x + B_y, A_y - B_y, B_x - B_y
     if equations.slip_margin(u, z, k) <= -AT_ONSET:
@@ -146,14 +146,14 @@ def leave(at: Moment, k: Motion) -> tuple[int, Moment]:
     alpha, beta = math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
     wall_alone = k.eta * (B_x + B_y) - abs(B_z)  # what its cone has left where it carries no weight
     if wall_alone < k.mu * A_y - math.hypot(A_x, A_z):
-        return RS, aimed(at, at.x, math.nan, beta)
+        return RS, with_directions(at, at.x, math.nan, beta)
     if abs(A_x) <= 16 * EPS * B_y:
-        return SR, aimed(at, at.x, alpha, math.nan)
-    return SS, aimed(at, at.x, alpha, beta)
+        return SR, with_directions(at, at.x, alpha, math.nan)
+    return SS, with_directions(at, at.x, alpha, beta)
 
 
 def _contact(closed: bool, s: float, t: float) -> Closed:
-    """A contact with its slip, m s-1."""
+    """A contact for the contact problem, from whether it is closed and its slip, m s-1."""
     speed = math.hypot(s, t)
     if not closed:
         return ABSENT
@@ -167,14 +167,16 @@ def _by_accelerations(at: Moment, A: Closed, B: Closed, start: Forces, k: Motion
     if not settled:
         raise NotConvergedError(UNSETTLED)
     (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(rates, k), rigid_body.slip_at_B(rates, k)
-    contact_A, s_A, t_A = _goes_on(A, force.A_y, rates.v_y, s_A, t_A, k)
-    contact_B, s_B, t_B = _goes_on(B, force.B_x, rates.v_h, s_B, t_B, k)
+    contact_A, s_A, t_A = _contact_after(A, force.A_y, rates.v_y, s_A, t_A, k)
+    contact_B, s_B, t_B = _contact_after(B, force.B_x, rates.v_h, s_B, t_B, k)
     alpha = math.atan2(-t_A, s_A) if contact_A == SLIPS else math.nan
     beta = math.atan2(t_B, -s_B) if contact_B == SLIPS else math.nan
-    return 3 * contact_A + contact_B, aimed(at, at.x, alpha, beta)
+    return 3 * contact_A + contact_B, with_directions(at, at.x, alpha, beta)
 
 
-def _goes_on(contact: Closed, load: float, rise: float, s: float, t: float, k: Motion) -> tuple[int, float, float]:
+def _contact_after(
+    contact: Closed, load: float, rise: float, s: float, t: float, k: Motion
+) -> tuple[int, float, float]:
     """State of a contact from its force and accelerations, and the direction in which it slips if it does."""
     still = LEAST_ACCELERATION * k.g
     if not contact.closed or (load <= 0 and rise > still):
@@ -218,7 +220,7 @@ def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
         v_h = 0.0
     left = Velocities(v_h, v_y, u.v_k, u.o_x, u.o_y, u.o_z)
     y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = rigid_body.state(x.y, x.h, left, k)
-    still = AT_REST * _size(before, k)
+    still = AT_REST * _speed(before, k)
     (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(u, k), rigid_body.slip_at_B(u, k)
     if A.closed and P.A_y > 0 and math.hypot(s_A, t_A) <= still:
         slip_x, slip_z = 0.0, -(v_h + v_y) / k.r
@@ -228,13 +230,14 @@ def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
     return Moment(at.time, at.theta, after, math.nan, math.nan, work), P
 
 
-def _size(u: Velocities, k: Motion) -> float:
+def _speed(u: Velocities, k: Motion) -> float:
     """Root of the sum of squares of velocities, those of spin times r, m s-1."""
     spin = k.r * k.r * (u.o_x * u.o_x + u.o_y * u.o_y + u.o_z * u.o_z)
     return math.sqrt(u.v_h * u.v_h + u.v_y * u.v_y + u.v_k * u.v_k + spin)
 
 
 TEXT = (
-    react, settle, aimed, _held, choose, leave, _contact, _by_accelerations, _goes_on, collide, _size,
+    react, settle, with_directions, _slip_directions, choose, leave, _contact, _by_accelerations, _contact_after,
+    collide, _speed,
 )  # fmt: skip
 """What is compiled where numba is installed."""

@@ -58,12 +58,11 @@ def slip_rates(
     """
     state, names, n = dynamics.check_state(inner, x, p), normals(inner, outer), np.asarray(n, dtype=float)
     push = State(**dict(zip(names, np.moveaxis(n, -1, 0), strict=True)))
-    slides = zip(
-        (inner.A, inner.B), (outer.A, outer.B), dynamics.slides(state, p), dynamics.slides(push, p), strict=True
-    )
+    old_slips, new_slips = (dynamics.sliding_velocities(each, p) for each in (state, push))
+    contacts = zip((inner.A, inner.B), (outer.A, outer.B), old_slips, new_slips, strict=True)
     slip_A, slip_B = (
         dynamics.direction(*(old if before is Contact.S else new)) if after is Contact.S else None
-        for before, after, old, new in slides
+        for before, after, old, new in contacts
     )
     force = dynamics.forces(outer, state, p, p.omega_0, slip_A, slip_B)
     rates = dynamics.newton_euler(outer, state, force, p, p.omega_0)
@@ -100,7 +99,7 @@ def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> flo
         there = state._replace(omega_c=omega_c, slip_x=slip_x)
         return lift_acceleration(inner, outer, there, p.replace(omega_0=p.omega_0 * omega_c / state.omega_c))
 
-    return float(roots.crossing(np.vectorize(rise), 0.1 * state.omega_c, 10 * state.omega_c))
+    return float(roots.sign_change(np.vectorize(rise), 0.1 * state.omega_c, 10 * state.omega_c))
 
 
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
@@ -117,12 +116,12 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
         case Case.RR:
             divisor = p.mu * p.eta * (1 + p.j) + p.j - p.eta
             slip = (Omega2 * divisor, p.mu * (1 + p.eta)) if p.eta < p.j else (p.mu * p.j * Omega2, p.mu)
-            kinds = {_sign(0.0, p.eta * Omega2), _sign(*slip)}
+            kinds = {_by_sign(0.0, p.eta * Omega2), _by_sign(*slip)}
         case Case.SR | Case.NR:
             smooth_floor = case is Case.SR and p.mu == 0  # the floor then carries the weight, the wall nothing
-            kinds = {_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
+            kinds = {_by_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
         case Case.RS:
-            kinds = {_sign(p.j * Omega2, p.mu)}
+            kinds = {_by_sign(p.j * Omega2, p.mu)}
         case _:
             kinds = set()
     worst_first = SlipStability.UNSTABLE, SlipStability.NEUTRAL
@@ -140,11 +139,11 @@ def neutral_flow(case: Case, p: Parameters) -> float:
     def side(flow: Real) -> int:
         return order.index(stability(case, p.replace(omega_0=float(flow)))) - 1
 
-    return float(roots.crossing(side, 1e-3 * unit, 1e3 * unit))
+    return float(roots.sign_change(side, 1e-3 * unit, 1e3 * unit))
 
 
-def _sign(drive: float, hold: float) -> SlipStability:
-    """What the sign of drive - hold says; both are >= 0 and carry the few round-offs of their products."""
+def _by_sign(drive: float, hold: float) -> SlipStability:
+    """Unstable if drive > hold, stable if less, neutral within the round-off of both, which are >= 0."""
     if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):
         return SlipStability.NEUTRAL
     return SlipStability.UNSTABLE if drive > hold else SlipStability.STABLE

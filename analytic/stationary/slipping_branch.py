@@ -134,7 +134,7 @@ def fold(
         return np.full(mu.shape, np.nan)
     # Valid numbers where there is no fold; the root there is discarded.
     safe_mu, safe_eta = np.where(exists, mu, 1.0), np.where(exists, eta, p.j / 2)
-    places = roots.crossing(lambda s: slope(s, p, safe_mu, safe_eta), -END, END)
+    places = roots.sign_change(lambda s: slope(s, p, safe_mu, safe_eta), -END, END)
     return np.where(exists, places, np.nan)
 
 
@@ -148,7 +148,7 @@ def points_at(p: Parameters) -> list[float]:
     turning = float(fold(p))
     parts = [(-END, END)] if np.isnan(turning) else [(-END, turning), (turning, END)]
 
-    places = [float(roots.crossing(lambda s: branch(s, p).Omega_0 - p.Omega_0, *part)) for part in parts]
+    places = [float(roots.sign_change(lambda s: branch(s, p).Omega_0 - p.Omega_0, *part)) for part in parts]
     return [s for s in places if not np.isnan(s)]
 
 
@@ -158,6 +158,7 @@ def _friction(p: Parameters, mu: npt.ArrayLike | None, eta: npt.ArrayLike | None
 
 
 def _denominator(cos: Array, j: float, mu: Array, eta: Array) -> Array:
+    """N, by which the closed forms (38)-(42) are divided."""
     return np.asarray((1 + j * cos**2) * mu * eta + (j - eta) * cos)
 
 
@@ -213,7 +214,7 @@ def hopf_places(p: Parameters) -> list[float]:
 
     values, places = pair_sums(s), []
     for k in np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0):
-        place = float(roots.crossing(pair_sums, s[k], s[k + 1]))
+        place = float(roots.sign_change(pair_sums, s[k], s[k + 1]))
         pair = eigenvalues_at(place, p)
         if np.any((np.abs(pair.real) < 1e-6 * np.abs(pair.imag)) & (pair.imag > 0)):
             places.append(place)

@@ -149,7 +149,7 @@ def _solution(
     family: tuple[str, ...] = (),
     values: npt.NDArray[np.complex128] | None = None,
 ) -> StationarySolution:
-    """With forces and stability; the eigenvalues are those of the Jacobian unless given."""
+    """The stationary solution at a state x, with forces and stability; eigenvalues by the Jacobian unless given."""
     if p.c == 0:  # nothing pulls omega_c to omega_0
         family = (*family, "omega_c")
     force = dynamics.forces(case, x, p, p.omega_0)
@@ -178,7 +178,7 @@ def _solution(
 
 
 def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
-    """By the rightmost of the eigenvalues, without the `zeros` that belong to the free variables of a family."""
+    """Stability by the rightmost eigenvalue, but for as many `zeros` as belong to the free variables of a family."""
     rest = values[np.argsort(np.abs(values))][zeros:]
     if np.any(rest.real > _LEAST_REAL_PART * np.abs(rest)):
         return Stability.UNSTABLE

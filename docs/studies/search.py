@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import simulate, simulate_many
-from analytic.orbits.fates import periodic
+from analytic.orbits.fates import periodic_fate
 from analytic.orbits.periodic import landings
 from analytic.simulation.ensemble import interval
 from compare.kit import pages, progress
@@ -174,7 +174,7 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
     if not any(landings(zip(seen.events.from_case, seen.events.to_case, strict=True))):
         return None
-    fate = periodic(seen)
+    fate = periodic_fate(seen)
     if fate and fate.orbit and (count := sum(landings(fate.orbit.changes))):
         orbit = fate.orbit
         omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R

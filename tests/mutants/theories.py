@@ -299,7 +299,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "rolling lasts while forces can jam it": _jams,
         "Definitions 1-3 with 1 % more wall friction": given(other(eta=1.01)),
     },
-    "slipping.slip_stability._sign": {"what is driven is held": lambda right: lambda drive, hold: right(hold, drive)},
+    "slipping.slip_stability._by_sign": {
+        "what is driven is held": lambda right: lambda drive, hold: right(hold, drive)
+    },
     "slipping.slip_bounds._nr_terms": {"(56)-(59) with 2 % more inertia": given(other(j=1.02))},
     "slipping.slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": given(other(eta=1.03))},
     "slipping.slip_bounds.rr_to_rs": {"(66) with μ, as printed": given(swapped)},
@@ -396,7 +398,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "landings on the wall with 5 % more friction": where(lambda at: at.x.h == 0, given(other(eta=1.05))),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
-    "simulation.charts._at_wall": {
+    "simulation.charts._begin_on_wall": {
         "motions at the wall have 2 % more inertia": given(other(j=1.02)),
         "one contact slips with 3 % more floor friction": where(
             lambda case: case in (Case.RS, Case.SR), given(other(mu=1.03))
@@ -405,7 +407,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "both contacts slip with 3 % more wall friction": in_case(Case.SS, given(other(eta=1.03))),
         "off the floor there is 3 % more drag": where(lambda case: case in (Case.NR, Case.NS), given(other(c=1.03))),
     },
-    "simulation.charts._away_from_wall": {
+    "simulation.charts._begin_off_wall": {
         "rolling off the wall with 5 % more drag": in_case(Case.RN, given(other(c=1.05))),
         "slipping off the wall with 3 % more friction": in_case(Case.SN, given(other(mu=1.03))),
         "flight with 5 % more drag": in_case(Case.NN, given(other(c=1.05))),
