@@ -27,12 +27,12 @@ def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
 
 
 def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
-    """omega_x^0, rad s-1, of a case at flows, also where it is formal; that of SR is that of NR."""
+    """The spin on the wall omega_x^0 of a stationary solution at flows, rad s-1, also where it is formal."""
     sets = [p.replace(omega_0=float(flow)) for flow in np.ravel(flows)]
     return [float(bifurcation.wall_spin(analytic.solution(q, case, formal=True).state, q)) for q in sets]
 
 
-def going_round(p: Parameters, case: Case, begin: float, end: float) -> tuple[Array, Array]:
+def round_with_fluid(p: Parameters, case: Case, begin: float, end: float) -> tuple[Array, Array]:
     """slip_x and omega_c (n,) from one flow to another of RR, SR, NR or NS: the ball goes round with the fluid."""
     flows = np.linspace(begin, end, 200)
     rolls = p.R / p.r * flows
@@ -40,8 +40,8 @@ def going_round(p: Parameters, case: Case, begin: float, end: float) -> tuple[Ar
     return np.asarray(spun) - rolls, flows
 
 
-def ends(p: Parameters) -> tuple[float, float]:
-    """The flows up to which RR and from which SR is stable, rad s-1: for eta > j they are one."""
+def stable_ends(p: Parameters) -> tuple[float, float]:
+    """The flows in rad s-1 up to which RR is stable, and from which SR is; for eta > j they are one."""
     Omega, unit = bifurcation.curves_without_drag(p.j, p.mu, p.eta), math.sqrt(p.g / p.R)
     rolls, rides = ("omega_01", "omega_02") if p.eta < p.j else ("omega_03", "omega_03")
     return float(Omega[rolls] * unit), float(Omega[rides] * unit)
@@ -64,7 +64,7 @@ def slipping_curve(p: Parameters, count: int) -> tuple[State, Array, npt.NDArray
 def slipping(
     axes: Axes, p: Parameters, quantity: Drawn, stable: Place | None = None, unstable: Place | None = None
 ) -> None:
-    """The branch of SS, its line by its eigenvalues; a name at each part that has a place for it."""
+    """Draw the branch of SS, dashed where unstable; its stable and unstable part are named where a place is given."""
     x, omega_0, grows = slipping_curve(p, 1601)
     values = quantity(x.slip_x, x.omega_c)
     for part, line, text, place in ((~grows, "-", "SS", stable), (grows, UNSTABLE, "SS, unstable", unstable)):
@@ -72,8 +72,8 @@ def slipping(
             style.curve(axes, Case.SS, omega_0, np.where(part, values, np.nan), (text, place), line)
 
 
-def lifted(omega_0: float, p: Parameters) -> float:
-    """That of NR at one flow."""
+def spin_off_floor(omega_0: float, p: Parameters) -> float:
+    """The spin on the wall of NR at a flow, rad s-1."""
     return spins(Case.NR, omega_0, p)[0]
 
 

@@ -39,7 +39,7 @@ class Dart(Free):
         for surface, name, point, normal in self.planes():
             skeleton = bodies.Skeleton(name)
             self.surfaces[name] = scene.surfaces.index(surface)
-            if self.moves(surface):
+            if self.goes_along(surface):
                 self.wall, node = skeleton.createTranslationalJointAndBodyNodePair()
                 self.wall.setActuatorType(bodies.ActuatorType.VELOCITY)
                 node.setGravityMode(False)
@@ -60,7 +60,7 @@ class Dart(Free):
         for body, friction in zip(scene.bodies, (1e3, scene.between), strict=False):
             skeleton = bodies.Skeleton(f"body{len(self.nodes)}")
             joint, node = skeleton.createFreeJointAndBodyNodePair()
-            pose = placed(body.position)
+            pose = translation(body.position)
             pose[:3, :3] = rotated(np.array(body.orientation), np.eye(3)).T
             joint.setTransform(engine.math.Isometry3(pose))
             joint.setLinearVelocity(body.velocity)
@@ -78,9 +78,9 @@ class Dart(Free):
     def add(
         self, skeleton: Any, node: Any, shape: Any, friction: float, at: Any = (0, 0, 0), restitution: float = 1.0
     ) -> None:
-        """A shape that touches others."""
+        """Give a body a shape with friction and restitution, at a place in its axes."""
         frame = node.createShapeNode(shape)
-        frame.setRelativeTransform(engine.math.Isometry3(placed(at)))
+        frame.setRelativeTransform(engine.math.Isometry3(translation(at)))
         frame.createCollisionAspect()
         dynamics = frame.createDynamicsAspect()
         dynamics.setFrictionCoeff(friction)
@@ -118,8 +118,8 @@ class Dart(Free):
         return shown
 
 
-def placed(position: Any) -> Array:
-    """A pose that isn't turned, (4, 4)."""
+def translation(position: Any) -> Array:
+    """The pose (4, 4) of a place without a turn."""
     pose = np.eye(4)
     pose[:3, 3] = position
     return pose

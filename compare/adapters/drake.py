@@ -60,12 +60,12 @@ class Drake(Free):
         self.own = ball.index()
         for k, (place, shape) in enumerate(self.shapes()):
             self.add(ball, place, shape, f"body{k}")
-        moving = [surface for surface in scene.surfaces if self.moves(surface) or surface.turning]
-        walls = {surface.name: self.heavy(surface) for surface in moving}
+        moving = [surface for surface in scene.surfaces if self.goes_along(surface) or surface.turning]
+        walls = {surface.name: self.moving_body(surface) for surface in moving}
         self.surfaces = {}
         for surface, name, point, normal in self.planes():
             of = walls.get(surface.name, plant.world_body())
-            if self.moves(surface):
+            if self.goes_along(surface):
                 point, normal = np.zeros(3), np.array([-1.0, 0.0, 0.0])
             self.surfaces[self.plane(of, point, normal, name, surface)] = scene.surfaces.index(surface)
         apart = engine.CollisionFilterDeclaration().ExcludeWithin(engine.GeometrySet([*self.surfaces]))
@@ -77,17 +77,17 @@ class Drake(Free):
         self.root = self.diagram.CreateDefaultContext()
         self.context = plant.GetMyMutableContextFromRoot(self.root)
         self.force, self.x = np.zeros(plant.num_velocities()), plant.GetPositionsAndVelocities(self.context)
-        self.ball = self.wall = self.numbers(ball)
+        self.ball = self.wall = self.state_slices(ball)
         self.put(self.ball, [*body.orientation, *body.position], [*body.spin, *body.velocity])
         for surface in moving:
             if surface.turning:
                 turns = plant.GetJointByName(surface.name)
                 self.x[plant.num_positions() + turns.velocity_start()] = surface.turning
             else:
-                self.wall = self.numbers(walls[surface.name])
+                self.wall = self.state_slices(walls[surface.name])
 
-    def heavy(self, surface: Surface) -> Any:
-        """A turntable on its hinge, or a body that floats without gravity, for a surface that moves."""
+    def moving_body(self, surface: Surface) -> Any:
+        """The body of a surface that moves: a turntable on its hinge, or one that floats without gravity."""
         plant, own = self.plant, self.plant.AddModelInstance(surface.name)
         plant.set_gravity_enabled(own, False)
         mass = self.scene.body.mass * (1.0 if surface.turning else HEAVY)  # the engine's own stiffness is by mass
@@ -99,7 +99,7 @@ class Drake(Free):
         return body
 
     def shapes(self) -> list[tuple[Any, Any]]:
-        """The shape of the body; a box in the best settings is its corners."""
+        """Shapes of the body with their poses; a box in the best settings is its corners."""
         body = self.scene.body
         if body.shape == "sphere" or not self.best:
             whole = engine.Sphere(*body.size) if body.shape == "sphere" else engine.Box(*(2 * np.array(body.size)))
@@ -108,7 +108,7 @@ class Drake(Free):
         return [(engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners]
 
     def add(self, of: Any, pose: Any, shape: Any, name: str, friction: float | None = None) -> Any:
-        """A shape of what moves, or of what it touches, with the friction of the pair."""
+        """Register a shape of the body or of a surface; `friction` is that of the pair, None for the body."""
         material, mu = engine.ProximityProperties(), self.most
         if friction is not None:  # the harmonic mean of both is the pair's
             mu = mu * friction / (2 * mu - friction) if friction else 0.0
@@ -117,7 +117,7 @@ class Drake(Free):
         return self.plant.RegisterCollisionGeometry(of, pose, shape, name, material)
 
     def plane(self, of: Any, point: Array, normal: Array, name: str, surface: Surface) -> Any:
-        """A half space, or one side of a cube: a half space among a dozen of shapes crashes the engine."""
+        """Register a plane: a half space, or one side of a cube, as a dozen half spaces crash the engine."""
         size = 0.0 if self.best else SIZE * max((each.radius or 0.0) for each in self.scene.surfaces)
         if not size:
             pose, shape = engine.HalfSpace.MakePose(normal, point), engine.HalfSpace()
@@ -126,13 +126,13 @@ class Drake(Free):
             pose, shape = engine.RigidTransform(turn, point - size / 2 * normal), engine.Box(size, size, size)
         return self.add(of, pose, shape, name, surface.friction)
 
-    def numbers(self, body: Any) -> tuple[slice, slice]:
-        """Where orientation and place, and spin and velocity of a free body are in the state."""
+    def state_slices(self, body: Any) -> tuple[slice, slice]:
+        """Slices of the state: orientation and place of a free body, and its spin and velocity."""
         at, rate = body.floating_positions_start(), self.plant.num_positions() + body.floating_velocities_start_in_v()
         return slice(at, at + 7), slice(rate, rate + 6)
 
     def put(self, numbers: tuple[slice, slice], pose: Any, rate: Any) -> None:
-        """A free body somewhere."""
+        """Set pose and velocity of a free body at the given slices of the state."""
         self.x[numbers[0]], self.x[numbers[1]] = pose, rate
 
     def advance(self) -> None:

@@ -28,7 +28,7 @@ State = tuple[Any, ...]
 
 @dataclass(frozen=True)
 class Library:
-    """What an engine comes in, a package that may be missing, and the module of its adapters."""
+    """The package that an engine comes in, which may be missing, and the module of its adapters."""
 
     name: str
     """Of the package."""
@@ -45,7 +45,7 @@ class Library:
         return version(self.name)
 
     def load(self, member: str) -> Free:
-        """A copy of one of its adapters by name; `InputError` if the package is missing or can't be imported."""
+        """A copy of an adapter by its name in the module; `InputError` if the package is missing or broken."""
         try:
             engine: Free = getattr(importlib.import_module(self.module), member)
         except ImportError as error:
@@ -54,7 +54,7 @@ class Library:
 
 
 class Touch(NamedTuple):
-    """What a contact point of the engine carried in the last step."""
+    """A contact point of the engine, and what it carried in the last step."""
 
     surface: int
     """Which of the scene's surfaces."""
@@ -93,7 +93,7 @@ class Free(ABC):
         self.timestep = self.now = self.ahead = 0.0
 
     def build(self, scene: Scene, timestep: float) -> None:
-        """The scene at its start; raises `NotImplementedError` for one that the engine can't have."""
+        """Put the scene at its start into the engine; raises `NotImplementedError` for one that it can't have."""
         self.ahead = self.now = self.AHEAD * timestep * self.best
         body, under = scene.body.after(self.ahead), scene.under and scene.under.after(self.ahead)
         self.scene, self.timestep = dataclasses.replace(scene, body=body, under=under), timestep
@@ -102,7 +102,7 @@ class Free(ABC):
     def step(self, n: int) -> None:
         """Take n steps."""
         scene = self.scene
-        radii = [surface.radius or 0.0 for surface in scene.surfaces if self.moves(surface)]
+        radii = [surface.radius or 0.0 for surface in scene.surfaces if self.goes_along(surface)]
         half, reach = self.timestep / 2, scene.body.size[0]
         for _ in range(n):
             if scene.forced or radii:
@@ -125,8 +125,8 @@ class Free(ABC):
             parts[k] -= self.ahead * parts[k + 1]
         return tuple(parts)
 
-    def moves(self, surface: Surface) -> bool:
-        """Whether a surface is a cylinder for which one plane stands that goes with the body."""
+    def goes_along(self, surface: Surface) -> bool:
+        """Whether a surface is a cylinder in whose place one plane goes along with the body."""
         return self.best and surface.radius is not None
 
     def planes(self) -> Iterator[tuple[Surface, str, Array, Array]]:

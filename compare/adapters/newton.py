@@ -48,7 +48,7 @@ class Newton(Free):
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
             material, own, at = rough(surface.friction**2 if rooted else 2 * surface.friction), -1, pose(point, normal)
-            if self.moves(surface):
+            if self.goes_along(surface):
                 self.wall = own = builder.add_body(xform=at, mass=1.0, is_kinematic=True)
                 at = warp.transform()
             builder.add_shape_plane(None, body=own, xform=at, width=0.0, length=0.0, cfg=material)

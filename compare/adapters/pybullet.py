@@ -64,7 +64,7 @@ class PyBullet(Free):
         self.put(self.body, body.position, body.orientation, body.velocity, body.spin)
 
     def put(self, body: int, place: Any, orientation: Any, velocity: Any, spin: Any = (0, 0, 0)) -> None:
-        """A body or a plane somewhere."""
+        """Set place, orientation (scalar first), velocity and spin of a body or a plane."""
         (w, *axis), (place, velocity) = (
             orientation,
             ([each * self.scale for each in part] for part in (place, velocity)),

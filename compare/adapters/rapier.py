@@ -30,7 +30,7 @@ class Rapier(Free):
     """Small steps in one, in the best settings: the engine's own, but where a wall has to be placed before each."""
 
     def build(self, scene: Scene, timestep: float) -> None:
-        self.small = self.SMALL if self.best and scene.round else 1
+        self.small = self.SMALL if self.best and scene.in_cylinder else 1
         self.AHEAD = 0.5 if self.small > 1 else 0.5 / self.SMALL
         super().build(scene, timestep / self.small)
 
@@ -49,8 +49,8 @@ class Rapier(Free):
             settings.length_unit, settings.normalized_max_linear_velocity = 0.01, 1e6
             settings.contact_softness = settings.static_contact_softness = engine.SpringCoefficients(200.0, 10.0)
         for surface, _, point, normal in self.planes():
-            moves = surface.turning or any(surface.velocity) or self.moves(surface)
-            if self.moves(surface):
+            moves = surface.turning or any(surface.velocity) or self.goes_along(surface)
+            if self.goes_along(surface):
                 point, normal = np.zeros(3), np.array([-1.0, 0.0, 0.0])
             kind = engine.RigidBody.kinematic_velocity_based() if moves else engine.RigidBody.fixed()
             shape = engine.Collider.halfspace(normal.tolist()).friction(surface.friction / (scene.between or 1.0))

@@ -46,7 +46,7 @@ class Sapien(Free):
                 raise NotImplementedError("its planes don't turn")
             size: tuple[float, ...] = ()
             own = physx.PhysxRigidStaticComponent()
-            if self.moves(surface):  # planes have no velocity
+            if self.goes_along(surface):  # planes have no velocity
                 own, size = physx.PhysxRigidDynamicComponent(), (WALL * body.size[0],) * 3
                 own.kinematic, self.half = True, size[0]
             self.wall, self.face = self.add(own, pose(point, normal), 2 * surface.friction, size), own
@@ -60,7 +60,7 @@ class Sapien(Free):
         self.body.set_angular_velocity(body.spin)
 
     def add(self, component: Any, pose: Any, friction: float, size: tuple[float, ...] = ()) -> Any:
-        """A plane, sphere or box, which is told by how many numbers its size has."""
+        """Attach a shape with a friction: a plane, sphere or box, as its size has no, one or three numbers."""
         kinds = {0: physx.PhysxCollisionShapePlane, 1: physx.PhysxCollisionShapeSphere, 3: physx.PhysxCollisionShapeBox}
         material = physx.PhysxMaterial(friction, friction, 0.0)
         component.attach(kinds[len(size)](*(size if len(size) == 1 else [size] * bool(size)), material))

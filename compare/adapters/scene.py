@@ -69,7 +69,7 @@ class Body:
 
     @property
     def parts(self) -> Array:
-        """Where the centres of its shapes are, (n, 3), in its own axes, m."""
+        """Centres (n, 3) of the shapes that it is made of, in its own axes, m."""
         if self.shape != "tripod":
             return np.zeros((1, 3))
         _, out, down = self.size
@@ -135,7 +135,7 @@ class Scene:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """What version 1 of the cases had not: an engine that takes it says so in `FEATURES`."""
+        """Features that not every engine has, by name: one that has them declares so in `FEATURES`."""
         asked = {
             "two bodies": self.under,
             "moving surface": any(any(surface.velocity) for surface in self.surfaces),
@@ -147,7 +147,7 @@ class Scene:
         return tuple(name for name, needed in asked.items() if needed)
 
     @property
-    def round(self) -> bool:
+    def in_cylinder(self) -> bool:
         """Whether the body is in a cylinder about the z axis."""
         return any(surface.radius is not None for surface in self.surfaces)
 
@@ -166,7 +166,7 @@ class Scene:
         qpos: list[float] = []
         qvel: list[float] = []
         for surface, name, point, normal in self.planes(FACETS):
-            moves = (*into(upright(normal), np.array(surface.velocity)), 0.0, 0.0, surface.turning)
+            moves = (*in_body_axes(upright(normal), np.array(surface.velocity)), 0.0, 0.0, surface.turning)
             pose = f'pos="{_text(point)}" quat="{_text(upright(normal))}"'
             belt = f'surfacevel="{_text(moves)}" ' if any(moves) else ""
             parts.append(
@@ -186,7 +186,7 @@ class Scene:
       {(chr(10) + "      ").join(geoms)}
     </body>""")
             # MuJoCo counts the spin of a free body in its own axes.
-            free = [*body.position, *body.orientation], [*body.velocity, *into(body.orientation, body.spin)]
+            free = [*body.position, *body.orientation], [*body.velocity, *in_body_axes(body.orientation, body.spin)]
             start = ([0.0], [float(np.dot(self.joint, body.velocity))]) if self.joint else free
             qpos, qvel = qpos + start[0], qvel + start[1]
         pair = (
@@ -207,8 +207,8 @@ def _text(numbers: Any) -> str:
     return " ".join(repr(float(number) + 0.0) for number in numbers)  # no negative zero
 
 
-def into(orientation: tuple[float, ...], vectors: Any) -> Array:
-    """Vectors of the world, (3,) or (n, 3), in the axes of a body."""
+def in_body_axes(orientation: tuple[float, ...], vectors: Any) -> Array:
+    """Vectors (3,) or (n, 3) in world axes, in the axes of a body with an orientation (a unit quaternion)."""
     w, *axis = orientation
     return rotated(np.array([w, *(-a for a in axis)]), np.array(vectors))
 

@@ -42,7 +42,7 @@ _CARRIED = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a run of any engine is set by; the rest, its adapter declares."""
+    """Settings of a run by another engine: the time step; its adapter declares all else."""
 
     timestep: float = 1e-3
     """s"""
@@ -51,8 +51,8 @@ class Settings:
         check_number("timestep", self.timestep, "s", POSITIVE)
 
 
-def geometry(p: Parameters, x: State) -> dict[str, Any]:
-    """What a scene of the study's ball has, by its fields: the ball at azimuth zero, floor and wall, gravity."""
+def scene_fields(p: Parameters, x: State) -> dict[str, Any]:
+    """Fields of the `Scene` of a ball in the study's vessel: the ball at azimuth zero, floor and wall, gravity."""
     place, velocity, spin = (part.tolist() for part in to_world(x, 0.0, p))
     body = Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3)
     return {"body": body, "surfaces": (Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)), "g": p.g}
@@ -69,7 +69,7 @@ class Vessel(Scene):
     def of(cls, p: Parameters, x: State, flow: Flow) -> Vessel:
         """The scene of a ball with these parameters, which starts at azimuth zero."""
         ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
-        return cls(name="vessel", **geometry(p, x), ball=ball, fluid=flow)
+        return cls(name="vessel", **scene_fields(p, x), ball=ball, fluid=flow)
 
     @property
     def forced(self) -> bool:
@@ -84,8 +84,8 @@ class Vessel(Scene):
 
 
 @dataclass(frozen=True)
-class _Band:
-    """What the classifier needs of an engine: see `mjsim.classify.Regularised`."""
+class _RollingBand:
+    """Up to which slip speed an engine's contact is called rolling, for the classifier (`mjsim.classify`)."""
 
     timestep: float
     midpoint: float
@@ -152,18 +152,18 @@ def simulate(library: Library, member: str, task: Any, progress: Callable[[float
 
 
 class _Steps:
-    """The steps of a run: what each shows is noted, and told as samples and cases, many steps at once."""
+    """The steps of a run: states and contact forces are noted, then turned into samples and cases in blocks."""
 
     def __init__(self, engine: Free, timestep: float, p: Parameters, every: int, along: float) -> None:
-        """One of so many steps is a sample; `along` is how fast the plane slips that stands for the wall, m s-1."""
+        """One of `every` steps is a sample; `along` is how fast the plane that stands for the wall slips, m s-1."""
         self.engine, self.timestep, self.p, self.every, self.done = engine, timestep, p, every, 0
-        self.band = _Band(timestep, engine.ahead / timestep, engine.RESOLUTION + along)
+        self.band = _RollingBand(timestep, engine.ahead / timestep, engine.RESOLUTION + along)
         self.classifier = Classifier([p], self.band)
         self.kept = list[npt.NDArray[np.void]]()
         self._rows, self._told, self._theta = np.empty((NOTED, 9 + 2 * _CARRIED)), 0, 0.0
 
     def take(self) -> None:
-        """A step: the state before it, and what contacts carried in it."""
+        """Take a step, and note the state before it and what contacts carried in it."""
         engine, row = self.engine, self._rows[self.done % NOTED]
         row[:9], row[9:] = np.concatenate(engine.state()), 0.0
         engine.step(1)
@@ -179,7 +179,7 @@ class _Steps:
         self.done += 1
 
     def tell(self, last: bool) -> None:
-        """Tell the cases of the steps since, and keep the samples among them."""
+        """Classify the steps noted since the last call, and keep the samples among them."""
         steps, self._told = np.arange(self._told, self.done), self.done
         time = np.asarray(steps * self.timestep, float)
         block = _samples(time, self._rows[: len(steps)], self._theta, self.engine.ahead, self.p)
@@ -204,8 +204,8 @@ def _samples(time: Array, rows: Array, theta: float, ahead: float, p: Parameters
     return block
 
 
-def _contacts(block: npt.NDArray[np.void], band: _Band, p: Parameters) -> Contacts:
-    """What the contacts do in successive steps, of samples (n,).
+def _contacts(block: npt.NDArray[np.void], band: _RollingBand, p: Parameters) -> Contacts:
+    """Loads, friction, slip speeds and gaps of both contacts at samples (n,), for the classifier.
 
     Where forces aren't known a closed contact bears 1 N, and uses all of its friction if it slips.
     """

@@ -30,7 +30,7 @@ FAULTS = {
 
 @dataclass(frozen=True)
 class Change:
-    """The one option to change, and what that does to the worst pair."""
+    """The one option of a model to change, and what that does to the worst pair of geoms."""
 
     option: str
     value: tuple[float, ...]
@@ -108,7 +108,7 @@ class AtRest:
 
     @np.errstate(over="ignore")
     def harm(self, c: Contacts) -> dict[str, Array]:
-        """By what may be wrong with each contact, see `FAULTS`: how many times what passes for good."""
+        """For each fault that a contact may have, see `FAULTS`: how many times what passes for good, (n,)."""
         law = c.law()
         speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
         return {
@@ -128,7 +128,7 @@ def best_change(
     """
     c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
     part, names = np.isin(np.arange(len(scene.number)), members), geom_names(scene.model)
-    for option, value in _options(c.only(part)) if harm[what] > 1 else ():
+    for option, value in _options(c.subset(part)) if harm[what] > 1 else ():
         other, state = copy.copy(scene.model), copy.copy(scene.data)
         apply(other, option, value)
         mujoco.mj_fwdPosition(other, state)
@@ -158,23 +158,25 @@ def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "cone", (int(mujoco.mjtCone.mjCONE_ELLIPTIC),)
     time, ratio = c.solref[0]
     if time < 0 and ratio == 0:
-        yield "solref", (time, -_rounded(2 * math.sqrt(-time)))  # critical
+        yield "solref", (time, -_two_digits(2 * math.sqrt(-time)))  # critical
     for share in (0.7, 0.5, 0.35, 0.25, 0.2, 0.15, 0.1):
         if time > 0 and share * time >= 2 * c.timestep:
-            yield "solref", (_rounded(share * time), ratio)
+            yield "solref", (_two_digits(share * time), ratio)
         elif time < 0:
-            yield "solref", (_rounded(time / share**2), _rounded(ratio / share))
+            yield "solref", (_two_digits(time / share**2), _two_digits(ratio / share))
     for impedance in (0.95, 0.98, 0.99, 0.995, 0.998, 0.999):
         if c.solimp[0, 0] < impedance:
             yield "solimp", (impedance, max(impedance, c.solimp[0, 1]))
     for share in (0.7, 0.5, 0.35, 0.2, 0.1):
-        yield "timestep", (_rounded(share * c.timestep),)
+        yield "timestep", (_two_digits(share * c.timestep),)
 
 
-def _rounded(value: float) -> float:
+def _two_digits(value: float) -> float:
     return float(f"{value:.2g}")
 
 
 def _worst(c: Contacts, part: Array, quantity: str) -> float:
     """The worst creep or depth, or the largest stable step, of some contacts."""
-    return c.only(part).largest_step() if quantity == "largest_step" else float(getattr(c.law(), quantity)[part].max())
+    return (
+        c.subset(part).largest_step() if quantity == "largest_step" else float(getattr(c.law(), quantity)[part].max())
+    )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.adapters.scene import TIME_STEPS, Body, Scene, Surface, into
+from compare.adapters.scene import TIME_STEPS, Body, Scene, Surface, in_body_axes
 from compare.kit.statistics import plain
 from model import InputError
 from model.arrays import Array
@@ -69,7 +69,7 @@ class Case(Scene):
         grows into any error of the azimuth.
         """
         parts = states.reshape(len(states), -1, 3)
-        if not self.round:
+        if not self.in_cylinder:
             return parts
         x, y, _ = parts[:, 0].T
         cos, sin, zero = x / np.hypot(x, y), y / np.hypot(x, y), 0 * x
@@ -123,18 +123,18 @@ class Case(Scene):
     def to_mapping(self) -> dict[str, Any]:
         """The case without its MJCF as JSON-able data; scales that are infinite are None."""
         data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": TIME_STEPS, "tolerance": TOLERANCE}
-        data |= {"turned": self.round, "wrong": {name: self.error(states) for name, states in self.wrong.items()}}
+        data |= {"turned": self.in_cylinder, "wrong": {name: self.error(states) for name, states in self.wrong.items()}}
         del data["motion"]
         return dict(plain(data))
 
 
 def reach(body: Body, normal: Array) -> Array:
-    """How far a body reaches from its centre against normals (n, 3), m, with the orientation of its start."""
+    """How far a body in its first orientation extends from its centre against normals (n, 3), m."""
     if body.shape == "disc":
-        along = np.abs(into(body.orientation, normal)[..., 2])
+        along = np.abs(in_body_axes(body.orientation, normal)[..., 2])
         return np.asarray(body.size[0] * np.sqrt(np.maximum(1 - along**2, 0.0)) + body.size[1] * along)
     if body.shape == "box":
-        return np.asarray(np.abs(into(body.orientation, normal)) @ np.array(body.size))
+        return np.asarray(np.abs(in_body_axes(body.orientation, normal)) @ np.array(body.size))
     return np.full(len(normal), body.size[0] + (body.size[2] if body.shape == "tripod" else 0.0))
 
 
@@ -161,4 +161,5 @@ def read(path: Path) -> Case:
 
 
 def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Data as JSON has it, with tuples for lists."""
     return {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}

@@ -61,7 +61,7 @@ class Contacts:
 
     @property
     def discrete(self) -> bool:
-        """Whether springs and dampers are taken at the end of a step."""
+        """Whether the integrator takes springs and dampers at the end of a step."""
         return bool(self.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE)
 
     @property
@@ -78,7 +78,7 @@ class Contacts:
 
     @property
     def parts(self) -> bool:
-        """Whether any joint moves a body along a normal."""
+        """Whether any joint can move a body along a contact normal, so that the contacts may part."""
         return bool((abs(self.rows[:, 0]) > 1e-9 * abs(self.rows).max(initial=1e-300)).any())
 
     @property
@@ -101,7 +101,7 @@ class Contacts:
         return spring, b, np.where(own, self.reference(self.solreffriction)[1], b)
 
     @cached_property
-    def _wanted(self) -> Array:
+    def _scaled_friction(self) -> Array:
         """Friction divided by its coefficient, (n, 5), N or N m."""
         return np.where(self._frictional, np.abs(self.force[:, 1:]) / self.friction, 0)
 
@@ -113,13 +113,13 @@ class Contacts:
             return softness, k, b_f
         return softness, k, b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
 
-    def _borne(self, depth: Array, slides: Array) -> Array:
-        """The load that contacts bear at a depth."""
+    def _load_at(self, depth: Array, slides: Array) -> Array:
+        """The load that contacts bear at a depth, N; `slides` says which slip."""
         softness, k, damping = self._rows(depth)
         x, load = k * depth / softness, self.force[:, 0]
         sliding = damping[:, None] * self.friction * np.abs(self.slip) / softness[:, None] * self._frictional
         if self.pyramidal:
-            edge = np.maximum(2 * x[:, None], np.where(slides[:, None], x[:, None] + sliding, self._wanted))
+            edge = np.maximum(2 * x[:, None], np.where(slides[:, None], x[:, None] + sliding, self._scaled_friction))
             return np.where(self.dim > 1, (edge * self._frictional).sum(1), x)
         kept = self.friction[:, 0] ** 2 / self.impratio * load
         return x + np.where(slides, np.maximum(np.hypot.reduce(sliding, 1) - kept, 0), 0)
@@ -132,7 +132,7 @@ class Contacts:
         high = 1.01 * softness * load / k
         for _ in range(100):
             middle = (low + high) / 2
-            above = self._borne(middle, slides) - load > 0
+            above = self._load_at(middle, slides) - load > 0
             low, high = np.where(above, low, middle), np.where(above, middle, high)
         return np.asarray((low + high) / 2)
 
@@ -146,7 +146,7 @@ class Contacts:
         first, _, first_damping = self._rows(np.zeros(len(load)))
         if self.pyramidal:
             x = (k * depth / softness)[:, None]
-            wanted = self._wanted
+            wanted = self._scaled_friction
             creep = softness[:, None] * np.where(wanted <= 2 * x, wanted / 2, wanted - x) / (mu * damping[:, None])
             hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
             sideways = 2 * mu**2 / softness[:, None]
@@ -177,8 +177,8 @@ class Contacts:
             damping=np.column_stack([b, *[b_f] * 5]),
         )
 
-    def only(self, which: Array) -> Contacts:
-        """Some of the contacts, with their Jacobian in the coordinates that they move."""
+    def subset(self, which: Array) -> Contacts:
+        """The contacts `which` alone, with their Jacobian in the coordinates that they move."""
         n = len(self.dim)
         chosen = {
             f.name: v[which] for f in dataclasses.fields(self) if np.ndim(v := getattr(self, f.name)) and len(v) == n
@@ -323,8 +323,8 @@ def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
     }
 
 
-def replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """What the engine takes in the place of what the model says, for the contacts of one pair: its kind, and how."""
+def replacements(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Parameters of one pair's contacts in whose place the engine takes others: the kind, and a sentence on it."""
     asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
     if (asked > 0).sum() == 1:
         yield "solref of neither format", f"{asked[0]:g} {asked[1]:g}: {SOLREF[0]:g} {SOLREF[1]:g} is taken"

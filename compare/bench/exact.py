@@ -17,10 +17,10 @@ import numpy as np
 
 import analytic
 from compare.adapters.scene import Surface
-from compare.adapters.vessel import geometry
+from compare.adapters.vessel import scene_fields
 from compare.bench import mechanisms, one_contact
 from compare.bench.case import TOLERANCE, VERSION, Case
-from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
+from compare.bench.one_contact import SPEED_ALONE, G, along, closed_form, slope, sphere
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import check_ours, make_directory, write_text
@@ -44,7 +44,7 @@ def cases() -> tuple[Case, ...]:
 
 
 def listing() -> list[list[str]]:
-    """Of each case its name, how many contacts it has, its kind, what happens; templates/cases.json has them, too."""
+    """A row for each case: name, number of contacts, kind, what happens; templates/cases.json has them, too."""
     return [[case.name, str(len(case.contacts[0])), case.kind, case.about] for case in cases()]
 
 
@@ -94,12 +94,12 @@ def _grooves() -> list[Case]:
     cube = {"shape": "box", "size": (0.1,) * 3, "mass": 1.0, "inertia": (0.04 / 6,) * 3}
     source = "Newton and Euler; by symmetry both planes carry m g cos/sqrt(2)"
     return [
-        closed(
+        closed_form(
             "groove-rolls", "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
             sphere(), planes(gentle, 0.5), partial(descends, angle=gentle, size=0.1),
             wrong={"on one point, 5/7 g sin": {"lever": 0.4}, "a hollow sphere": {"lever": 4 / 3}},
             until=1.0, scales=(1.0, 2.0, 30.0), contacts=("RR",), source=source),
-        closed(
+        closed_form(
             "groove-rests",
             "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
             cube | {"orientation": orientation}, planes(steep, 0.5),
@@ -120,29 +120,29 @@ def _vessel() -> list[Case]:
     hits = State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3)
     rides = State(y=0.1, v_y=0.1, omega_c=22.0, slip_x=5.0)
     return [
-        ball("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)", SLOW,
+        ball_case("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)", SLOW,
              State(omega_c=8.0), 4.0, rolling),
-        ball("from-rest", "from rest it slips on the wall, then rolls on both, ever faster (RS, RR)",
+        ball_case("from-rest", "from rest it slips on the wall, then rolls on both, ever faster (RS, RR)",
              SLOW, State(), 8.0, rolling),
-        ball("slips-on-both", "slipping on floor and wall it comes to its stationary state (SS)",
+        ball_case("slips-on-both", "slipping on floor and wall it comes to its stationary state (SS)",
              SLOW.replace(omega_0=25.0), kicked, 2.0, slipping),
-        ball("rides-the-wall", "the wall alone carries it, and it rolls there (NR)",
+        ball_case("rides-the-wall", "the wall alone carries it, and it rolls there (NR)",
              ROUGH, rides, 1.0, rolling),
-        ball("onset-of-slip", "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
+        ball_case("onset-of-slip", "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
              SLOW.replace(omega_0=20.0), State(omega_c=8.0), 3.0, slipping),
-        ball("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
+        ball_case("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
              SLOW, lands, 0.5, landing),
-        ball("hits-the-wall", "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
+        ball_case("hits-the-wall", "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
              SLOW, hits, 0.5, landing),
-        ball("falls-in", "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
+        ball_case("falls-in", "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
              SLOW, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, landing),
     ]  # fmt: skip
 
 
-def ball(
+def ball_case(
     name: str, about: str, p: Parameters, x0: State, until: float, wrong: Mapping[str, Mapping[str, float]]
 ) -> Case:
-    """The ball of the paper between floor and wall, sampled 25 times.
+    """A case of the paper's ball between floor and wall by event-driven simulation, sampled 25 times.
 
     `wrong` are factors of its parameters, or a restitution.
     """
@@ -151,7 +151,7 @@ def ball(
         found = analytic.simulate(p, x0, until, rtol=rtol, restitution=restitution, sample_interval=until / 25)
         return np.concatenate(to_world(found.x, found.theta, p), axis=1)[1:], found
 
-    def mistaken(restitution: float = 0.0, **factors: float) -> Array:
+    def wrong_states(restitution: float = 0.0, **factors: float) -> Array:
         changed = {key: factor * getattr(p, key) for key, factor in factors.items()}
         return run(p.replace(**changed), 1e-9, restitution)[0]
 
@@ -159,14 +159,14 @@ def ball(
     return Case(
         name=name,
         about=f"a ball in a vessel: {about}",
-        **geometry(p, x0),
+        **scene_fields(p, x0),
         times=motion.time[1:],
         exact=exact,
         contacts=tuple(case.name for case in motion.cases[1:]),
         bound=BOUND,
         source=f"analytic.simulate, event-driven, rtol {SHARP:g}",
         scales=(p.R, p.R * p.omega_0, p.R * p.omega_0 / p.r),
-        wrong={text: mistaken(**how) for text, how in wrong.items()},
+        wrong={text: wrong_states(**how) for text, how in wrong.items()},
         drag=p.c,
         flow=p.omega_0,
         motion=(p, x0),

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from compare.bench import advice
-from compare.bench.contact_law import LARGEST, Array, contacts, geom_names, replaced
+from compare.bench.contact_law import LARGEST, Array, contacts, geom_names, replacements
 from compare.bench.settled import (
     WINDOW,
     Advance,
@@ -27,10 +27,10 @@ from compare.bench.settled import (
     UnsettledError,
     awake,
     few,
-    loads,
+    loads_by_pair,
     measured_slip,
-    noting_loads,
     radii,
+    recording_loads,
     settle,
     step_to_most_contacts,
     with_control,
@@ -134,11 +134,11 @@ def forecast(
     return dataclasses.replace(found, change=change, remedy=advice.remedy_code(model) if creeps else "")
 
 
-def tried(
+def follow_advice(
     model: Any, data: Any, before: Forecast, limit: float, control: Control | None = None, **good: Any
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
-    """Follow the advice: the forecast with what was found after it, that after the change, and that with the remedy on
-    top, of models that are settled anew within `limit` s.
+    """Follow the advice and settle the model anew, for at most `limit` s: the forecast with what was found then, that
+    after the change, and that with the remedy, too.
 
     What isn't advised isn't tried: None. The change is made in `model`. Raises as `forecast` does.
     """
@@ -173,7 +173,7 @@ def _measured(
         step_to_most_contacts(model, data, step)
     those, number = contacts(model, data)
     if not len(number):
-        flexible = _flexible(data)
+        flexible = _count_flexible(data)
         also = f"; {flexible} contacts of flexible bodies are left out" if flexible else ""
         also += f"; after {data.time:.3g} s {few([*moving.values()])}" if moving else ""
         also += f"; gone down: {few(settled.collapsed)}" if settled.collapsed else ""
@@ -183,8 +183,8 @@ def _measured(
     radius = radii(model)[bodies].min(1)
     history: list[dict[tuple[int, int], Array]] = []
     time = WINDOW if settled.steady and not moving else SECOND
-    found = measured_slip(model, data, those, number, noting_loads(step, history), time)
-    now = loads(model, start)
+    found = measured_slip(model, data, those, number, recording_loads(step, history), time)
+    now = loads_by_pair(model, start)
     for pair in np.unique(those.geoms, axis=0):
         part, key = (those.geoms == pair).all(1), tuple(pair.tolist())
         series = np.array([each.get(key, np.zeros(6)) for each in history])
@@ -197,7 +197,7 @@ def _measured(
             those.force[part, 1:] *= friction / sideways if sideways > 1e-9 * then[0] else load
             found["depth_measured"][part] = mean[1] / max(mean[2], 1e-300)
     good = np.full(len(number), depth) if depth else DEPTH * radius
-    own = those.only(np.ones(len(number), bool))
+    own = those.subset(np.ones(len(number), bool))
     return advice.AtRest(model, start, own, number, radius, moves, found, creep, good)
 
 
@@ -210,7 +210,7 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
     geoms, belongs = np.unique(those.geoms, axis=0, return_inverse=True)
     for k, (first, second) in enumerate(geoms):
         part = belongs.ravel() == k
-        own = those.only(part)
+        own = those.subset(part)
         largest = own.largest_step()
         pairs.append(
             PairForecast(
@@ -222,7 +222,7 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
                 slides=bool((law.slides & ~moves)[part].any()),
                 hover=float(law.hover[part].min()),
                 largest_step=largest,
-                replaced=dict(replaced(scene.model, own, names)),
+                replaced=dict(replacements(scene.model, own, names)),
                 harm={name: float(values[part].max()) for name, values in harms.items()}
                 | {"largest_step": those.timestep / largest},
                 **{name: float(values[part].max()) for name, values in told.items()},
@@ -232,9 +232,9 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
     alone = min(pair.largest_step for pair in pairs)
     largest = min(alone, those.largest_step(min(alone, LARGEST)))
     step = scene.model.opt.timestep
-    return Forecast(tuple(pairs), step, largest, settled, _flexible(scene.data), None, "")
+    return Forecast(tuple(pairs), step, largest, settled, _count_flexible(scene.data), None, "")
 
 
-def _flexible(data: Any) -> int:
-    """How many contacts there are of flexible bodies."""
+def _count_flexible(data: Any) -> int:
+    """How many contacts of flexible bodies there are, which are left out."""
     return int((data.contact.geom < 0).any(1).sum())

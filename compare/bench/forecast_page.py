@@ -62,7 +62,7 @@ def sentences(f: Forecast) -> Iterator[str]:
 
 
 def _replaced(pairs: Sequence[PairForecast]) -> Iterator[str]:
-    """What MuJoCo replaces: a line a kind, with an example."""
+    """A sentence for each kind of parameter in whose place MuJoCo takes another, with an example."""
     for kind in dict.fromkeys(kind for p in pairs for kind in p.replaced):
         those = [p for p in pairs if kind in p.replaced]
         more = f", and at {len(those) - 1} more" if len(those) > 1 else ""
@@ -70,7 +70,7 @@ def _replaced(pairs: Sequence[PairForecast]) -> Iterator[str]:
 
 
 def _number(value: float, factor: float = 1, endless: str = "any") -> str:
-    """Three digits, none for what is next to nothing."""
+    """A number times a factor as text: three digits, 0 for what is next to nothing, `endless` for infinity."""
     value *= factor
     if not math.isfinite(value):
         return endless if math.isinf(value) else "–"
@@ -87,17 +87,17 @@ def tables(f: Forecast) -> list[Table]:
         rest.append([p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), _number(p.cone, 100)])
         motion.append([p.name, _number(p.hover, 1e3), _number(p.largest_step, 1e3)])
     title = f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
-    return [(title, _filled(rest)), ("In motion", _filled(motion))]
+    return [(title, _without_empty_columns(rest)), ("In motion", _without_empty_columns(motion))]
 
 
-def _filled(rows: list[list[str]]) -> list[list[str]]:
-    """Without the columns in which there is nothing."""
+def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
+    """A table without the columns in which there is nothing."""
     there = [any(cell != "–" for cell in column[1:]) for column in zip(*rows, strict=True)]
     return [[*itertools.compress(row, there)] for row in rows]
 
 
-def again(f: Forecast, after: Forecast | None, held: Forecast | None) -> list[Table]:
-    """What the change was for, after it; and creep with the remedy."""
+def tables_after(f: Forecast, after: Forecast | None, held: Forecast | None) -> list[Table]:
+    """Tables of what the change was made for, once it was made, and of the creep with the remedy."""
     shown = []
     if after and f.change:
         shown.append((f"With {f.change.written}", tables(after)[f.change.quantity == "largest_step"][1]))
@@ -106,14 +106,14 @@ def again(f: Forecast, after: Forecast | None, held: Forecast | None) -> list[Ta
     return shown
 
 
-def paste(f: Forecast) -> list[tuple[str, str]]:
-    """What to paste, and where."""
+def snippets(f: Forecast) -> list[tuple[str, str]]:
+    """Text to paste into the model or program that makes it better, each with what it is: MJCF or Python."""
     mjcf = [("MJCF", f.change.mjcf)] if f.change else []
     return mjcf + ([("Python", f.remedy)] if f.remedy else [])
 
 
 def html(f: Forecast, after: Forecast | None, held: Forecast | None, file: str) -> str:
     """The forecast, and those after the change and with the remedy, as one self-contained page."""
-    shown = tables(f) + again(f, after, held)
-    said = {"file": file, "sentences": list(sentences(f)), "paste": paste(f), "faint": f"{FAINT:.1%}"}
+    shown = tables(f) + tables_after(f, after, held)
+    said = {"file": file, "sentences": list(sentences(f)), "paste": snippets(f), "faint": f"{FAINT:.1%}"}
     return pages.render("compare.bench", "forecast.html", tables=shown, **said)

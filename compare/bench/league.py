@@ -88,7 +88,7 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
     """A row for each engine that was tried: how many cases it passes, the median error of each kind, order and cost."""
     kinds = {case.name: case.kind for case in cases()}
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
-    for name, results in tried(league).items():
+    for name, results in ranked(league).items():
         own = [result for result in results if not result.skipped]
         medians = [_median(r.error if math.isfinite(r.error) else math.inf for r in own if kinds[r.case] == each)
                    for each in KINDS]  # fmt: skip
@@ -108,14 +108,14 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
 
 def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
     """A row for each case, a column for each engine that was tried: errors at the shortest step."""
-    those = tried(league)
+    those = ranked(league)
     table = [["case", *those]]
     for k, case in enumerate(cases()):
         table.append([case.name, *(cell(results[k]) for results in those.values())])
     return table
 
 
-def tried(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
+def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
     """Engines that were tried in some case; those that pass the largest share first, as they come behind all others."""
 
     def place(name: str) -> tuple[bool, float]:
@@ -127,7 +127,7 @@ def tried(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]
 
 
 def cell(result: Result) -> str:
-    """An error, or why there is none, in a word; with a mark where it is too much to pass."""
+    """The cell of a result: its error, or in a word why there is none; marked where it is too much to pass."""
     if result.skipped:
         return "–"
     floor = FLOORS[result.engine.precision]
@@ -145,17 +145,17 @@ def number(value: float, floor: float) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
-def worst(results: Sequence[Result]) -> Result | None:
-    """The tried case with the greatest error; one that is lost before all others."""
+def worst_result(results: Sequence[Result]) -> Result | None:
+    """The result with the greatest error, one that failed before all others; None if no case was tried."""
     tried = [result for result in results if not result.skipped]
     return max(tried, key=lambda r: r.error if math.isfinite(r.error) else math.inf, default=None)
 
 
-def about(league: Mapping[str, Sequence[Result]]) -> Rows:
+def declarations(league: Mapping[str, Sequence[Result]]) -> Rows:
     """What each engine that was tried declares, its worst case and why; `notes` say why others were not."""
     table = [["engine", "version", "declared", "worst case", "why"]]
     for name, results in league.items():
-        engine, found = results[0].engine, worst(results)
+        engine, found = results[0].engine, worst_result(results)
         if found is None:
             continue
         failed = f": {found.failure}" if found.failure else ""
@@ -164,7 +164,7 @@ def about(league: Mapping[str, Sequence[Result]]) -> Rows:
 
 
 def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, str]]:
-    """What failed or was not tried, and why; one line for each reason of an engine."""
+    """Engines and cases that failed or were not tried, and why; one line for each reason of an engine."""
     for name, results in league.items():
         reasons: dict[str, list[str]] = {}
         for result in results:
@@ -175,7 +175,7 @@ def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, str]]:
 
 
 def to_mapping(league: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
-    """JSON-able data."""
+    """All results of the league as JSON-able data."""
     entries = {
         name: [vars(result) | {"order": result.order, "passed": result.passed} for result in results]
         for name, results in league.items()
@@ -196,7 +196,7 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
     from compare.kit import style
 
     kinds = {case.name: case.kind for case in cases()}
-    shown = {name: [r for r in results if r.errors] for name, results in tried(league).items()}
+    shown = {name: [r for r in results if r.errors] for name, results in ranked(league).items()}
     families = list(dict.fromkeys(name.removesuffix("-defaults") for name in shown))
     figure, panels = style.panels(9.0, 4.4 + 0.19 * len(shown), 2, 2, sharex=True, sharey=True)
     for axes, each in zip(panels.ravel(), KINDS, strict=True):

@@ -15,7 +15,7 @@ from scipy.special import ellipj, ellipk, ellipkinc
 
 from compare.adapters.scene import Surface
 from compare.bench.case import Case
-from compare.bench.one_contact import SPEED_ALONE, UP, WAY, G, along, block, closed, slope, sphere
+from compare.bench.one_contact import SPEED_ALONE, UP, WAY, G, along, block, closed_form, slope, sphere
 from model.arrays import Array
 
 _Motion = tuple[Array, ...]
@@ -23,7 +23,7 @@ _Motion = tuple[Array, ...]
 
 def cases() -> tuple[Case, ...]:
     """The cases that version 2 added."""
-    return (_tripod(), _plank(), _thousandfold(), _belt(), _joint(), _rocking(), _bounce(), _disc())
+    return (_tripod(), _plank(), _heavy_on_light(), _belt(), _joint(), _rocking(), _bounce(), _disc())
 
 
 def _tripod() -> Case:
@@ -58,7 +58,7 @@ def _tripod() -> Case:
         place = np.stack([x, y, none + foot + down], axis=1)
         return place, np.stack([v_x, v_y, none], axis=1), np.outer(turning, UP)
 
-    return closed(
+    return closed_form(
         "tripod-turns",
         "three legs that slide and turn: each bears what keeps it from tilting, and slows it along its own slip",
         {"shape": "tripod", "size": size, "mass": mass, "inertia": moments}, (Surface("floor", mu),), courses,
@@ -74,7 +74,7 @@ PLANK = (0.6, 0.2, 0.02)
 
 
 def plate(mass: float, tilt: float = 0.0, size: tuple[float, float, float] = PLANK) -> dict[str, Any]:
-    """A box of other size and mass, turned about the y axis."""
+    """A box of a size and mass, turned about the y axis, as fields of `Body`."""
     x, y, z = (2 * half for half in size)
     moments = tuple(mass / 12 * sum(pair) for pair in ((y * y, z * z), (x * x, z * z), (x * x, y * y)))
     return block(tilt) | {"size": size, "mass": mass, "inertia": moments}
@@ -84,7 +84,7 @@ def _plank() -> Case:
     above, below, speed, mass = 0.4, 0.1, 2.0, 2.0
 
     def dragged(t: Array, above: float = above, below: float = below, load: float = 1.0) -> _Motion:
-        """Block and plank: the block slows by mu g, and draws the plank until both go together, then stop.
+        """A block that slides on a plank slows by mu g and draws the plank until both go together, then stop.
 
         `load` is what of the block's weight the floor bears under the plank.
         """
@@ -103,7 +103,7 @@ def _plank() -> Case:
     meet = speed / (above * G + (above - below * (mass + 1)) * G / mass)
     stop = meet + (speed - above * G * meet) / (below * G)
 
-    return closed(
+    return closed_form(
         "plank", "a block that is pushed off on a plank draws it along, until both go together and stop on the floor",
         block(), (Surface("floor", below),), dragged,
         wrong={"the floor doesn't feel the block": {"load": 0.0},
@@ -114,7 +114,7 @@ def _plank() -> Case:
     )  # fmt: skip
 
 
-def _thousandfold() -> Case:
+def _heavy_on_light() -> Case:
     tilt = math.atan(0.9 * 0.5)
 
     def stays(t: Array, mu: float = 0.5) -> _Motion:
@@ -124,7 +124,7 @@ def _thousandfold() -> Case:
         low, high = under * np.array(normal), (2 * under + half) * np.array(normal)
         return *along(way, a * t**2 / 2, a * t, 0 * t, high), *along(way, a * t**2 / 2, a * t, 0 * t, low)
 
-    return closed(
+    return closed_form(
         "thousandfold",
         "a block of 1000 kg on one of 1 kg on a slope whose tangent is 0.9 of their friction: neither must move",
         plate(1000.0, tilt, (0.2, 0.2, 0.2)), (Surface("slope", 0.5, normal=slope(tilt)[1]),), stays,
@@ -140,14 +140,14 @@ def _belt() -> Case:
     way, normal = slope(tilt)
 
     def rides(t: Array, mu: float = mu, belt: float = belt) -> _Motion:
-        """Down at first, slowed by g (mu cos - sin) until it goes up with the belt."""
+        """A block that slides down a belt is slowed by g (mu cos - sin) until it goes up with the belt."""
         a = G * (mu * math.cos(tilt) - math.sin(tilt))
         slid = np.minimum(t, (speed + belt) / a)
         s = speed * slid - a * slid**2 / 2 - belt * (t - slid)
         return along(way, s, speed - a * slid, 0 * t, block()["size"][2] * np.array(normal))
 
     caught = (speed + belt) / (G * (mu * math.cos(tilt) - math.sin(tilt)))
-    return closed(
+    return closed_form(
         "belt", "a block slides down an inclined belt that runs up, stops and is carried off by it",
         block(tilt), (Surface("belt", mu, normal=normal, velocity=tuple((-belt * way).tolist())),), rides,
         wrong={"the belt stands": {"belt": 1e-9}, "friction 5 % too strong": {"mu": 1.05 * mu}},
@@ -160,7 +160,7 @@ def _joint() -> Case:
     stiffness, dry, start = 100.0, 4.0, 0.3
 
     def swings(t: Array, dry: float = dry, stiffness: float = stiffness) -> _Motion:
-        """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, until the spring can't overcome it."""
+        """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, until the spring is too weak."""
         rate, shift = math.sqrt(stiffness), dry / stiffness
         half = np.floor(t * rate / math.pi)
         last = max(math.ceil((start / shift - 1) / 2), 0) if shift else math.inf
@@ -170,7 +170,7 @@ def _joint() -> Case:
         s = side * (shift + width * np.cos(np.where(stopped, 0.0, phase)))
         return along(WAY, s, np.where(stopped, 0.0, -side * width * rate * np.sin(phase)), 0 * t, UP)
 
-    return closed(
+    return closed_form(
         "dry-joint",
         "a mass on a spring and a slide with dry friction: each half swing is shorter by 2 F/k, then it sticks",
         sphere(), (), swings, wrong={"friction 5 % too weak": {"dry": 0.95 * dry}, "none": {"dry": 0.0}},
@@ -215,7 +215,7 @@ def _rocking() -> Case:
         velocity = np.stack([arm * np.cos(tilt) * rate, 0 * t, arm * np.sin(tilt) * rate], axis=1)
         return place, velocity, np.outer(rate, [0.0, 1.0, 0.0])
 
-    return closed(
+    return closed_form(
         "rocking-block", "a block rocks from edge to edge, and loses the same share of its speed at every blow",
         body, (Surface("floor", 1.0),), rocks,
         wrong={"nothing is lost in a blow": {"kept": 1.0}, "inertia of a point": {"moment": arm**2}},
@@ -228,7 +228,7 @@ def _bounce() -> Case:
     share, drop = 0.7, 1.8
 
     def bounces(t: Array, share: float = share) -> _Motion:
-        """Parabolas: each blow leaves `share` of the speed."""
+        """A ball falls and bounces in parabolas: each blow leaves `share` of the speed."""
         speed, begin = math.sqrt(2 * G * drop), math.sqrt(2 * drop / G)
         z, v = drop - G * t**2 / 2, -G * t
         while begin < t[-1]:
@@ -239,7 +239,7 @@ def _bounce() -> Case:
         none = 0 * t
         return np.stack([none, none, 0.1 + z], axis=1), np.stack([none, none, v], axis=1), np.zeros((len(t), 3))
 
-    return closed(
+    return closed_form(
         "bounce", "a ball that falls on a floor leaves it with 0.7 of its speed, again and again",
         sphere(), (Surface("floor", 0.5, restitution=share),), bounces,
         wrong={"0.65 of it": {"share": 0.65}, "all of it": {"share": 1.0}},
@@ -272,7 +272,7 @@ def _disc() -> Case:
         return rho * out - c_z * UP, turning * rho * along, s * sin * out + (turning + s * cos) * UP
 
     across = mass * (radius**2 / 4 + thickness**2 / 3)
-    return closed(
+    return closed_form(
         "rolling-disc", "a disc that leans rolls on its rim, round and round",
         {"shape": "disc", "size": (radius, thickness), "mass": mass,
          "inertia": (across, across, mass * radius**2 / 2),

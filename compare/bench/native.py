@@ -68,7 +68,7 @@ class Native:
 
 
 def entry(path: Path) -> Bodies:
-    """An engine for the league: MuJoCo with the settings of a file, at its own time step; errors as of `read`."""
+    """MuJoCo with the contact settings and time step of a file, as an engine of the league; errors as of `read`."""
     settings = read(path)
     made = Bodies(path.stem, settings.note, tune=settings.tune)
     made.TIMESTEPS = (settings.option["timestep"],)
@@ -133,7 +133,7 @@ def _contacts(model: Any, ball: int) -> tuple[list[Pair], list[Pair]]:
     return pairs
 
 
-class OnJoints(Bodies):
+class PlainOnJoints(Bodies):
     """The engine `mujoco-plain` for cases that have a `motion`; with the first step the whole of it is simulated."""
 
     def build(self, case: Any, timestep: float) -> None:
@@ -163,7 +163,7 @@ class OnJoints(Bodies):
         return tuple(self._states[self._at]) if self._task else super().state()
 
 
-on_joints = OnJoints(
+on_joints = PlainOnJoints(
     "mujoco-plain",
     "contacts soft enough for sliding let a ball that lands sink in and throw it back",
     tune=studied,

@@ -35,7 +35,7 @@ Course = Callable[..., _Motion]
 """The motion at times (n,) in s."""
 
 
-def closed(
+def closed_form(
     name: str,
     about: str,
     body: Mapping[str, Any],
@@ -80,7 +80,7 @@ def closed(
 
 
 def block(tilt: float = 0.0) -> dict[str, Any]:
-    """A block, turned about the y axis by an angle."""
+    """A block turned about the y axis by an angle, as fields of `Body`."""
     x, y, z = (2 * half for half in BLOCK)
     moments = ((y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)
     turn = (math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0)
@@ -88,7 +88,7 @@ def block(tilt: float = 0.0) -> dict[str, Any]:
 
 
 def sphere() -> dict[str, Any]:
-    """A uniform sphere."""
+    """A uniform sphere, as fields of `Body`."""
     return {"shape": "sphere", "size": (RADIUS,), "mass": 1.0, "inertia": (J * RADIUS**2,) * 3}
 
 
@@ -99,13 +99,13 @@ def slope(angle: float) -> tuple[Array, Vector]:
 
 
 def along(way: Array, s: Any, v: Any, spin: Any, start: Any) -> _Motion:
-    """A straight course: distance and speed along a way, and a spin about the horizontal axis across it."""
+    """Motion along a straight way: distance s and speed v along it, and a spin about the horizontal axis across it."""
     across = np.array([-way[1], way[0], 0.0]) / math.hypot(way[0], way[1])
     return start + np.outer(s, way), np.outer(v, way), np.outer(spin, across)
 
 
-def _slides(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> _Motion:
-    """On a slope, from a speed; it stops where friction is the stronger and doesn't start again."""
+def _slides_down(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> _Motion:
+    """A block on a slope with a speed v at first; where friction is the stronger it stops and doesn't start again."""
     way, normal = slope(angle)
     a = G * (math.sin(angle) - mu * math.cos(angle))
     if a < 0:
@@ -120,11 +120,13 @@ def _on_slope(name: str, about: str, tangent: float, v: float, **more: Any) -> C
         Surface("floor", MU, normal=slope(angle)[1]),
         "Coulomb's law with Newton's second, integrated by hand",
     )
-    return closed(name, about, block(angle), (floor,), partial(_slides, angle=angle, v=v), source=source, **more)
+    return closed_form(
+        name, about, block(angle), (floor,), partial(_slides_down, angle=angle, v=v), source=source, **more
+    )
 
 
-def _pulled(t: Array, mu: float = MU, grip: float = 1.0) -> _Motion:
-    """By 10 N more each second, once that is more than friction can hold."""
+def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> _Motion:
+    """A block pulled by a force that grows by 10 N each second: it slides once that is more than friction can hold."""
     late = np.maximum(t - grip * mu * G / 10.0, 0.0)
     a0 = (grip - 1) * mu * G
     return along(WAY, a0 * late**2 / 2 + 10.0 * late**3 / 6, a0 * late + 5.0 * late**2, 0 * t, BLOCK[2] * UP)
@@ -134,22 +136,22 @@ _PUSH = G / (0.5 * MU)
 """Force at which half of the friction of a wall carries a block, N."""
 
 
-def _pinched(t: Array, mu: float = MU) -> _Motion:
-    """Held by a wall, or falling along it."""
+def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
+    """A block pressed to a wall: friction holds it, or it falls along the wall."""
     fall = max(G - mu * _PUSH, 0.0)
     start = np.array([-BLOCK[0], 0.0, 1.0])
     return start - np.outer(fall * t**2 / 2, UP), -np.outer(fall * t, UP), np.zeros((len(t), 3))
 
 
-def _rolls_at_last(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
-    """From 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)), then rolls."""
+def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
+    """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)), then rolls."""
     slid = np.minimum(t, 2.0 / (mu * G * (1 + 1 / j)))
     v, s = 2.0 - mu * G * slid, 2.0 * slid - mu * G * slid**2 / 2
     return along(WAY, s + v * (t - slid), v, mu * G * slid / (j * RADIUS), RADIUS * UP)
 
 
-def _descends(t: Array, angle: float, mu: float = 0.5, j: float = J) -> _Motion:
-    """From rest on a slope: rolls if tan <= mu (1 + 1/j), else slips."""
+def _rolls_down(t: Array, angle: float, mu: float = 0.5, j: float = J) -> _Motion:
+    """A sphere from rest on a slope: rolls if tan <= mu (1 + 1/j), else slips."""
     way, normal = slope(angle)
     a = max(G * math.sin(angle) / (1 + j), G * (math.sin(angle) - mu * math.cos(angle)))
     spun = (G * math.sin(angle) - a) / (j * RADIUS)
@@ -160,8 +162,8 @@ _GENTLE, _STEEP = math.atan(0.5), math.atan(2.5)
 """Slopes on which a sphere rolls, and on which it slips."""
 
 
-def _spins(t: Array, decay: float = 0.0) -> _Motion:
-    """About the vertical, for ever."""
+def _spins_on_the_spot(t: Array, decay: float = 0.0) -> _Motion:
+    """A sphere that spins about the vertical for ever."""
     return RADIUS * UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), UP)
 
 
@@ -169,8 +171,8 @@ _TURNING = 3.0
 """Of the turntable, rad/s."""
 
 
-def _circles(t: Array, j: float = J) -> _Motion:
-    """x'' = k turning z x x' with k = j/(1 + j), from where it circles about the axis itself."""
+def _circles_on_turntable(t: Array, j: float = J) -> _Motion:
+    """A sphere on a turntable, x'' = k turning z x x' with k = j/(1 + j), that circles about the table's axis."""
     k = _TURNING * j / (1 + j)
     cos, sin, none = np.cos(k * t), np.sin(k * t), 0 * t
     place, way = 0.5 * np.stack([cos, sin, none], axis=1), 0.5 * k * np.stack([-sin, cos, none], axis=1)
@@ -184,8 +186,8 @@ _CYLINDER = Parameters(m=1.0, r=RADIUS, R=_ORBIT, j=J, mu=1.0, eta=1.0, g=G, c=0
 """The same in the study's vessel, far above its floor."""
 
 
-def _rises(t: Array, j: float = J) -> _Motion:
-    """Round and down from rest: z'' = -g/(1 + j) - k^2 z with k = turns sqrt(j/(1 + j))."""
+def _rolls_in_cylinder(t: Array, j: float = J) -> _Motion:
+    """A sphere rolling round in a cylinder: z'' = -g/(1 + j) - k^2 z with k = turns sqrt(j/(1 + j))."""
     k = _TURNS * math.sqrt(j / (1 + j))
     deep = G / (j * _TURNS**2)
     z, fall = -deep * (1 - np.cos(k * t)), -deep * k * np.sin(k * t)
@@ -218,16 +220,16 @@ def _blocks() -> list[Case]:
             0.0, 2.0,
             wrong={"friction 5 % too weak": {"mu": 0.95 * MU}, "no friction": {"mu": 0.0}},
             until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S", 2.0 / (MU * G), "R")),
-        closed(
+        closed_form(
             "growing-pull", "a block under a force that grows by 10 N a second breaks away at mu m g and then slides",
-            block(), (Surface("floor", MU),), _pulled,
+            block(), (Surface("floor", MU),), _pulled_ever_harder,
             wrong={"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
             until=1.0, scales=(0.1, 0.5, math.inf), contacts=("R", MU * G / 10.0, "S"),
             source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive", growth=(10.0, 0.0, 0.0)),
-        closed(
+        closed_form(
             "pinched-block",
             "a block is pressed against a vertical wall, half of the friction there is carries it: it must not move",
-            block(), (Surface("wall", MU, normal=(-1.0, 0.0, 0.0)),), _pinched,
+            block(), (Surface("wall", MU, normal=(-1.0, 0.0, 0.0)),), _pressed_to_wall,
             wrong={"friction of 0.45 of Coulomb's": {"mu": 0.45 * MU}},
             until=2.0, scales=SPEED_ALONE, contacts=("R",),
             source="statics: half of mu times the force carries the weight, the pressure stays on the face",
@@ -237,41 +239,41 @@ def _blocks() -> list[Case]:
 
 def _balls() -> list[Case]:
     return [
-        closed(
+        closed_form(
             "sphere-slides-rolls",
             "a sphere that is pushed off at 2 m/s without spin slides, then rolls on at 5/7 of its speed",
-            sphere(), (Surface("floor", 0.2),), _rolls_at_last,
+            sphere(), (Surface("floor", 0.2),), _slides_then_rolls,
             wrong={"a hollow sphere": {"j": 2 / 3}, "friction 5 % too weak": {"mu": 0.19}, "it slides on": {"j": 1e9}},
             until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
             source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)"),
-        closed(
+        closed_form(
             "sphere-rolls-down", "a sphere rolls down a slope from rest at 5/7 g sin",
-            sphere(), (Surface("slope", 0.5, normal=slope(_GENTLE)[1]),), partial(_descends, angle=_GENTLE),
+            sphere(), (Surface("slope", 0.5, normal=slope(_GENTLE)[1]),), partial(_rolls_down, angle=_GENTLE),
             wrong={"it slides without friction": {"mu": 0.0}, "a hollow sphere": {"j": 2 / 3}},
             until=1.0, scales=(1.0, 2.0, 20.0), contacts=("R",), source="Newton and Euler: (1 + j) a = g sin"),
-        closed(
+        closed_form(
             "sphere-slips-down",
             "a sphere on a slope too steep for rolling, tan > 7/2 mu, slips down and is spun up by friction",
-            sphere(), (Surface("slope", 0.5, normal=slope(_STEEP)[1]),), partial(_descends, angle=_STEEP),
+            sphere(), (Surface("slope", 0.5, normal=slope(_STEEP)[1]),), partial(_rolls_down, angle=_STEEP),
             wrong={"it rolls": {"j": J, "mu": 10.0}, "friction 5 % too strong": {"mu": 0.525}},
             until=0.5, scales=(1.0, 2.0, 20.0), contacts=("S",),
             source="Newton and Euler: a = g (sin - mu cos), j r spin' = mu g cos"),
-        closed(
+        closed_form(
             "drilling-sphere",
             "a sphere spins about the vertical on a point, where friction has no arm: it spins for ever",
-            sphere(), (Surface("floor", MU),), _spins,
+            sphere(), (Surface("floor", MU),), _spins_on_the_spot,
             wrong={"a damping of 5 % a second": {"decay": 0.05}},
             until=2.0, scales=(0.1, 1.0, 20.0), contacts=("R",), source="a point contact carries no moment"),
-        closed(
+        closed_form(
             "turntable", "a ball rolls on a table that turns at 3 rad/s, and circles at 2/7 of that",
-            sphere(), (Surface("table", 0.5, turning=_TURNING),), _circles,
+            sphere(), (Surface("table", 0.5, turning=_TURNING),), _circles_on_turntable,
             wrong={"a hollow sphere": {"j": 2 / 3}, "it goes with the table": {"j": 1e9}},
             until=4.0, scales=(0.5, 0.5, 15.0), contacts=("R",),
             source="Weltner, Am. J. Phys. 47 (1979): v' = 2/7 turning z x v for a uniform ball"),
-        closed(
+        closed_form(
             "cylinder",
             "a ball rolls round inside a vertical cylinder: it comes down and rises again, at sqrt(2/7) of its orbit",
-            sphere(), (Surface("wall", 1.0, radius=_ORBIT + RADIUS),), _rises,
+            sphere(), (Surface("wall", 1.0, radius=_ORBIT + RADIUS),), _rolls_in_cylinder,
             wrong={"a hollow sphere": {"j": 2 / 3}, "it falls freely": {"j": 1e-9}},
             until=2.0, scales=(1.0, 8.0, 80.0), contacts=("R",),
             source="Newton and Euler in the turning frame: the spin along the radius changes with height",

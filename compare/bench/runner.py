@@ -148,7 +148,7 @@ class EngineProcess:
         # Not by `multiprocessing`, which runs a person's script a second time unless that is guarded.
         self._pipe, far = multiprocessing.Pipe()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import serve; serve({far.fileno()})"],
+            [sys.executable, "-c", f"from {__name__} import serve_engine; serve_engine({far.fileno()})"],
             env=os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)},
             pass_fds=[far.fileno()],
             stdin=subprocess.PIPE,  # ends when we do
@@ -162,7 +162,7 @@ class EngineProcess:
         return answer if isinstance(answer, About) else About(name, missing=f"{name} {answer}")
 
     def _answer(self, limit: float) -> Any:
-        """What the process sends, or in words why it doesn't."""
+        """What the process sends within `limit` s, or in words why it doesn't."""
         try:
             if self._pipe.poll(limit):
                 return self._pipe.recv()
@@ -226,7 +226,7 @@ def _load(given: Any) -> tuple[Any, About]:
             engine = getattr(engine, member) if member else engine
         except Exception as error:  # whatever a module or a broken package does when it is imported
             works = f" ({text})" if (text := _version(given, None)) else ""
-            raise InputError(f"{type(error).__name__}: {_line(error)}{works}") from error
+            raise InputError(f"{type(error).__name__}: {_one_line(error)}{works}") from error
     name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
     lacking = [function for function in FUNCTIONS if not callable(getattr(engine, function, None))]
     if lacking:
@@ -247,7 +247,7 @@ def _load(given: Any) -> tuple[Any, About]:
 
 
 def _version(given: Any, engine: Any) -> str:
-    """The version of an engine's package, and the one with which it is known to work if that is another."""
+    """The version of an engine's package, and that with which it is known to work if that is another, as text."""
     _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
     listed = (adapters.KNOWN.get(own) or adapters.KNOWN.get(own.partition(":")[0], "")) if ours else ""
     package, _, known = getattr(engine, "KNOWN", listed).partition(" ")
@@ -255,21 +255,21 @@ def _version(given: Any, engine: Any) -> str:
     return f"{package} {here}".strip() + (f", known to work: {known}" if known and here != known else "")
 
 
-def _line(error: Exception) -> str:
+def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())[:200]
 
 
-def serve(handle: int) -> None:
-    """The process: an engine and then cases come in, what the engine makes of them goes out.
+def serve_engine(handle: int) -> None:
+    """Run in the process of an engine: receive the engine, then cases; send the states that it makes of each.
 
-    It ends with the one that started it.
+    It ends with the process that started it.
     """
 
-    def follow() -> None:
+    def end_with_parent() -> None:
         sys.stdin.read()
         os._exit(1)
 
-    threading.Thread(target=follow, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     pipe = Connection(handle)
     try:
         adapter, about = _load(pipe.recv())
@@ -310,5 +310,5 @@ def _attempt(engine: Any, case: Case, step: float) -> Any:
     except NotImplementedError as error:
         return NotImplementedError(str(error))
     except Exception as error:  # whatever an engine throws loses the case alone
-        return None, math.nan, f"{type(error).__name__}: {_line(error)}"
+        return None, math.nan, f"{type(error).__name__}: {_one_line(error)}"
     return states, spent / float(case.times[-1]), ""

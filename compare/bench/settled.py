@@ -40,7 +40,7 @@ class UnsettledError(RuntimeError):
 
 @dataclass(frozen=True)
 class Rest:
-    """What a model has come to; bodies in words."""
+    """What a model has settled to; bodies in words."""
 
     steady: bool
     """Whether no speed changes any more but by little."""
@@ -109,7 +109,7 @@ def with_control(control: Control | None, step: Advance = mujoco.mj_step) -> Adv
 
 
 def awake(model: Any) -> Any:
-    """The model, or a copy in which nothing sleeps."""
+    """The model, or a copy of it in which MuJoCo puts no body to sleep."""
     sleep = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     if model.opt.enableflags & sleep:
         model = copy.copy(model)
@@ -136,7 +136,7 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
         restless = (change > np.minimum(RESTLESS * speed, JOLT) + NOISE) | (turned > TURNING)
         restless[0] = False  # the world
         calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0  # a speed may pass through a maximum
-    moving = {int(b): f"{_body(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
+    moving = {int(b): f"{_body_name(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
     steady = bool((change <= STEADY * speed + NOISE).all())
     return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(_asleep(sleepy, model, data, step)))
 
@@ -156,7 +156,7 @@ def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
         sunk = (data.subtree_com[root] - first.subtree_com[root]) @ gravity / (np.hypot.reduce(gravity) or 1)
         if bent[own].max() > BENT and sunk > SUNK * size:
             by = f"joint {joint.name or joint.id!r} by {bent[own].max():.2g} rad"
-            yield f"{_body(model, root)} by {sunk:.2g} m, its {by}"
+            yield f"{_body_name(model, root)} by {sunk:.2g} m, its {by}"
 
 
 def _asleep(sleepy: Any, model: Any, data: Any, step: Advance) -> Iterator[str]:
@@ -165,7 +165,7 @@ def _asleep(sleepy: Any, model: Any, data: Any, step: Advance) -> Iterator[str]:
         state = copy.copy(data)
         step(sleepy, state, 2 * mujoco.mjMINAWAKE)
         for tree in np.flatnonzero(state.tree_asleep >= 0):
-            yield _body(model, int(np.flatnonzero(model.body_treeid == tree)[0]))
+            yield _body_name(model, int(np.flatnonzero(model.body_treeid == tree)[0]))
 
 
 def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array:
@@ -178,7 +178,7 @@ def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) 
     steps = max(WINDOW_STEPS, math.ceil(time / model.opt.timestep))
     step(model, data, steps)
     if bad := [each for each in (data.warning[kind] for kind in BAD) if each.number]:
-        body = _body(model, model.dof_bodyid[min(bad[0].lastinfo, model.nv - 1)])
+        body = _body_name(model, model.dof_bodyid[min(bad[0].lastinfo, model.nv - 1)])
         raise UnsettledError(f"the model diverges before {begin + steps * model.opt.timestep:.3g} s, {body} first")
     mujoco.mj_forward(model, data)
     turn = data.xmat.reshape(-1, 3, 3) @ axes.transpose(0, 2, 1)
@@ -195,13 +195,13 @@ def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
     for _ in range(WINDOW_STEPS):
         step(model, data, 1)
         mujoco.mj_forward(model, data)
-        if len(loads(model, data)) > most:
-            most, best = len(loads(model, data)), copy.copy(data)
+        if len(loads_by_pair(model, data)) > most:
+            most, best = len(loads_by_pair(model, data)), copy.copy(data)
     if most:
         mujoco.mj_copyData(data, model, best)
 
 
-def loads(model: Any, data: Any) -> dict[tuple[int, int], Array]:
+def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
     """What each pair of geoms bears, summed over its contacts: load, N, depth, m, number, and friction (3), N."""
     found: dict[tuple[int, int], Array] = {}
     force = np.zeros(6)
@@ -213,13 +213,13 @@ def loads(model: Any, data: Any) -> dict[tuple[int, int], Array]:
     return found
 
 
-def noting_loads(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
-    """A law of stepping that notes what pairs of geoms bear in each step."""
+def recording_loads(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
+    """A law of stepping that appends what pairs of geoms bear in each step to `history`."""
 
     def one_by_one(model: Any, data: Any, nstep: int) -> None:
         for _ in range(nstep):
             step(model, data, 1)
-            history.append(loads(model, data))
+            history.append(loads_by_pair(model, data))
 
     return one_by_one
 
@@ -248,7 +248,7 @@ def radii(model: Any) -> Array:
     return np.where(radius > 0, radius, np.inf)
 
 
-def _body(model: Any, body: int) -> str:
+def _body_name(model: Any, body: int) -> str:
     name = model.body(body).name
     return f"body {name!r}" if name else f"body {int(body)}"
 

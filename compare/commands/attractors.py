@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def attractor_data(of: Attractor) -> dict[str, Any]:
-    """An attractor as data, SI."""
+    """An attractor as JSON-able data, SI."""
     fate, run, orbit = of.fate, of.run, of.fate.orbit
     states = {"mean": orbit.mean if orbit else run.x.mean(axis=0), "low": run.x.min(axis=0), "high": run.x.max(axis=0)}
     # Those of a period, or those of the last window in the order in which they first come up.
@@ -84,7 +84,7 @@ def attractor_data(of: Attractor) -> dict[str, Any]:
 
 
 def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
-    """A branch as data, SI; each place with the orbit there or nearest to it."""
+    """A branch of orbits as JSON-able data, SI; each bifurcation with the orbit there or nearest to it."""
 
     def data(orbit: Orbit) -> dict[str, Any]:
         return {
@@ -150,8 +150,8 @@ def _largest(row: dict[str, Any]) -> float:
     return max((abs(complex(*each)) for each in row["multipliers"]), default=float("nan"))
 
 
-def plane(args: argparse.Namespace) -> int:
-    """Map the basins and show their shares."""
+def run_basins(args: argparse.Namespace) -> int:
+    """Map the basins of attraction over a plane of starts, and show their shares."""
     p, start = options.parameters(args), running.start(args)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))

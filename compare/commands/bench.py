@@ -24,8 +24,8 @@ LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
 
 
-def ranked(args: argparse.Namespace) -> int:
-    """Measure, show the table, write JSON and page."""
+def run_league(args: argparse.Namespace) -> int:
+    """Run engines on the exact cases, show the table, write JSON and page."""
     from compare.bench import league, native  # here and below, because a list of the cases waits for no engine
     from compare.kit import progress
     from compare.kit.pictures import embedded, svg
@@ -44,12 +44,12 @@ def ranked(args: argparse.Namespace) -> int:
         raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")
     data = league.to_mapping(found)
     write_text(args.output / LEAGUE_JSON, json.dumps(data, indent=1))
-    summary, rows, columns = league.summary(found), league.rows(found), enumerate(league.tried(found).values(), 1)
+    summary, rows, columns = league.summary(found), league.rows(found), enumerate(league.ranked(found).values(), 1)
     shown = {
         "summary": summary,
         "rows": rows,
         "failed": {(r.case, k) for k, results in columns for r in results if not (r.skipped or r.passed)},
-        "about": league.about(found),
+        "about": league.declarations(found),
         "notes": list(league.notes(found)),
         "caption": league.CAPTION,
         "least": f"{league.LEAST:g}",
@@ -69,7 +69,7 @@ def ranked(args: argparse.Namespace) -> int:
     return 0
 
 
-def foretold(args: argparse.Namespace) -> int:
+def run_forecast(args: argparse.Namespace) -> int:
     """Settle the model, print the forecast, and check the limits."""
     import mujoco
     from rich.text import Text
@@ -85,7 +85,7 @@ def foretold(args: argparse.Namespace) -> int:
         found = forecast.forecast(model, data, settled.settle(model, data, args.settle), **good)
         after = held = None
         if args.tries:
-            found, after, held = forecast.tried(model, data, found, args.settle, **good)
+            found, after, held = forecast.follow_advice(model, data, found, args.settle, **good)
     except settled.UnsettledError as error:
         print(f"dualball: {args.file}: {error}", file=sys.stderr)
         return 1
@@ -94,8 +94,8 @@ def foretold(args: argparse.Namespace) -> int:
     if args.output:
         write_text(args.output, forecast_page.html(found, after, held, args.file.name))
     shown: list[Any] = [Text(f"• {line}") for line in forecast_page.sentences(found)]
-    shown += [Text(f"\n{text}") for _, text in forecast_page.paste(found)]
-    tables = forecast_page.tables(found) + forecast_page.again(found, after, held)
+    shown += [Text(f"\n{text}") for _, text in forecast_page.snippets(found)]
+    tables = forecast_page.tables(found) + forecast_page.tables_after(found, after, held)
     shown += [Text(""), *(pages.table(title, rows, **LOOK) for title, rows in tables)]
     options.show({"before": found, "after": after, "held": held}, args.json, *shown)
     said = [f"{args.file}: {found.unsettled}"] if found.unsettled else []
@@ -109,8 +109,8 @@ def foretold(args: argparse.Namespace) -> int:
     return int(bool(said))
 
 
-def listed(args: argparse.Namespace) -> int:
-    """List the cases, show one, or write all."""
+def run_cases(args: argparse.Namespace) -> int:
+    """List the exact cases, show one, or write all."""
     if not (args.name or args.json or args.output):  # as a file has them, since the cases are simulated
         known = json.loads((resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8"))
         options.show(None, False, _table(known["version"], known["cases"]))

@@ -38,7 +38,7 @@ def program() -> NoReturn:
         # MuJoCo would load a window library, by way of a Python of its own; `render` draws by what was chosen.
         os.environ["DUALBALL_GL"] = os.environ.get("MUJOCO_GL", "")
         os.environ["MUJOCO_GL"] = "disable"
-    with signals.answered(signals.end):
+    with signals.on_first_signal(signals.end):
         try:
             code = main()
         except SystemExit as done:  # as of --help
@@ -51,7 +51,7 @@ def program() -> NoReturn:
 
 
 def _flushed(code: int) -> int:
-    """The exit code, once what was printed has arrived, or if nobody wants to read it, as with `| head`."""
+    """Flush what was printed, unless nobody reads it, as with `| head`; return the exit code."""
     try:
         sys.stdout.flush()
     except OSError as error:

@@ -65,16 +65,16 @@ class Parser(argparse.ArgumentParser):
         for action in (each for each in self._actions if isinstance(each.type, Output)):
             output: Path | None = getattr(found, action.dest, None)
             others = (value for name, value in vars(found).items() if name != action.dest)
-            if output and any(_same(output, path) for path in _files(others)):
+            if output and any(_same(output, path) for path in _named_files(others)):
                 self.error(f"argument {'/'.join(action.option_strings)}: {str(output)!r} is read and would be lost")
         return found, rest
 
 
-def _files(values: Iterable[Any]) -> Iterator[Path]:
+def _named_files(values: Iterable[Any]) -> Iterator[Path]:
     """Files that arguments may name; one run of a batch is named like a file in it."""
     for value in values:
         if isinstance(value, list):
-            yield from _files(value)
+            yield from _named_files(value)
         elif isinstance(value, str | Path):
             yield from (Path(value), Path(value).parent)
 
@@ -158,7 +158,7 @@ ENDINGS = {suffix for each in (HDF5, MARKDOWN, PAGE, MAP, FILM) for suffix in ea
 
 
 def results(text: str) -> Path:
-    """A directory to be filled, for argparse; a name that promises a file is refused."""
+    """The path of a directory to write to, for argparse; a name that ends like that of a file is refused."""
     if Path(text).suffix.lower() in ENDINGS and not Path(text).is_dir():
         raise argparse.ArgumentTypeError(f"{text!r} would be a directory, but its name is that of a file")
     return Path(text)
@@ -209,7 +209,7 @@ class Help(argparse.HelpFormatter):
 
 
 def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
-    """The set that was asked for, by its name; nothing if none was."""
+    """The parameter set that --set or --parameters names, by its name; {} if neither is given."""
     if args.parameters:
         return {args.parameters.stem: Parameters.load(args.parameters)}
     return {args.set: Parameters.named(args.set)} if args.set else {}
@@ -385,13 +385,13 @@ def parameters(args: argparse.Namespace) -> Parameters:
         if getattr(args, f"{PREFIX}{name}", None) is not None:
             raise InputError(f"--{name.replace('_', '-')} has no effect: {name} is varied")
     chosen = Parameters.load(args.parameters) if args.parameters else Parameters.named(args.set)
-    p = chosen.replace(**given(args, [field.name for field in dataclasses.fields(Parameters)], PREFIX))
+    p = chosen.replace(**given_options(args, [field.name for field in dataclasses.fields(Parameters)], PREFIX))
     if max(p.r, p.R) > _LARGE:
         print(f"dualball: warning: r = {p.r:g} m, R = {p.R:g} m: were millimetres meant?", file=sys.stderr)
     return p
 
 
-def given(args: argparse.Namespace, names: Iterable[str], prefix: str = "") -> dict[str, Any]:
+def given_options(args: argparse.Namespace, names: Iterable[str], prefix: str = "") -> dict[str, Any]:
     """The options of these names that were given, with their values."""
     values = {name: getattr(args, prefix + name) for name in names}
     return {name: value for name, value in values.items() if value is not None}

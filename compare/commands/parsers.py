@@ -82,7 +82,7 @@ def figures(parser: Parser) -> None:
     parser.excludes("--results", "--parameters", "--set")  # it shows what was measured, they what theory says of a set
 
 
-@command("the ball", "predict.catalogue", "--set steel-in-water")
+@command("the ball", "predict.show_parameters", "--set steel-in-water")
 def parameters(parser: Parser) -> None:
     """The parameters of the ball that commands take, their units and ranges; the sets."""
     options.add_parameters(parser)
@@ -132,7 +132,7 @@ def compare(parser: Parser) -> None:
     options.add_json(parser)
 
 
-@command("the ball", "simulate.grid", "--vary omega_0=10:30:21")
+@command("the ball", "simulate.run_sweep", "--vary omega_0=10:30:21")
 def sweep(parser: Parser) -> None:
     """Many runs over ranges of parameters, resumable."""
     options.add_parameters(parser)
@@ -183,7 +183,7 @@ def attractors(parser: Parser) -> None:
     parser.excludes("--start", "--random", "--seed")
 
 
-@command("the ball", "attractors.plane", "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21")
+@command("the ball", "attractors.run_basins", "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21")
 def basins(parser: Parser) -> None:
     """What becomes of the ball from each start of a plane of states; what MuJoCo has run is kept."""
     options.add_parameters(parser)
@@ -239,7 +239,7 @@ def explore(parser: Parser) -> None:
     parser.add_argument("--no-browser", action="store_true", help="open none")
 
 
-@command("contacts and engines", "bench.foretold", "scene.xml --try")
+@command("contacts and engines", "bench.run_forecast", "scene.xml --try")
 def forecast(parser: Parser) -> None:
     """What the contacts of a MuJoCo model will do: depth, creep, hovering, largest step."""
     parser.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
@@ -256,7 +256,7 @@ def forecast(parser: Parser) -> None:
     options.add_json(parser)
 
 
-@command("contacts and engines", "bench.listed", "-o cases")
+@command("contacts and engines", "bench.run_cases", "-o cases")
 def cases(parser: Parser) -> None:
     """The exact contact cases: listed, shown, or as files for engines in any language."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="show this case")
@@ -265,7 +265,7 @@ def cases(parser: Parser) -> None:
     options.add_json(parser)
 
 
-@command("contacts and engines", "bench.ranked", "--quick")
+@command("contacts and engines", "bench.run_league", "--quick")
 def league(parser: Parser) -> None:
     """All installed engines on the exact cases, as they come and in the best settings known."""
     parser.add_argument("--quick", action="store_true", help="one time step")

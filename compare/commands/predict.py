@@ -25,7 +25,7 @@ from model.drag import LAWS, REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES
 
 
-def catalogue(args: argparse.Namespace) -> int:
+def show_parameters(args: argparse.Namespace) -> int:
     """Show every parameter, with its value in the set that was asked for, and the names of all sets."""
     p, rows = options.parameters(args), []
     for field in Parameters.quantities():
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def described(p: Parameters) -> dict[str, Any]:
-    """Everything as plain data; what doesn't exist is nan."""
+    """All that theory predicts of a set, as plain data; what doesn't exist is nan."""
     limit, solutions = analytic.operating_limit(p), []
     for s in analytic.stationary_solutions(p):
         Re = drag.reynolds_of(s.state, p)

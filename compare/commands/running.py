@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from compare.commands.options import given
+from compare.commands.options import given_options
 from compare.kit import engines, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import AnySettings
@@ -38,7 +38,7 @@ def flow(args: argparse.Namespace) -> Flow | None:
 def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
     """Settings of the engine that the options of `add_engine` choose, for a ball."""
     chosen: engines.Engine = args.engine
-    return chosen.configured(given(args, ("timestep", "rtol", "restitution")), p)
+    return chosen.configured(given_options(args, ("timestep", "rtol", "restitution")), p)
 
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:

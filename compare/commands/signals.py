@@ -29,8 +29,8 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def answered(answer: Callable[[int, FrameType | None], object]) -> Iterator[Callable[[], None]]:
-    """The first signal calls a function with its number and what it broke into, the next ones do what they did before.
+def on_first_signal(answer: Callable[[int, FrameType | None], object]) -> Iterator[Callable[[], None]]:
+    """A context in which the first signal calls `answer` with its number and frame; later ones act as they did before.
 
     Yields how to listen again. Signals that are ignored stay so, as in what a shell runs in the background; and all in
     a thread, which gets none.
@@ -59,14 +59,14 @@ def answered(answer: Callable[[int, FrameType | None], object]) -> Iterator[Call
 
 @contextmanager
 def noted() -> Iterator[list[int]]:
-    """The first signal is but noted in what is yielded. What goes on for seconds, as a compiler does, gets it again."""
+    """A context in which the first signal is only appended to the yielded list; it is sent again after some seconds."""
     heard, sent = list[int](), list[threading.Timer]()
 
     def note(number: int, frame: FrameType | None) -> None:
         heard.append(number)
-        sent.append(_again(number, _PATIENCE))
+        sent.append(_send_later(number, _PATIENCE))
 
-    with answered(note):
+    with on_first_signal(note):
         try:
             yield heard
         finally:
@@ -74,7 +74,7 @@ def noted() -> Iterator[list[int]]:
                 each.cancel()
 
 
-def _again(number: int, seconds: float) -> threading.Timer:
+def _send_later(number: int, seconds: float) -> threading.Timer:
     """Send a signal a little later."""
     timer = threading.Timer(seconds, os.kill, (os.getpid(), number))
     timer.daemon = True
@@ -84,7 +84,7 @@ def _again(number: int, seconds: float) -> threading.Timer:
 
 @contextmanager
 def raised() -> Iterator[None]:
-    """The first signal raises `Interrupted`, also where a library makes another error of it.
+    """A context in which the first signal raises `Interrupted`, also where a library makes another error of it.
 
     It comes again a little later while something is imported, since half an import would spoil the next ones; and where
     Python lost what it raised, as when an object ends.
@@ -93,7 +93,7 @@ def raised() -> Iterator[None]:
 
     def later(number: int) -> None:
         listen()
-        _again(number, 0.01)
+        _send_later(number, 0.01)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if _imports(frame) and len(waits) < _WAITS:
@@ -110,7 +110,7 @@ def raised() -> Iterator[None]:
             usual(what)
 
     try:
-        with answered(interrupt) as listen:
+        with on_first_signal(interrupt) as listen:
             sys.unraisablehook = lost
             yield
     except Exception as error:
@@ -122,7 +122,7 @@ def raised() -> Iterator[None]:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether what runs is part of an import."""
+    """Whether a frame runs within an import."""
     while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
         frame = frame.f_back
     return frame is not None

@@ -25,7 +25,7 @@ DURATION = 10.0
 def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
     if args.view:
-        return live(args)
+        return open_viewer(args)
     args.time = args.time or DURATION
     task = running.task(args, options.parameters(args), flow=running.flow(args))
     # The first signal ends the run with its samples, the second without.
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         return 128 + heard[0] if heard else 1 if failure else 0
 
 
-def live(args: argparse.Namespace) -> int:
+def open_viewer(args: argparse.Namespace) -> int:
     """Open the viewer."""
     from compare.view import viewer  # here, because nothing else needs it
 
@@ -58,7 +58,7 @@ def live(args: argparse.Namespace) -> int:
     return 0
 
 
-def grid(args: argparse.Namespace) -> int:
+def run_sweep(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
     p, axes = options.parameters(args), sweep.Axis.several(args.vary)
     if args.direction != "held":
@@ -70,7 +70,7 @@ def grid(args: argparse.Namespace) -> int:
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
     how: dict[str, Any] = {"looked_at": False, "save": collection.save_means if args.means_only else storage.save_batch}
     with running.campaign(args, "sweep", batch=args.batch, **how) as work:
-        _keep_apart(args, p)
+        _check_no_other_sweep(args, p)
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
     if args.json:
@@ -84,7 +84,7 @@ def grid(args: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
-def _keep_apart(args: argparse.Namespace, p: Parameters) -> None:
+def _check_no_other_sweep(args: argparse.Namespace, p: Parameters) -> None:
     """Raise `InputError` if the directory holds another sweep, with which `collect` would mix this one."""
     names = ("vary", "random", "seed", "direction", "start", "time", "timestep", "rtol", "restitution",
              "sample_interval", "means_only")  # fmt: skip

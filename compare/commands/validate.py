@@ -107,7 +107,7 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
 
 
 def checks(verdict: Verdict) -> Table:
-    """Every number of one claim."""
+    """A table of every measured number of a claim beside its prediction."""
     rows = [["set", "ω₀ (rad/s)", "quantity", "predicted", "measured", "deviation", "tolerance", "", "with"]]
     for check in verdict.checks:
         m = check.measurement

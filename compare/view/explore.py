@@ -24,7 +24,7 @@ from scipy.ndimage import distance_transform_edt
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
-from compare.branches import ends, slipping_curve
+from compare.branches import slipping_curve, stable_ends
 from compare.kit.pages import typeset
 from compare.kit.style import COLOURS
 from compare.subjects.thresholds.figures import TINTS
@@ -75,7 +75,7 @@ def changed(p: Parameters, name: str, value: float | str) -> Parameters:
 
 def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     """omega_c of stationary solutions over omega_0, the thresholds, where the ball starts; a click anywhere counts."""
-    t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, ends(p)
+    t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, stable_ends(p)
     lines: list[tuple[str, Case, Any, Any, str]] = []
     if np.isfinite(rolls):
         lines.append(("RR", Case.RR, [0, min(rolls, fastest)], [0, min(rolls, fastest)], "solid"))

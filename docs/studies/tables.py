@@ -127,7 +127,7 @@ LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
     "league": lambda campaign: league.summary(_league(campaign.directory)),
     "league-best": lambda campaign: _errors(False, campaign.directory),
     "league-defaults": lambda campaign: _errors(True, campaign.directory),
-    "league-about": lambda campaign: league.about(_league(campaign.directory)),
+    "league-about": lambda campaign: league.declarations(_league(campaign.directory)),
 }
 VERDICTS = {"witnesses": TABLES["witnesses"]}
 PAGES = {

@@ -190,7 +190,7 @@ ADVISED = [name for name in SCENES | DEEP if name != "slope, noslip"]
 @pytest.mark.parametrize("scene", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in ADVISED])
 def test_advice_does_what_it_says(scene):
     model, data, found = settled((SCENES | DEEP)[scene])
-    found, after, held = forecast.tried(model, data, found, 10.0)
+    found, after, held = forecast.follow_advice(model, data, found, 10.0)
     assert after
     change = found.change
     assert change

@@ -16,7 +16,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import Bifurcation, OrbitBranch
-from compare.branches import Drawn, check_thresholds, going_round, lifted, slipping, spin
+from compare.branches import Drawn, check_thresholds, round_with_fluid, slipping, spin, spin_off_floor
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError
 from compare.subjects.attractors.basins import FATES, Basins
@@ -91,9 +91,9 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             end = analytic.solution(fast, Case.SS, stable=stable).state
             height = float(quantity(end.slip_x, end.omega_c))
             style.beside(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
-        slip_x, flows = going_round(p, Case.NR, edge, top)
+        slip_x, flows = round_with_fluid(p, Case.NR, edge, top)
         style.curve(axes, (Case.SR, Case.NR), flows, quantity(slip_x, flows), ("SR, NR", (0.6, rides)))
-        slip_x, flows = going_round(p, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge)
+        slip_x, flows = round_with_fluid(p, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge)
         style.curve(axes, Case.NS, flows, quantity(slip_x, flows), ("NS", (0.5, (-3, 9))))
         cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
         mean = quantity(means.slip_x, means.omega_c)
@@ -109,7 +109,7 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
         axes.set(xlim=(LOWEST_FLOW * edge, top), xlabel=style.OMEGA_0)
         style.guides(axes, {"omega_02": edge})
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * top))
-    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
+    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * spin_off_floor(edge, p)))
     style.points(orbit, of.states)
     style.legend(orbit, loc="center right")
     factors = np.abs([each.multipliers[0] for each in branch.orbits])

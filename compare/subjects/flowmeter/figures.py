@@ -13,7 +13,7 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter.design import THRESHOLDS, Design
 from analytic.simulation import simulator
-from compare.branches import check_thresholds, ends, fold_state, slipping
+from compare.branches import check_thresholds, fold_state, slipping, stable_ends
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, Motion, only_where
 from compare.kit.engines import EVENT
@@ -132,7 +132,7 @@ def top_flow(p: Parameters) -> float:
 
 def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     """All solutions up to the fastest flow, but for unstable SR; the thresholds. For eta > j all are on one line."""
-    t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, ends(p)
+    t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, stable_ends(p)
     spans: list[tuple[tuple[Case, ...], tuple[float, float], float]] = [
         ((Case.RR,), (0.0, rolls if folds else t.omega_02), 0.45),
         ((Case.SR, Case.NR), (rides, fastest), 0.7),

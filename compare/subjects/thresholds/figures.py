@@ -20,7 +20,7 @@ from scipy import ndimage
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
-from compare.branches import check_thresholds, fold_state, going_round, lifted, slipping, spin
+from compare.branches import check_thresholds, fold_state, round_with_fluid, slipping, spin, spin_off_floor
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, only_where
 from compare.kit.record import Check
@@ -200,7 +200,7 @@ def _round(
     line: Line = STABLE,
 ) -> None:
     """A branch on which the ball goes round with the fluid, from one flow to another."""
-    slip_x, flows = going_round(p, case, *span)
+    slip_x, flows = round_with_fluid(p, case, *span)
     style.curve(axes, case, flows, spin(p, slip_x, flows), name, line)
 
 
@@ -215,7 +215,7 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
         guides = {"omega_02": t.omega_02}
         draw(Case.NS, (1e-3 * t.omega_02, (1 - 1e-9) * t.omega_02), ("NS", (0.35, (-4, 6))))
         draw(Case.NR, (t.omega_02, top), ("NR", (0.5, (4, 6))))
-        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "P2", (0, 8))
+        style.mark(axes, t.omega_02, spin_off_floor(t.omega_02, p), "P2", (0, 8))
     elif of.figure == "fig-10":
         del guides["omega_03"]
         top = 1.25 * t.omega_04
@@ -223,7 +223,7 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
         slipping(axes, p, partial(spin, p), (0.5, (0, -7)), (0.4, (6, 6)))
         draw(Case.SR, (t.omega_02, top), ("SR", (0.85, (-5, -5))))
         style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
-        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-4, -6))
+        style.mark(axes, t.omega_02, spin_off_floor(t.omega_02, p), "NF2", (-4, -6))
         style.mark(axes, t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
     elif of.figure == "fig-11":
         guides = {"omega_02": t.omega_02, "omega_03": t.omega_03}
@@ -232,7 +232,7 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
         draw(Case.SR, (t.omega_02, t.omega_03), ("SR, unstable", (0.02, (9, 3))), UNSTABLE)
         draw(Case.SR, (t.omega_03, top), ("SR", (0.5, (4, 6))))
         for w in (t.omega_02, t.omega_03):
-            axes.plot([w], [lifted(w, p)], **style.POINT)
+            axes.plot([w], [spin_off_floor(w, p)], **style.POINT)
     else:
         curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
         guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
@@ -245,7 +245,7 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
         draw(Case.SR, (t.omega_03, top), ("SR", (0.35, (-5, -5))))
         style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
         style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (7, 0))
-        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
+        style.mark(axes, t.omega_02, spin_off_floor(t.omega_02, p), "NF2", (-6, 4))
         style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
         for s in slipping_branch.hopf_places(p):
             x, omega_0 = slipping_branch.states(s, p)

@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import pulsation, response
-from compare.branches import check_thresholds, ends, slipping
+from compare.branches import check_thresholds, slipping, stable_ends
 from compare.kit import style
 from compare.kit.drawing import Drawing, Evidence, GapError, Motion, only_where
 from compare.kit.record import Measurement
@@ -49,7 +49,7 @@ class Measurements:
     @property
     def mean(self) -> Parameters:
         """The set, with the mean flow of the pulsations."""
-        usual = self.p.replace(omega_0=ROLLS_AT * ends(self.p)[0])
+        usual = self.p.replace(omega_0=ROLLS_AT * stable_ends(self.p)[0])
         return next((m.parameters for m in self.of("gain")), usual)
 
     @property
@@ -76,7 +76,7 @@ def of_set(p: Parameters, figure: str) -> Measurements:
     if figure == "unsteady":
         only_where(p, folds=True)
         check_thresholds(p)
-    elif not 0 < ends(p)[0] < math.inf:
+    elif not 0 < stable_ends(p)[0] < math.inf:
         raise GapError("there is no flow at which two-point rolling ends")
     return Measurements(p=p)
 
