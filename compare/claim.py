@@ -49,12 +49,12 @@ class Text(StrEnum):
 
 
 def given(**conditions: Condition) -> When:
-    """Chooses the measurements that were made under these conditions."""
+    """A filter of measurements: whether one was made under these conditions."""
     return lambda m: conditions.items() <= m.conditions.items()
 
 
-def every(*whens: When) -> When:
-    """True where all conditions hold."""
+def all_of(*whens: When) -> When:
+    """A filter of measurements: whether one passes all of these filters."""
     return lambda m: all(when(m) for when in whens)
 
 
@@ -79,7 +79,7 @@ class Bearing:
 
     @property
     def number(self) -> bool:
-        """Whether it predicts a number, and not a case, a count, or on which side of a bound something is."""
+        """Whether it predicts a number rather than a case, a count, or on which side of a bound something is."""
         return quantity(self.quantity).resolves > 0 and self.relation is Relation.EQUAL
 
 
@@ -119,12 +119,12 @@ class Claim:
 def bearings(
     protocol: str, quantities: Iterable[str], predict: Callable[[Measurement], Prediction], **more: Any
 ) -> tuple[Bearing, ...]:
-    """Bearings of several quantities that one function predicts."""
+    """A `Bearing` for each of several quantities of one protocol, all predicted by one function."""
     return tuple(Bearing(protocol, quantity, predict, **more) for quantity in quantities)
 
 
 def claim(id: str, source: str, statement: str, *bearings: Bearing, **more: Any) -> Claim:
-    """A claim on which measurements bear, and what more there is to say of it."""
+    """A claim with the bearings of the measurements that bear on it; `more` are other fields of `Claim`."""
     return Claim(id, source, statement, bearings, **more)
 
 

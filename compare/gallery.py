@@ -118,12 +118,12 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
 
 
 def of_set(p: Parameters) -> Selected:
-    """What the figures show of one set that theory alone can draw."""
+    """Of each figure that theory alone can draw the function that selects its data for a set."""
     return {name: partial(each.of_set, p) for name, each in FIGURES.items() if each.of_set}
 
 
 def of_results(evidence: Evidence) -> Selected:
-    """What every figure selects from results."""
+    """Of each figure the function that selects its data from results."""
     return {name: partial(each.select, evidence) for name, each in FIGURES.items()}
 
 
@@ -154,7 +154,7 @@ def write(output: Path, selected: Selected, formats: Sequence[str] = ("svg",)) -
 def pictures(
     evidence: Evidence, drawings: Mapping[str, Drawing], spread: Spread = map
 ) -> tuple[dict[str, dict[str, str]], str]:
-    """Of each figure by its name what a page shows, a picture with its caption, or why there is none; and all letters.
+    """For a page: each figure's picture and caption, or why there is none, by name; and the letters that they share.
 
     Each is drawn once, by `spread`, a `map`, and kept in `PICTURES` of the results with a hash of all that it shows.
     """
@@ -193,7 +193,7 @@ def kept(path: Path, drawing: Drawing, data: Any) -> dict[str, str] | None:
 
 
 def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
-    """The same of a picture that is drawn and written into the file, where it describes itself by the caption.
+    """Draw a figure and write it to its SVG file, with its caption as description: picture and caption.
 
     Where it can't be drawn or written, the reason as a "gap".
     """
@@ -210,5 +210,6 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
 
 
 def _mark(drawing: Drawing, data: Any) -> str:
+    """A comment at the end of an SVG file with a hash of the program and the data that it was made from."""
     made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources("model", "analytic", "compare")])
     return f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"

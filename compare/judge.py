@@ -47,7 +47,7 @@ def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
 def simulated(
     p: Parameters, x: tuple[float, ...], t_end: float, samples: int = 1, flow: Flow | None = None, rtol: float = RTOL
 ) -> Trajectory:
-    """The motion of theory from a state, with so many samples after the first."""
+    """The motion from a state x by event-driven simulation, with so many samples after the first; computed once."""
     return theory(analytic.simulate, p, x, t_end, flow, sample_interval=t_end / samples, rtol=rtol)
 
 
@@ -58,7 +58,7 @@ def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
 
 
 def forget() -> None:
-    """Forget all predictions."""
+    """Empty the cache of predictions."""
     _computed.cache_clear()
 
 
@@ -82,29 +82,29 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
     if not checks and not missing and (known := {m.protocol for m in records.measurements} & claim.protocols):
         missing = tuple(Missing(name, "all sets", "no number bears on the claim", 0) for name in sorted(known))
-    return Verdict(claim=claim, outcome=outcome(claim, checks, rows(checks)), checks=checks, missing=missing)
+    return Verdict(claim=claim, outcome=outcome(claim, checks, per_bearing(checks)), checks=checks, missing=missing)
 
 
 def outcome(claim: Claim, checks: Sequence[Check], wanted: Counter[int]) -> Outcome:
     """What checks come to, see `verdict`, of so many as are wanted of each bearing."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
-    if lacking(checks, wanted):
+    if undecided_bearings(checks, wanted):
         return Outcome.INCONCLUSIVE
     numbers = {n for n, bearing in enumerate(claim.bearings) if bearing.number}
-    if not checks or (numbers and numbers.isdisjoint(rows(checks))):
+    if not checks or (numbers and numbers.isdisjoint(per_bearing(checks))):
         return Outcome.NOT_RUN
     return Outcome.CONFIRMED
 
 
-def rows(checks: Iterable[Check]) -> Counter[int]:
+def per_bearing(checks: Iterable[Check]) -> Counter[int]:
     """How many checks there are of each bearing, by its number."""
     return Counter(check.bearing for check in checks)
 
 
-def lacking(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
+def undecided_bearings(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
     """Bearings of which fewer than half of the checks that are wanted can tell, and how many can."""
-    told = rows(check for check in checks if check.conclusive)
+    told = per_bearing(check for check in checks if check.conclusive)
     return {n: told[n] for n, count in wanted.items() if 2 * told[n] < count}
 
 

@@ -39,7 +39,7 @@ def characteristic(p: Parameters, axes: Axes | None = None, *, fastest: float | 
 
     Dotted: the thresholds (84) to (88). Raises `InputError` where a set has none, as without drag.
     """
-    axes = _or_new(axes)
+    axes = _given_or_new(axes)
     flowmeter.theory(axes, p, fastest or flowmeter.top_flow(p))
     axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     return axes
@@ -50,7 +50,7 @@ def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> 
 
     As Figs. 7 and 8 of the paper, with the other parameters of the set.
     """
-    axes = _or_new(axes)
+    axes = _given_or_new(axes)
     thresholds.regions(axes, p, equal)
     style.legend(axes, loc="upper right")
     return axes
@@ -83,7 +83,7 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
     units = {UNITS[name]: name for name in names}
     if len(units) > 1:
         raise InputError(f"{' and '.join(units.values())} have different units: {', '.join(units)}")
-    axes, time, case = _or_new(axes), np.asarray(run.time), np.asarray(run.case)
+    axes, time, case = _given_or_new(axes), np.asarray(run.time), np.asarray(run.case)
     for name in names:
         axes.plot(time, component(run, name), label=style.symbol(name))
     begins = np.flatnonzero(np.diff(case, prepend=-1))
@@ -101,10 +101,11 @@ def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
 
     Raises `StorageError` for a file that isn't one.
     """
-    axes = _or_new(axes)
+    axes = _given_or_new(axes)
     attractors.fill_basins(axes, of if isinstance(of, Basins) else Basins.load(of))
     return axes
 
 
-def _or_new(axes: Axes | None) -> Axes:
+def _given_or_new(axes: Axes | None) -> Axes:
+    """The given axes, or those of a new figure."""
     return axes if axes is not None else style.figure(6.2, 4.4).add_subplot()

@@ -12,17 +12,17 @@ from compare.kit.settling import forces, physical_case
 from model import Case, Parameters
 
 
-def lasting(p: Parameters) -> list[StationarySolution]:
+def solutions(p: Parameters) -> list[StationarySolution]:
     """The stationary solutions that a ball may settle to: those that attract, and the one that sinks for ever."""
     return theory(analytic.stable_solutions, p, sinking=True)
 
 
-def cases(p: Parameters) -> set[Case]:
+def lasting_cases(p: Parameters) -> set[Case]:
     """Cases of the states that last; SR, the state of NR on an unloaded floor, is none of its own."""
-    return {s.case for s in lasting(p)} - {Case.SR}
+    return {s.case for s in solutions(p)} - {Case.SR}
 
 
-def detected(m: Measurement) -> Case:
+def case_of(m: Measurement) -> Case:
     """The case of the state that was measured; two cases in which a contact carries nothing count as one.
 
     SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall.
@@ -31,16 +31,16 @@ def detected(m: Measurement) -> Case:
     return Case.RS if case is Case.RN else case
 
 
-def reached(m: Measurement) -> StationarySolution:
+def solution_of(m: Measurement) -> StationarySolution:
     """The lasting state of the case that was detected; LookupError if theory has none."""
-    for state in lasting(m.parameters):
-        if state.case is detected(m):
+    for state in solutions(m.parameters):
+        if state.case is case_of(m):
             return state
-    raise LookupError(f"no state of case {detected(m).name} lasts")
+    raise LookupError(f"no state of case {case_of(m).name} lasts")
 
 
-def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
-    """A quantity of a stationary solution by its name in the measurements."""
+def quantity_of(quantity: str, s: StationarySolution, p: Parameters) -> float:
+    """The value of a quantity, by its name in the measurements, in a stationary solution."""
     if quantity == "wall_spin":
         return float(bifurcation.wall_spin(s.state, p))
     if quantity.startswith("force_"):
@@ -49,8 +49,8 @@ def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
 
 
 def is_in(*cases: Case) -> When:
-    """True for settled states of these cases."""
-    return lambda m: detected(m) in cases
+    """A filter of measurements: whether the settled state is in one of these cases."""
+    return lambda m: case_of(m) in cases
 
 
 def slips_first(m: Measurement) -> bool:

@@ -98,6 +98,7 @@ def read(source: Source, name: str = "") -> Series:
 
 
 def _csv(path: Path) -> dict[str, Array]:
+    """The columns of a table of numbers by the names in its head; time and omega_c if it has none."""
     try:
         rows = [row for line in path.read_text("utf-8-sig").splitlines() if any(row := table.fields(line))]
         head = rows.pop(0) if rows and {"time", "t"} & set(rows[0]) else ["time", "omega_c"]
@@ -109,7 +110,7 @@ def _csv(path: Path) -> dict[str, Array]:
 
 
 def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
-    """A trajectory; or the columns of another program's file, which names no schema."""
+    """The trajectory in an HDF5 file, or the columns of a file of another program, which names no schema."""
     try:
         return storage.load(path)
     except StorageError as error:
@@ -148,8 +149,8 @@ class Difference:
     """Rms of what interpolating may have added; 0 where both have samples at the same times."""
 
 
-def common(a: Series, b: Series) -> Array:
-    """Times (n,) at which the one with fewer samples has them while both last; `InputError` for less than `FEWEST`."""
+def common_times(a: Series, b: Series) -> Array:
+    """Sample times (n,) of the motion with fewer samples while both last; `InputError` for less than `FEWEST`."""
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     times: Array = min((t[(begin <= t) & (t <= end)] for t in (a.time, b.time)), key=len)
     if len(times) < FEWEST:
@@ -158,8 +159,8 @@ def common(a: Series, b: Series) -> Array:
 
 
 def difference(a: Series, b: Series, quantity: str) -> Difference:
-    """Of a from b at their `common` times, linearly between samples; raises `InputError`."""
-    times, rows, doubts = common(a, b), [], []
+    """How far a is from b in a quantity at `common_times`, linearly between samples; raises `InputError`."""
+    times, rows, doubts = common_times(a, b), [], []
     for t, values in ((each.time, each[quantity]) for each in (a, b)):
         rows.append(np.interp(times, t, values))
         # Between every second sample linear interpolation is off by four times as much.

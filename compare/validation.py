@@ -21,7 +21,7 @@ from compare.kit.engines import WITNESSES, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.programme import Protocol
-from compare.kit.progress import Show, ValidationProgress, nowhere
+from compare.kit.progress import Show, ValidationProgress, show_nothing
 from compare.kit.record import Missing, Records, RecordsByEngine
 from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes, threads
 from compare.report import results
@@ -43,7 +43,7 @@ def validate(
     engine: Engine | None = None,
     workers: int | Workers = 1,
     limit: float = math.inf,
-    progress: Show = nowhere,
+    progress: Show = show_nothing,
     announce: Announce = lambda verdict: None,
     report: bool = True,
 ) -> list[Verdict]:
@@ -76,7 +76,7 @@ def validate(
     output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
     results.open_directory(output)
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
-    todo = [protocol for protocol in programme.needed(PROTOCOLS, names) if protocol.assignment.level <= level]
+    todo = [protocol for protocol in programme.with_needed(PROTOCOLS, names) if protocol.assignment.level <= level]
     engines = [engine] if engine else [*WITNESSES]
     far = ValidationProgress(progress, {}, len(chosen))
     with (
@@ -102,7 +102,7 @@ def validate(
     count = workers if isinstance(workers, int) else workers.count
     with processes(min(count, os.cpu_count() or 1)) as work:
         draw = far.drawing(work.map) if report else None
-        _write(output, level, files, results.testimony(output, files), verdicts, draw)
+        _write(output, level, files, results.load_measurements(output, files), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
 
 
@@ -121,7 +121,7 @@ class _Judging:
         self.broken, self.judged = dict[str, str](), dict[str, Future[Verdict]]()
 
     def take(self, protocol: Protocol, lab: Lab, found: Records | Exception, sets: Sequence[str]) -> None:
-        """What a protocol has measured, or why it broke down, which takes its own claims with it, and no others."""
+        """Take in what a protocol has measured, or its error, which takes its own claims with it, and no others."""
         if isinstance(found, Records):
             records = found
         elif lab.engine is self.trial:
@@ -133,7 +133,7 @@ class _Judging:
         self.measured[lab.engine.name][lab.refine] += records
 
     def judge(self, jobs: Sequence[programme.Job]) -> None:
-        """All claims that wait for none of these protocols."""
+        """Begin to judge all claims that wait for none of these protocols."""
         waiting = {protocol.name for protocol, _ in jobs}
         for claim in self.claims:
             # Next to a threshold a settled state has no limit: see `witnesses.MARGIN`.
@@ -146,7 +146,7 @@ class _Judging:
 
 def _files(output: Path, lab: Lab, sets: Mapping[str, Parameters] | None) -> list[str]:
     """The files of what was measured, relative to the results directory."""
-    paths = [programme.file(each, output, lab, sets) for each in PROTOCOLS if each.measures(lab)]
+    paths = [programme.measurements_file(each, output, lab, sets) for each in PROTOCOLS if each.measures(lab)]
     return [path.relative_to(output).as_posix() for path in paths if path.exists()]
 
 
@@ -170,13 +170,13 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
 
 
 def _judged(directory: Path, number: int) -> dict[str, Any]:
-    """What there is to say of a claim; claims themselves don't go from process to process."""
+    """In a worker: the verdict on a claim by its number, as fields, since claims don't go from process to process."""
     judged = _in_time(CLAIMS[number], stored(directory))
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
 
 def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
-    """The verdict on what is stored, or that it took too long."""
+    """The verdict on a claim by what is stored, or one that says that it took too long."""
     try:
         with at_most(JUDGING):
             return full_verdict(claim, testimony)
@@ -187,18 +187,18 @@ def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
 @cache
 def stored(directory: Path) -> RecordsByEngine:
     """The measurements of the last validation in a directory, read once in a process."""
-    return results.testimony(directory, results.load(directory).measurements)
+    return results.load_measurements(directory, results.load(directory).measurements)
 
 
 def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Evidence:
-    """What figures of a results directory are made of: of engines beside the one on trial at half the usual step."""
+    """The numbers and runs that figures show; those of engines beside the one on trial are at half the usual step."""
     checks = {v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts}
     first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [Records()]
     return Evidence(checks, first, directory, sum(others, Records()))
 
 
 def stored_evidence(directory: Path) -> Evidence:
-    """The same from what is stored, judged again; of theory alone if nothing is."""
+    """As `evidence`, from what a directory holds, judged again; without any numbers if it holds none."""
     if not (directory / results.SUMMARY).exists():
         return Evidence()
     testimony = stored(directory)

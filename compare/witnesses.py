@@ -27,7 +27,7 @@ import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
 from compare.claim import Claim, Outcome, Verdict, Witness
-from compare.judge import checks_of, lacking, outcome, rows, verdict
+from compare.judge import checks_of, outcome, per_bearing, undecided_bearings, verdict
 from compare.kit.engines import Engine, engine
 from compare.kit.lab import coarse_step, time_unit
 from compare.kit.quantities import quantity
@@ -94,30 +94,30 @@ def full_verdict(claim: Claim, testimony: RecordsByEngine) -> Verdict:
 
 
 @dataclass(frozen=True)
-class Yielded:
-    """What the protocols of a claim yielded, with the time steps in one that they asked for, the fewest first."""
+class Asked:
+    """What the protocols of a claim measured with one engine, a row each with the number that divides its step."""
 
     rows: tuple[tuple[int, Measurement | Missing], ...]
 
     @classmethod
     def of(cls, claim: Claim, steps: Mapping[int, Records]) -> Self:
-        """What an engine was asked for a claim."""
+        """Of records by the number that divides the step those that bear on a claim, the coarsest first."""
         wanted = claim.protocols
         return cls(tuple((n, row) for n, own in sorted(steps.items()) for row in own.rows if row.protocol in wanted))
 
     @property
     def finest(self) -> dict[str, int]:
-        """The finest step of each protocol."""
+        """By protocol the largest number by which its step was divided."""
         return {row.protocol: n for n, row in self.rows}
 
     @property
     def missing(self) -> list[Missing]:
-        """What was left out with the finest step of its protocol."""
+        """What could not be measured with the finest step of its protocol."""
         finest = self.finest
         return [row for n, row in self.rows if isinstance(row, Missing) and finest[row.protocol] == n]
 
     def shared(self, trial: Iterable[Check]) -> set[tuple[int, str]]:
-        """Bearings and sets of the checks of the engine on trial of which this one was asked, too."""
+        """Bearings and sets of those checks of the engine on trial that this engine was to measure, too."""
         places = {(row.protocol, row.set) for _, row in self.rows}
         checks = (c for c in trial if (c.measurement.protocol, c.measurement.set) in places)
         return {(c.bearing, c.measurement.set) for c in checks}
@@ -126,7 +126,7 @@ class Yielded:
 def _testify(
     claim: Claim, by: Engine, steps: Mapping[int, Records], ends: Set[tuple[str, float]], trial: Sequence[Check] = ()
 ) -> Witness:
-    """What an engine says; `ends` are thresholds measured on sets, `trial` the checks of the engine on trial.
+    """What an engine says of a claim; `ends` are measured thresholds, `trial` the checks of the engine on trial.
 
     Of a bearing it should have as many numbers as with any of its steps, and where the engine on trial has some, one,
     or one for each set that was asked of both.
@@ -134,7 +134,7 @@ def _testify(
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves the claim undecided
     where too few of its numbers can tell, those without a limit among them: see `_limit`.
     """
-    asked = Yielded.of(claim, steps)
+    asked = Asked.of(claim, steps)
     try:
         found = {n: checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
@@ -144,11 +144,11 @@ def _testify(
         reasons = ["at this level nothing that bears on the claim was asked of it", *map(str, missing[:3])]
         return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason="; ".join(reasons))
     if by.allowance:
-        limits = [(_allowed(check, by.allowance), math.nan) for check in found[max(found)]]
+        limits = [(_with_allowance(check, by.allowance), math.nan) for check in found[max(found)]]
     else:
-        limits = [limit for row in _aligned(found, asked.finest) if (limit := _limit(row, ends))]
+        limits = [limit for row in _sequences_by_step(found, asked.finest) if (limit := _limit_of_no_step(row, ends))]
     checks, orders = tuple(check for check, _ in limits), [order for _, order in limits if math.isfinite(order)]
-    most = reduce(or_, map(rows, found.values()))
+    most = reduce(or_, map(per_bearing, found.values()))
     wanted = most | Counter(bearing for bearing, _ in shared) | Counter({check.bearing for check in trial})
     usual = ((c, coarse_step(c.measurement.parameters) / n) for n, own in found.items() for c in own)
     return Witness(
@@ -163,8 +163,8 @@ def _testify(
 
 
 def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]) -> str:
-    """Of which bearings too few numbers can tell, and what was not measured of these; empty if it is so of none."""
-    if not (few := lacking(checks, wanted)):
+    """In words of which bearings too few numbers can tell, and what was not measured of these; empty if of none."""
+    if not (few := undecided_bearings(checks, wanted)):
         return ""
     symbols: dict[str, list[str]] = {}
     for n, told in sorted(few.items()):
@@ -181,15 +181,15 @@ def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
     return tuple(each for each in off if math.isfinite(each))
 
 
-def _allowed(check: Check, share: float) -> Check:
-    """The same with a share of its scale as its tolerance."""
+def _with_allowance(check: Check, share: float) -> Check:
+    """The check with a share of its scale as its tolerance, for an engine whose errors have no limit."""
     exact = quantity(check.measurement.quantity).resolves == 0
     return check if exact else replace(check, tolerance=share * check.scale, ceiling=2 * share)
 
 
 @dataclass(frozen=True)
 class Alike:
-    """What checks of the same thing with different steps have in common, but for the numbers among their conditions."""
+    """What checks of one thing with different time steps share: all but the numbers among their conditions."""
 
     protocol: str
     bearing: int
@@ -198,20 +198,20 @@ class Alike:
 
     @classmethod
     def of(cls, check: Check) -> Self:
-        """That of a check."""
+        """What a check shares with those of the same thing with other steps."""
         m = check.measurement
         texts = sorted((name, value) for name, value in m.conditions.items() if isinstance(value, str))
         return cls(m.protocol, check.bearing, m.set, tuple(texts))
 
 
-def _place(m: Measurement) -> dict[str, float]:
+def _numbers_of(m: Measurement) -> dict[str, float]:
     """The numbers among the conditions of a measurement, and those of its parameters that protocols choose."""
     numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
     return numbers | {name: getattr(m.parameters, name) for name in ("omega_0", "c", "mu", "eta")}
 
 
-def _aligned(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) -> Iterator[list[Step]]:
-    """The checks with the finest step of their protocol, each after those of the same with coarser ones."""
+def _sequences_by_step(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) -> Iterator[list[Step]]:
+    """For each check with the finest step of its protocol: those of the same with coarser steps, and itself last."""
     groups: dict[int, dict[Alike, list[Check]]] = {n: {} for n in sorted(found)}
     for n, group in groups.items():
         for check in found[n]:
@@ -220,18 +220,18 @@ def _aligned(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) ->
         if n == finest[kind.protocol]:
             steps: list[list[Step]] = [[] for _ in last]
             for coarser, others in [(m, group[kind]) for m, group in groups.items() if m < n and kind in group]:
-                for i, k in _same(last, others):
+                for i, k in _pair_nearest(last, others):
                     steps[i].append((coarser, others[k]))
             yield from ([*row, (n, check)] for row, check in zip(steps, last, strict=True))
 
 
-def _same(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tuple[int, int]]:
-    """Which of ones and of others, of one kind, were measured at the same place, or nearly so."""
-    p, names = ones[0].measurement.parameters, sorted(_place(ones[0].measurement))
+def _pair_nearest(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tuple[int, int]]:
+    """Pairs of indices of checks of one kind that were measured at the same place, or nearly so."""
+    p, names = ones[0].measurement.parameters, sorted(_numbers_of(ones[0].measurement))
     natural = dict(zip(VARIABLES, state_units(p), strict=True))
     natural |= dict.fromkeys(("frequency", "decay_rate"), 1 / time_unit(p))
     here, there = (
-        np.array([[_place(c.measurement).get(name, 0.0) for name in names] for c in checks])
+        np.array([[_numbers_of(c.measurement).get(name, 0.0) for name in names] for c in checks])
         for checks in (ones, others)
     )
     largest = np.maximum(np.abs(here).max(axis=0), np.abs(there).max(axis=0))
@@ -241,8 +241,8 @@ def _same(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tuple[int,
     yield from ((i, k) for i, k in pairs if apart[i, k] <= NEAR)
 
 
-def _limit(there: Sequence[Step], ends: Set[tuple[str, float]] = frozenset()) -> tuple[Check, float] | None:
-    """A check in the limit of no step, and the order found, nan where the step shows nothing.
+def _limit_of_no_step(there: Sequence[Step], ends: Set[tuple[str, float]] = frozenset()) -> tuple[Check, float] | None:
+    """A check extrapolated to no time step, and the order of convergence, nan where the step shows nothing.
 
     None of a state so near a threshold that the step may decide on its case; where it wasn't measured with three steps;
     and of a threshold that moves too far with the step.

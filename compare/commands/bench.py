@@ -38,7 +38,7 @@ def run_league(args: argparse.Namespace) -> int:
         chosen = {args.settings.stem: native.entry(args.settings)} | chosen
     make_directory(args.output)
     check_ours(args.output / LEAGUE_PAGE, beside=args.output / LEAGUE_JSON)
-    with progress.shown(quiet=args.json or args.quiet) as show:
+    with progress.reporter(quiet=args.json or args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
     if all(result.skipped for results in found.values() for result in results):
         raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")

@@ -30,7 +30,7 @@ def program() -> NoReturn:
 
     What standard output can't show in its encoding is spelled.
     """
-    codecs.register_error("spelled", pages.spelled)
+    codecs.register_error("spelled", pages.spell_out)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="spelled")
     os.environ["MPLBACKEND"] = "agg"  # figures go into files: that of a notebook would be looked for here, too

@@ -106,7 +106,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     def shown_to(value: float, most: int) -> str:
         return meter.rounded(value, off, most)
 
-    first = [Text(doubt, "bold yellow") for doubt in meter.doubts(off)]
+    first = [Text(doubt, "bold yellow") for doubt in meter.model_warning(off)]
     given = [["", "", ""]]
     for field in p.quantities():
         meta, value = field.metadata, f"{getattr(p, field.name):.8g}"

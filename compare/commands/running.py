@@ -62,7 +62,7 @@ def workers(args: argparse.Namespace) -> Workers:
 def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: Any) -> Iterator[Campaign]:
     """A campaign in a directory of ``--output`` by the workers that are named, whose progress is shown."""
     with (
-        progress.shown(args.quiet or args.json, counted=True) as show,
+        progress.reporter(args.quiet or args.json, counted=True) as show,
         Campaign(args.output / directory, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
     ):
         yield made

@@ -75,7 +75,7 @@ def run_sweep(args: argparse.Namespace) -> int:
     whole = len(tasks) - len(failures)
     if args.json:
         summary = {"directory": str(args.output), "runs": len(tasks), "whole": whole}
-        options.show(summary | {"failures": campaign.listed(failures)}, args.json)
+        options.show(summary | {"failures": campaign.failures_as_data(failures)}, args.json)
     else:
         print(f"{whole} of {len(tasks)} runs are whole, in {args.output}; gather them with: ", end="")
         print(f"dualball collect {args.output}")

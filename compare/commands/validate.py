@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         rows = [[claim.id, claim.source, claim.statement, str(claim.text)] for claim in CLAIMS]
         options.terminal().print(pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left"))
         return 0
-    with progress.shown(quiet=args.quiet or args.json) as show:
+    with progress.reporter(quiet=args.quiet or args.json) as show:
         wanted = {
             "level": Level[args.level.upper()],
             "claims": args.claim,
@@ -89,7 +89,7 @@ def line(verdict: Verdict) -> Text:
         parts.append(Text(str(verdict.missing[0]), "dim"))
     for each in (witness for witness in verdict.witnesses[1:] if witness.outcome is not Outcome.NOT_ASKED):
         kind, mark = wording.MARKS[each.outcome]
-        parts.append(Text.assemble(f"{each.engine} ", (f"{mark} {wording.said(each)}", _STYLES[kind])))
+        parts.append(Text.assemble(f"{each.engine} ", (f"{mark} {wording.witness_outcome(each)}", _STYLES[kind])))
     return shown.append(Text("; ").join(parts))
 
 
@@ -97,7 +97,7 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
     """How many claims and numbers came out how."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     counts = "; ".join(map(" ".join, wording.totals(ran)))
-    shown = Text(f"{wording.headline(ran)}: {counts}. {wording.missing(ran)}".strip(), "bold")
+    shown = Text(f"{wording.headline(ran)}: {counts}. {wording.coarse_and_missing(ran)}".strip(), "bold")
     for each in (each for each in wording.witnesses(ran) if each["asked"] != "0"):
         counts = f"{each['confirmed']} of {each['asked']} claims confirmed (to {each['to']}), "
         counts += f"{len(each['refuted'])} refuted, {each['open']} undecided"

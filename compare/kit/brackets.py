@@ -19,7 +19,7 @@ Answer = Callable[[Trajectory], bool | None]
 
 @dataclass(frozen=True)
 class Attempt:
-    """How a run is done: `time` times as long, with the time step divided by `refine`."""
+    """How the run of a question is done: `time` times as long, with the time step divided by `refine`."""
 
     time: int = 1
     refine: int = 1
@@ -100,29 +100,29 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     before, todo = list(brackets), list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].width > searches[k].width]:
         inside = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist()[1:-1] for k in todo}
-        replies = _ask(lab, [(searches[k], value, brackets[k]) for k in todo for value in inside[k]], failures)
+        replies = _answers(lab, [(searches[k], value, brackets[k]) for k in todo for value in inside[k]], failures)
         for n, k in enumerate(todo):
             before[k] = brackets[k]
-            brackets[k] = _shorter(brackets[k], inside[k], replies[n * sections : (n + 1) * sections])
+            brackets[k] = _narrowed(brackets[k], inside[k], replies[n * sections : (n + 1) * sections])
         todo = [k for k in todo if brackets[k].width < 0.51 * before[k].width]
     granted = [(k, end) for k, b in enumerate(brackets) for end in (0, 1) if not (b.runs[end] or lab.effort.granted)]
-    replies = _ask(lab, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures)
+    replies = _answers(lab, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures)
     for (k, end), reply in zip(granted, replies, strict=True):
         if reply.answer is (end == 0):
             yes, no = brackets[k].runs
             brackets[k] = replace(brackets[k], runs=(yes, reply.run) if end else (reply.run, no))
     if careful:
         asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in b.ends]
-        replies = _ask(lab, asked, failures, FINER)
+        replies = _answers(lab, asked, failures, FINER)
         for k, (low, high) in enumerate(zip(replies[::2], replies[1::2], strict=True)):
             if low.answer is False or high.answer is True or not (low.run and high.run):
                 brackets[k] = replace(brackets[k], shift=before[k].width)
     return [replace(b, failure=failures.get(search, "")) for search, b in zip(searches, brackets, strict=True)]
 
 
-def _ask(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], attempt: Attempt = USUAL) -> list[Reply]:
-    """What runs answer, those that don't show it done again for longer; why some broke down is noted in `failures`."""
-    tasks, replies = [search.task(value, bracket, attempt) for search, value, bracket in questions], []
+def _answers(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], how: Attempt = USUAL) -> list[Reply]:
+    """Carry out a run for each question: its answer, those without one run anew for longer; errors into `failures`."""
+    tasks, replies = [search.task(value, bracket, how) for search, value, bracket in questions], []
     for (search, *_), task, run in zip(questions, tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
             failures[search] = run
@@ -130,14 +130,14 @@ def _ask(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], a
         else:
             replies.append(Reply(task, run, search.answer(run)))
     unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
-    if attempt is USUAL and unclear:
-        longer = _ask(lab, [questions[n] for n in unclear], failures, LONGER)
+    if how is USUAL and unclear:
+        longer = _answers(lab, [questions[n] for n in unclear], failures, LONGER)
         for n, reply in zip(unclear, longer, strict=True):
             replies[n] = reply
     return replies
 
 
-def _shorter(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply]) -> Bracket:
+def _narrowed(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply]) -> Bracket:
     """The bracket that is left once values inside it were asked."""
     answers, runs = [reply.answer for reply in replies], [reply.run for reply in replies]
     places, said = [bracket.low, *values, bracket.high], [True, *answers, False]

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from compare.kit.lock import Lock
-from compare.kit.progress import Show, nowhere
+from compare.kit.progress import Show, show_nothing
 from compare.kit.tasks import Task, carry_out, deadline, failed_path, store
 from compare.kit.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
@@ -52,7 +52,7 @@ _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 
 @dataclass(frozen=True)
 class Storing:
-    """What becomes of the runs of a batch."""
+    """Where and how the runs of a batch are stored, and whether they are handed out."""
 
     directory: Path
     label: str
@@ -100,7 +100,7 @@ class Campaign:
     workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)
     batch: int = BATCH
     limit: float = math.inf
-    report: Show = nowhere
+    report: Show = show_nothing
     doing: str = ""
     label: str = "runs"
     save: Save = storage.save_batch
@@ -133,8 +133,8 @@ class Campaign:
         if self._made and not any(self.directory.iterdir()):
             self.directory.rmdir()
 
-    def under(self, label: str, doing: str) -> Campaign:
-        """A part of the campaign with a label and runs of its own; parts may be carried out by several threads."""
+    def part(self, label: str, doing: str) -> Campaign:
+        """A part of the campaign with a label and runs of its own, which another thread may carry out."""
         part = copy.copy(self)
         part.label, part.doing, part._read, part._samples = label, doing, {}, 0
         part._files = {key: f for key, f in self._files.items() if label in (f.stem, f.name.rpartition("-")[0])}
@@ -154,10 +154,10 @@ class Campaign:
         """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
         if key not in self._read:
             runs = storage.load_runs(self._files[key])
-            self._hold(runs if key in runs else {key: runs[""]})
+            self._keep_in_memory(runs if key in runs else {key: runs[""]})
         return self._read[key]
 
-    def _hold(self, runs: Mapping[str, Trajectory]) -> None:
+    def _keep_in_memory(self, runs: Mapping[str, Trajectory]) -> None:
         """Keep runs in memory, and forget the earliest of the others while there are more than `READ` samples.
 
         What isn't stored is before it is forgotten, all at once.
@@ -212,12 +212,12 @@ class Campaign:
                 if file:
                     self._files[task.key] = file
                 if run:
-                    self._hold({task.key: run})
+                    self._keep_in_memory({task.key: run})
             self.report(self.doing, done, len(unique), len(failures))
         with self._lock:  # the parts of a campaign share the list
             if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
                 self._failed |= new
-                write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
+                write_text(self.directory / FAILURES, json.dumps(failures_as_data(self._failed.values()), indent=1))
         return failures
 
     def keep(self, keys: Collection[str]) -> None:
@@ -272,8 +272,8 @@ class Campaign:
                     again.extend(batch)
 
 
-def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
-    """Failures as JSON-able data: what failed, why, and all that it takes to try it again."""
+def failures_as_data(failures: Iterable[Failure]) -> list[dict[str, Any]]:
+    """Failures as JSON-able data: the key, the reason, and the task, to try it again."""
     return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 

@@ -71,7 +71,7 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     shares = [files[k : k + SHARE] for k in range(0, len(files), SHARE)]
     parts, problems = [], list[str]()
     with processes(workers) as work:
-        for found, unread in work.map(partial(_gathered, directory), shares):
+        for found, unread in work.map(partial(_columns_of_files, directory), shares):
             parts += [found] if found else []
             problems += unread
     table = {name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0] if parts else ())}
@@ -88,10 +88,10 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     if not table:
         raise StorageError(f"there are no runs in {directory}")
     collected = {name: values[rows] for name, values in table.items() if name not in _HELD}
-    coordinates, about = varied(collected), _attributes()
+    coordinates, about = varied_parameters(collected), _attributes()
     order = np.lexsort([collected[name] for name in ("run", *reversed(coordinates))])
     collected = {name: values[order] for name, values in collected.items()}
-    dimensions, collected = _arranged(collected, coordinates)
+    dimensions, collected = _as_grid(collected, coordinates)
     with WholeFile(output) as whole:
         title = f"What {len(rows)} balls settled to, measured over the last part of each run"
         whole.file.attrs.update(Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION)
@@ -103,8 +103,8 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     return len(rows)
 
 
-def _arranged(of: Columns, coordinates: list[str]) -> tuple[list[str], Columns]:
-    """The dimensions and columns of sorted runs: those of a grid if each of its points is there once."""
+def _as_grid(of: Columns, coordinates: list[str]) -> tuple[list[str], Columns]:
+    """Names of dimensions, and columns shaped by them: those of a grid if each point has one run, else one of runs."""
     axes = {name: np.unique(of[name]) for name in coordinates}
     shape = [len(values) for values in axes.values()]
     if not axes or math.prod(shape) != len(of["run"]):
@@ -115,7 +115,7 @@ def _arranged(of: Columns, coordinates: list[str]) -> tuple[list[str], Columns]:
     return coordinates, axes | {name: values.reshape(shape) for name, values in of.items() if name not in axes}
 
 
-def _flat(file: h5py.File) -> Columns:
+def _one_entry_a_run(file: h5py.File) -> Columns:
     """The columns of a collection, an entry a run."""
     of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
     if not run.is_scale:
@@ -124,8 +124,8 @@ def _flat(file: h5py.File) -> Columns:
     return {name: values.ravel() for name, values in of.items()}
 
 
-def _gathered(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
-    """The columns of all runs of some files, named from the directory on; and what can't be read."""
+def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
+    """The columns of all runs of some files, named by their paths in the directory; and errors of unreadable files."""
     parts, problems = [], []
     for file in files:
         try:
@@ -136,7 +136,7 @@ def _gathered(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str
 
 
 def _rows(path: Path, shown: Path) -> Columns:
-    """The columns of all runs of a file that is `shown` under a name."""
+    """The columns of all runs of a file, whose name in the collection begins with `shown`."""
     with reading(path) as file:
         if file.attrs.get("schema") != MEANS:
             found = None
@@ -149,7 +149,7 @@ def _rows(path: Path, shown: Path) -> Columns:
     of = [
         dict(zip(found, row, strict=True)) for row in zip(*(values.tolist() for values in found.values()), strict=True)
     ]
-    theory = [_theory(row) for row in of]
+    theory = [_solution_of(row) for row in of]
     found |= {f"{name}_theory": np.array([each[name] for each in theory]) for name in VARIABLES}
     return found | {"run": np.array([str(shown / name) for name in found["run"].tolist()])}
 
@@ -165,8 +165,8 @@ def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
 
 
 def _means(runs: Mapping[str, Trajectory]) -> Columns:
-    """What runs say of themselves: their parameters, means over their last quarter with uncertainties by drift, and
-    last cases. Those are nan, and the case -1, for a run too short for them."""
+    """For each run parameters, means over the last quarter with uncertainties by drift, and the last case. Those are
+    nan, and the case -1, for a run too short for them."""
     rows = []
     for name, run in runs.items():
         row: dict[str, Any] = {"run": name, "engine": run.header.engine} | dataclasses.asdict(run.header.parameters)
@@ -183,8 +183,9 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def _theory(row: Mapping[str, Any]) -> dict[str, float]:
-    """The stable stationary solution of a run's case; nan where there is none, where it is free, in unsteady flow."""
+def _solution_of(row: Mapping[str, Any]) -> dict[str, float]:
+    """The stable stationary solution of a run's case by theory; nan if there is none, where it is free, or the flow
+    changes."""
     found = dict.fromkeys(VARIABLES, math.nan)
     if row["case"] >= 0 and row["steady"]:
         p = Parameters(**{f.name: row[f.name] for f in dataclasses.fields(Parameters)})
@@ -195,6 +196,7 @@ def _theory(row: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _digest(*parts: bytes) -> str:
+    """A hash of bytes, 32 hexadecimal digits."""
     digest = hashlib.sha256()
     for part in parts:
         digest.update(part)
@@ -226,8 +228,8 @@ def _attributes() -> dict[str, dict[str, Any]]:
     return about
 
 
-def varied(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
-    """The parameters that have several values; older files have no law of drag."""
+def varied_parameters(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
+    """Names of the parameters that have several values in the columns; older files have no law of drag."""
     return [f.name for f in dataclasses.fields(Parameters) if f.name in of and len(np.unique(of[f.name])) > 1]
 
 
@@ -243,14 +245,14 @@ def describe(path: Path) -> dict[str, Any]:
         if schema == SCHEMA:
             if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
                 raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
-            return described(_flat(file))
+            return described(_one_entry_a_run(file))
     if schema not in (MEANS, storage.BATCH):
         return {}
     return described({name: values for name, values in _rows(path, path).items() if name not in _HELD})
 
 
 def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
-    """As `describe`, for the columns of a collection by name; `drag` is missing in older ones."""
+    """What the columns of a collection hold, as `describe` gives it; `drag` is missing in older ones."""
     codes, counts = np.unique(of["case"], return_counts=True)
     finite = {name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"}
     return {
@@ -260,13 +262,13 @@ def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
         "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
         "failures": [text for text in of["failure"].tolist() if text],
         "drag": sorted(set(of["drag"].tolist())) if "drag" in of else [],
-        "varied": varied(of),
+        "varied": varied_parameters(of),
         "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
     }
 
 
 def table(about: dict[str, Any]) -> Table:
-    """The description for the terminal."""
+    """What `describe` gives as a table for the terminal."""
     ranges, names = about["ranges"], about["names"]
     more = f"\n… and {len(names) - NAMED} more" if len(names) > NAMED else ""
     rows = {

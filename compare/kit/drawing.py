@@ -29,7 +29,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a validation left, for figures: judged numbers, measurements, run files. Without any, theory is drawn."""
+    """What a validation leaves for figures to show: judged numbers, measurements, run files; all may be none."""
 
     checks: Mapping[str, Sequence[Check]] = field(default_factory=dict)
     """By the id of the claim on which they bear."""

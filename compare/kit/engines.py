@@ -86,7 +86,7 @@ class Engine:
 
     @cached_property
     def versions(self) -> dict[str, str]:
-        """Of all that determines its results."""
+        """Versions of all packages that determine its results, by name."""
         needed = {self.needs.name: self.needs.version} if self.needs else {}
         return {name: version(name) for name in self.stands_on} | needed
 
@@ -111,7 +111,7 @@ STUDY_SLIP = 2.0
 
 @cache
 def _rough(step: float) -> ContactSettings:
-    """For a ball on the roughest floor; with `suited` one of two for all sets, so that runs of a step share a batch."""
+    """Contact settings that suit a ball on the roughest floor; with `suited` one of two, so that runs share a batch."""
     return ContactSettings.for_problem(Parameters.named("reference").replace(mu=1.0, eta=0.0), step, STUDY_SLIP)
 
 
@@ -135,6 +135,7 @@ def as_it_comes(step: float) -> ContactSettings:
 
 
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
+    """`mjsim.Run` without its warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that contacts may chatter with these settings is on trial
         return mjsim.Run(*given, **more)
@@ -151,7 +152,7 @@ def _theory(method: str, task: Any, progress: Callable[[float], None]) -> Trajec
 
 
 def _adapted(library: Library, marks: str) -> list[Engine]:
-    """Records of an engine with the best settings of its adapter and, with a second mark, with its own."""
+    """The `Engine` of an adapter in its best settings and, if there is a second mark, that in the engine's own."""
     name = library.module.rpartition(".")[2]
     best = Engine(
         name=name,

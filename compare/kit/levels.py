@@ -166,7 +166,7 @@ WITNESS_ABOVE_QUICK = replace(WITNESS, thresholds_loose=1e3, thresholds_rounds=(
 
 
 def effort(level: Level, witness: bool = False) -> Effort:
-    """How much is measured at a level; by an engine beside the one on trial if it is a `witness`."""
+    """How much an engine measures at a level; less if it is a `witness` beside the engine on trial."""
     if witness:
         return WITNESS if level is Level.QUICK else WITNESS_ABOVE_QUICK
     return (AT_QUICK, AT_DEFAULT, AT_FULL)[level]

@@ -44,7 +44,7 @@ for _prefix, _uri in (("", _SVG), ("xlink", _XLINK)):
 
 def svg(figure: Figure) -> str:
     """A figure as SVG; equal figures give equal text."""
-    parts = {f"part-{k}": part for k, part in enumerate(_named(figure))}
+    parts = {f"part-{k}": part for k, part in enumerate(_named_artists(figure))}
     for gid, (artist, _) in parts.items():
         artist.set_gid(gid)
     out = io.BytesIO()
@@ -67,7 +67,7 @@ def svg(figure: Figure) -> str:
 
 
 def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
-    """SVG pictures by name as parts of one page, and the letters that they share, which is to stand before them."""
+    """SVG pictures by name as parts of one page, and an SVG of the letters that they share, to stand before them."""
     letters: dict[str, str] = {}
     made = {}
     for k, (name, picture) in enumerate(pictures.items()):
@@ -79,12 +79,12 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
         text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', letter, picture).replace("<defs></defs>", "")
         text = re.sub(r"<style.*?</style>", "", text)  # for all lines of a picture: pages have it, too
         text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace("xlink:href", "href")
-        made[name] = re.sub(r'^<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', _opened, text)
+        made[name] = re.sub(r'^<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', _svg_start, text)
     return made, f'<svg width="0" height="0" style="position:absolute"><defs>{"".join(letters.values())}</defs></svg>'
 
 
-def _opened(found: re.Match[str]) -> str:
-    """How a picture begins on a page; letters of 10 points are at least as high as 6.4 pixels on a phone."""
+def _svg_start(found: re.Match[str]) -> str:
+    """The opening tag of a picture on a page; letters of 10 points are at least 6.4 pixels high on a phone."""
     return f'<svg {found[1]} role="img" style="--least:{0.64 * float(found[2]):.0f}px">'
 
 
@@ -96,8 +96,8 @@ def plain(label: str) -> str:
     return re.sub(r"[${}]|\\", "", label).replace("\n", " ")
 
 
-def _named(figure: Figure) -> Iterator[tuple[Artist, str]]:
-    """All axes, and what bears a label in each, with its name in HTML."""
+def _named_artists(figure: Figure) -> Iterator[tuple[Artist, str]]:
+    """All axes of a figure, and each artist in them that bears a label, with that label in HTML."""
     for axes in figure.axes:
         yield axes, ""
         boxes = ((part, box.get_label()) for box in axes.containers if isinstance(box, Container)
@@ -108,6 +108,7 @@ def _named(figure: Figure) -> Iterator[tuple[Artist, str]]:
 
 
 def _flat(artists: Any) -> Iterator[Artist]:
+    """All artists in nested sequences."""
     for each in artists:
         yield from [each] if isinstance(each, Artist) else _flat(each)
 

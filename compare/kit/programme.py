@@ -64,7 +64,7 @@ class Protocol:
         return ASSIGNMENTS.get(self.name, Assignment())
 
     def measures(self, lab: Lab) -> dict[str, Parameters]:
-        """The sets that it measures at a level with an engine, by name."""
+        """The parameter sets that it measures at the level and with the engine of a lab, by name."""
         known, assignment, above = sets(lab.level), self.assignment, lab.level > Level.QUICK
         names: Iterable[str] = known if above else assignment.quick
         if lab.engine.role is Role.AS_IT_COMES:
@@ -81,8 +81,8 @@ Job = tuple[Protocol, Lab]
 """A protocol, and where it is carried out."""
 
 
-def file(protocol: Protocol, results: Path, lab: Lab, chosen: Mapping[str, Parameters] | None) -> Path:
-    """Where measurements are kept; those of another engine, step, level, choice of sets, or program are apart."""
+def measurements_file(protocol: Protocol, results: Path, lab: Lab, chosen: Mapping[str, Parameters] | None) -> Path:
+    """The file of a protocol's measurements: another one for each engine, step, level, choice of sets, and program."""
     engine, sets = protocol.engine or lab.engine, protocol.measures(lab) if chosen is None else chosen
     identity = [
         engine.name,
@@ -108,14 +108,14 @@ def job_name(protocol: str, lab: Lab) -> str:
 
 
 def cost(job: Job) -> float:
-    """Processor time at the quick level, about."""
+    """About the processor time of a protocol at the quick level, relative to others."""
     protocol, lab = job
     asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.assignment.quick), 1)
     return protocol.cost * asked * lab.refine if lab.is_witness else protocol.cost
 
 
-def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
-    """The protocols of these names and those they go out from, in order."""
+def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
+    """The protocols of these names and all those whose measurements they need, in order."""
     known = {protocol.name: protocol for protocol in protocols}
     wanted, todo = set[str](), list(names)
     while todo:
@@ -184,13 +184,13 @@ def carry_out(
 
     Raises `StorageError` where measurements can't be read or written.
     """
-    path = file(protocol, results, lab, chosen)
+    path = measurements_file(protocol, results, lab, chosen)
     label = f"{protocol.name}-{path.parent.name}"
-    campaign = lab.campaign.under(label, job_name(protocol.name, lab))
+    campaign = lab.campaign.part(label, job_name(protocol.name, lab))
     lab = replace(lab, engine=protocol.engine or lab.engine, campaign=campaign)
     if not path.exists():
         sets = protocol.measures(lab) if chosen is None else chosen
-        weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
+        weak = {name: why for name, p in sets.items() if (why := _why_drag_too_weak(p, protocol))}
         strong = {name: p for name, p in sets.items() if name not in weak}
         rows: list[Measurement | Missing] = [Missing(protocol.name, name, why) for name, why in weak.items()]
         if protocol.alone and "reference" not in strong:
@@ -210,7 +210,7 @@ def carry_out(
     return record.load(path)
 
 
-def _too_weak(p: Parameters, protocol: Protocol) -> str:
+def _why_drag_too_weak(p: Parameters, protocol: Protocol) -> str:
     """Why drag is too weak for a protocol; empty if it isn't."""
     if p.c == 0:
         return UNDAMPED

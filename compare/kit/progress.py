@@ -23,20 +23,20 @@ Show = Callable[[str, int, int, int], None]
 """Called with what is being done, in words, how much of it is done, of how much in all, and how much failed."""
 
 
-def nowhere(what: str, done: int, total: int, failed: int) -> None:
-    """Shows nothing."""
+def show_nothing(what: str, done: int, total: int, failed: int) -> None:
+    """A progress function that shows nothing."""
 
 
 @contextmanager
-def shown(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
-    """A function to report progress to, on standard error, never silent for longer than `INTERVAL`.
+def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
+    """Yield a function that shows progress on standard error, which is never silent for longer than `INTERVAL`.
 
     `counted` if what is done are runs, whose number is to be shown, too.
     """
     if quiet:
-        yield nowhere
+        yield show_nothing
     elif counted:
-        with shown() as show:
+        with reporter() as show:
             yield lambda what, done, total, failed: show(f"{what}: {done} of {total} runs", done, total, failed)
     elif sys.stderr.isatty():
         times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()

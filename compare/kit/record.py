@@ -61,7 +61,7 @@ class Measurement:
             object.__setattr__(self, name, float(getattr(self, name)))
 
     def at(self, name: str) -> float:
-        """A number among the conditions."""
+        """The number that a condition has, by its name."""
         return float(self.conditions[name])
 
     @property
@@ -96,7 +96,7 @@ def measurement(
 
 
 def if_found(row: Measurement, why: str) -> Measurement | Missing:
-    """The measurement, however coarse, since the judge says whether it can tell; or why there is no number."""
+    """The measurement if it has a finite number, however coarse; else a `Missing` with the reason."""
     return row if np.isfinite([row.value, row.uncertainty]).all() else Missing(row.protocol, row.set, why)
 
 
@@ -153,7 +153,7 @@ class Check:
 
     @property
     def resolves(self) -> float:
-        """Resolving power: the smallest relative error of the prediction that this check would notice."""
+        """The smallest relative error of the prediction that this check would notice: its resolving power."""
         return self.tolerance / self.scale if self.scale else math.inf
 
     @property

@@ -76,8 +76,8 @@ class Patience:
 
 
 def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -> list[Settled]:
-    """Run each start until it is settled, in the order given. Of an engine as it comes every state counts, for what it
-    is when time is up.
+    """Run the ball from each start until it is settled: the states, in order. Of an engine as it comes every state
+    counts, for what it is when time is up.
 
     What isn't settled goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land.
@@ -99,7 +99,7 @@ def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -
             if isinstance(run, str):
                 states[n] = Settled(start, Case.NN, {}, start.x0, task, failure=f"the run {run}")
                 continue
-            state = states[n] = judged(start, task, run, loose)
+            state = states[n] = judge_run(start, task, run, loose)
             part = task.t_end / duration(start.p, span, steps)
             if left[n] and state.excess > min(part, 1.0) * min(loose, patience.sharp):
                 # A part of a round may end on the way to where the ball settles: it goes on as it is.
@@ -115,13 +115,13 @@ def settle_groups(
     groups: Sequence[Sequence[Start]],
     patience: Patience = Patience(),
 ) -> list[list[Settled]]:
-    """The same for groups of starts, all of them together."""
+    """Settle groups of starts as `settle` does, all of them together."""
     states = iter(settle(lab, [start for group in groups for start in group], patience))
     return [[next(states) for _ in group] for group in groups]
 
 
-def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
-    """What a run has come to; `loose` as in `Patience`.
+def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
+    """The state to which a run has settled, or why it has not; `loose` as in `Patience`.
 
     A run is settled once its drift lets each check resolve twice as much as it should, with no quantity swinging by
     more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows the one that
@@ -139,7 +139,7 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
         case = Case(int(counts.argmax()))
         means, drifts = steady_mean(rows, length)
         mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
-        groups = [[q for q in group if q in determined(case)] for group in ERROR_GROUPS]
+        groups = [[q for q in group if q in determined_quantities(case)] for group in ERROR_GROUPS]
         worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
         values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
         swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
@@ -156,7 +156,7 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
     return min(states, key=lambda state: state.excess)
 
 
-def reading(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterator[Measurement | Missing]:
+def settled_readings(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterator[Measurement | Missing]:
     """Case and omega_c to which the ball settles from each start."""
     for start, settled in zip(starts, settle(lab, starts), strict=True):
         if settled.failure:
@@ -181,8 +181,8 @@ def safe_height(p: Parameters) -> float:
     return 1.25 * dragged_speed(p) * duration(p, LONGEST * SPAN)
 
 
-def lasting(p: Parameters, units: float) -> float:
-    """A time in s of about `units` of 1/c: a power of two, so that sets share batches."""
+def rounded_duration(p: Parameters, units: float) -> float:
+    """A duration of about `units` of 1/c, s: a power of two, so that runs of several sets share batches."""
     return float(2.0 ** round(math.log2(units / p.c)))
 
 
@@ -212,8 +212,8 @@ def forces(A: Array, B: Array) -> dict[str, Array]:
     return components | {"Ax-By": A[0] - B[1], "Ay+By": A[1] + B[1], "Bx+By": B[0] + B[1]}
 
 
-def determined(case: Case) -> tuple[str, ...]:
-    """The quantities that a settled state of a case has.
+def determined_quantities(case: Case) -> tuple[str, ...]:
+    """Names of the quantities that a settled state of a case determines.
 
     Where both contacts roll, only sums of forces; and nothing but the wall turns a ball about the vertical.
     """

@@ -173,7 +173,7 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured
     return zero, slope
 
 
-def vanishing(where: Array, values: Sequence[Measured]) -> Measured:
+def extrapolated_zero(where: Array, values: Sequence[Measured]) -> Measured:
     """The place at which a quantity is zero, from places (n,) and its values there, the one nearest to zero first."""
     return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0)), values)
 
@@ -184,8 +184,8 @@ def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:
     return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size, values)
 
 
-def turning(where: Array, values: Sequence[Measured], others: Array | None = None) -> Measured:
-    """The maximum of the place as a function of a quantity, the value nearest to it first; nan if there is none.
+def extrapolated_maximum(where: Array, values: Sequence[Measured], others: Array | None = None) -> Measured:
+    """The maximum of the place as a function of a quantity, whose value nearest to it is the first; nan without one.
 
     Or what another quantity is there, with its values `others` at the places.
     """
@@ -201,7 +201,7 @@ def turning(where: Array, values: Sequence[Measured], others: Array | None = Non
 
 
 def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Measured]) -> Measured:
-    """An estimate (values, n) from the first n values, with n all of them; uncertain by its convergence and noise.
+    """The estimate(values, n) from all n values, with an uncertainty by its convergence with n and their noise.
 
     It is made without the last two points, without the last, and with all. Its changes are continued as a geometric
     series with the larger ratio of any two, at most 1, from the last change but one, since the last may be small by

@@ -122,7 +122,7 @@ def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = ()) 
 
 
 def marks(states: Sequence[Measurement]) -> str:
-    """What a caption says of measured points; nothing where there are none."""
+    """The part of a caption that explains the marks of measured points; empty where there are none."""
     if not states:
         return ""
     between = any(m.protocol == "edge" for m in states)
@@ -213,7 +213,7 @@ def guides(axes: Axes, values: dict[str, float]) -> None:
 
 
 def mark_of(engine: str) -> dict[str, Any]:
-    """The mark of what an engine gave, black: colours are those of cases."""
+    """Marker of an engine's points as keywords of matplotlib: black, since colours are those of cases."""
     given = ENGINES.get(engine)  # theory against theory has none
     return {"marker": given.mark if given else "D", "color": "0.1", "mfc": "white"}
 

@@ -57,12 +57,12 @@ class Task:
 
     @property
     def simulator(self) -> Engine:
-        """The engine itself; `InputError` if there is none of that name."""
+        """The engine of that name; `InputError` if there is none."""
         return engines.engine(self.engine)
 
     @property
     def fluid(self) -> Flow:
-        """omega_0 over time, also where `flow` is None."""
+        """The flow, steady where `flow` is None."""
         return self.flow or Flow.steady(self.parameters.omega_0)
 
     @functools.cached_property
@@ -125,7 +125,7 @@ def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -
     """
     if simulate := tasks[0].simulator.simulate:
         return [simulate(task, lambda done: check()) for task in tasks]
-    return _begun(tasks, progress=lambda done: check()).trajectories()
+    return _start_stream(tasks, progress=lambda done: check()).trajectories()
 
 
 def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:
@@ -156,7 +156,7 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
     else:
         journal = Journal(journal_path(task, path)) if task.long else None
         try:
-            under_way = _begun([task], journal)
+            under_way = _start_stream([task], journal)
         except InputError:  # there is nothing to go on with
             if journal:
                 journal.discard()
@@ -188,8 +188,8 @@ def journal_path(task: Task, path: Path) -> Path:
     return path.with_name(f"{task.key}.journal")
 
 
-def _begun(tasks: Sequence[Task], journal: Journal | None = None, **more: Any) -> mjsim.Run:
-    """Runs that hand out their samples, several in a batch."""
+def _start_stream(tasks: Sequence[Task], journal: Journal | None = None, **more: Any) -> mjsim.Run:
+    """Begin a run of one or several tasks that hands out its samples as it goes."""
     first = tasks[0]
     parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
     run = parameters, x0s, first.t_end, flows, first.settings

@@ -89,8 +89,8 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Tria
             yield TrialResult(protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:]))
 
 
-def finer(coarse: float, fine: Measured) -> Measured:
-    """What the finer step shows: its difference from the coarser one adds to its own uncertainty in quadrature."""
+def with_step_error(coarse: float, fine: Measured) -> Measured:
+    """The value with the finer step, uncertain by its difference from that with the coarser one, too, in quadrature."""
     return Measured(fine.value, math.hypot(fine.value - coarse, fine.uncertainty))
 
 

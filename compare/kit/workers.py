@@ -127,7 +127,7 @@ class _Pool(ProcessPoolExecutor):
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Signals that end a program wait, and processes started here never get to know of them.
+    """A context in which signals that end a program wait, and whose new processes never get them.
 
     Those that another thread gets are handled by the main one, blocked or not: they are sent again afterwards.
     """
@@ -155,7 +155,7 @@ _between = threading.Lock()
 
 
 def _work(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
-    """In a worker: do a task, during which the worker may end."""
+    """In a worker: call a function, during which the parent may end the worker."""
     if _between.locked():
         _between.release()
     try:
@@ -182,7 +182,7 @@ def _follow(end: Connection) -> None:
 
 
 class _Here(Executor):
-    """Does everything at once, in this process; what is raised is for the caller."""
+    """An executor that calls each function at once, in this process; errors reach the caller."""
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
         done: Future[T] = Future()

@@ -32,7 +32,7 @@ MEANING = {
 _NONE = "–"
 
 
-def doubts(off: float) -> list[str]:
+def model_warning(off: float) -> list[str]:
     """The warning that the model leaves out too much of a real fluid, if its error `off` exceeds the limit."""
     if off <= real_fluid.LIMIT:
         return []
@@ -44,7 +44,7 @@ def doubts(off: float) -> list[str]:
 
 
 def torque(p: Parameters) -> str:
-    """What the fluid's torque does to the ball that rolls at both points, by Stokes and by its boundary layer."""
+    """In words what the fluid's torque does to a ball that rolls at both points, by Stokes and by boundary layer."""
     laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
     stokes_told, layer_told = (
         f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({100 * law.shift:+.0f} %), and "
@@ -85,11 +85,11 @@ def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
 
 
 def sentences(made: Design) -> list[str]:
-    """What the design amounts to, in sentences."""
+    """What a design of a flowmeter amounts to, in sentences."""
     chosen, request, curve, off, said = made.choice, made.request, made.curve, made.model_error, []
     if chosen.margin < 1:
         said.append(f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")
-    said.append(f"Best: {made.material}, {_values(chosen.values)}.")
+    said.append(f"Best: {made.material}, {_values_as_text(chosen.values)}.")
     if chosen.margin:
         said.append(
             "Rolling at both points is the ball's only lasting motion up to at worst "
@@ -123,7 +123,7 @@ def sentences(made: Design) -> list[str]:
 
 
 def rows(made: Design) -> dict[str, pages.Rows]:
-    """Tables by title, with a column for the best meter of each material, the best of all first, and of thresholds."""
+    """Tables of a design by title: the best meter of each material, a column each, thresholds, and sensitivities."""
     off = made.model_error
     best = dict(sorted(made.choices.items(), key=lambda item: -item[1].margin))
     numbers = {
@@ -134,7 +134,7 @@ def rows(made: Design) -> dict[str, pages.Rows]:
     }
     limits = {name: [rounded(x, off) for x in row] for name, row in numbers.items()}
     spread = {key: [getattr(made.thresholds, key), *made.spread[key]] for key in THRESHOLDS}
-    values = {_named(name): [rounded(c.values[name]) for c in best.values()] for name in made.choice.values}
+    values = {_symbol_and_unit(name): [rounded(c.values[name]) for c in best.values()] for name in made.choice.values}
     sensitivities = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]
     for name in made.sensitivities[THRESHOLDS[0]]:
         slopes = [made.sensitivities[key][name].value for key in THRESHOLDS]
@@ -152,14 +152,14 @@ def rows(made: Design) -> dict[str, pages.Rows]:
 
 
 def tables(made: Design) -> list[Table | str]:
-    """All of it, for the terminal."""
+    """Tables and sentences of a design, for the terminal."""
     shown = [pages.table(title, own) for title, own in rows(made).items()]
     refused = [f"{name} can't be used: {why}" for name, why in made.refused.items()]
-    return [*doubts(made.model_error), *shown, *refused, *sentences(made)]
+    return [*model_warning(made.model_error), *shown, *refused, *sentences(made)]
 
 
 def described(made: Design) -> dict[str, Any]:
-    """All of it as plain data; what doesn't exist is nan."""
+    """A design as plain data; what doesn't exist is nan."""
 
     def meter(c: Choice) -> dict[str, Any]:
         limits = {"limit": c.limit, "worst": c.worst}
@@ -194,7 +194,7 @@ def described(made: Design) -> dict[str, Any]:
 
 
 def page(made: Design) -> str:
-    """All of it as a page that needs nothing but itself."""
+    """A design as a self-contained page, in HTML."""
     from compare.kit.pictures import embedded, svg  # here, because drawing takes a second to load
     from compare.subjects.flowmeter.figures import OF_A_METER
 
@@ -202,20 +202,20 @@ def page(made: Design) -> str:
     response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""
     spans = {n: f"{low:g} … {high:g}" if low < high else f"{low:g}" for n, (low, high) in bounds.items()}
     asked = {
-        "fluid": _values(r.fluid),
+        "fluid": _values_as_text(r.fluid),
         "flow": f"ω₀ = {r.slowest:g} … {r.fastest:g} rad/s{response}",
-        "bounds": ", ".join(f"{_named(name)} {span}" for name, span in spans.items()),
+        "bounds": ", ".join(f"{_symbol_and_unit(name)} {span}" for name, span in spans.items()),
         "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
     drawn, letters = embedded({caption: svg(figure) for figure, caption in (draw(made) for draw in OF_A_METER)})
-    texts = {"doubts": doubts(made.model_error), "sentences": sentences(made), "tables": rows(made).items()}
+    texts = {"doubts": model_warning(made.model_error), "sentences": sentences(made), "tables": rows(made).items()}
     return pages.render("compare.report", "meter.html", made=made, **texts, asked=asked, figures=drawn, letters=letters)
 
 
-def _values(values: Mapping[str, Any]) -> str:
+def _values_as_text(values: Mapping[str, Any]) -> str:
     shown = {n: x if isinstance(x, str) else f"{rounded(x)} {UNITS.get(n, '')}".rstrip() for n, x in values.items()}
     return ", ".join(f"{SYMBOLS.get(name, name)} = {text}" for name, text in shown.items())
 
 
-def _named(name: str) -> str:
+def _symbol_and_unit(name: str) -> str:
     return SYMBOLS.get(name, name) + (f" ({UNITS[name]})" if name in UNITS else "")

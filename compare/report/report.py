@@ -76,10 +76,10 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
         "compare.report",
         "report.html",
         letters=letters,
-        title=f"{len(ran)} claims: {', '.join(map(' '.join, wording.kinds(ran)))}",
+        title=f"{len(ran)} claims: {', '.join(map(' '.join, wording.by_kind(ran)))}",
         headline=wording.headline(ran),
-        missing=wording.missing(ran),
-        lead=f"A ball rolls and slips round inside a cylinder. {_lead(ran)}",
+        missing=wording.coarse_and_missing(ran),
+        lead=f"A ball rolls and slips round inside a cylinder. {_opening_sentence(ran)}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         witnesses=wording.witnesses(ran),
         tiles=[*wording.totals(ran), (str(len(measured)), f"simulations with {len(sets)} parameter sets")],
@@ -106,7 +106,7 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
 
 
 def _row(verdict: Verdict) -> dict[str, Any]:
-    """What the page says of a claim, but for its figures."""
+    """A claim's verdict with marks, missing numbers and worst checks, for the page's template."""
     mark, symbol = wording.MARKS[verdict.outcome]
     more = len(verdict.missing) - REASONS
     unseen = [f"and {more} more, see {results.SUMMARY}"] if more > 0 else []
@@ -121,7 +121,7 @@ def _row(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def _lead(ran: Sequence[Verdict]) -> str:
+def _opening_sentence(ran: Sequence[Verdict]) -> str:
     """How far the orbit of stationary states is from theory, in a sentence."""
     checks = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
     orbits = [c for c in checks if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0]
@@ -147,7 +147,7 @@ def errata() -> str:
 
 
 def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str, list[Any]]:
-    """What the page searches, by column: a row for each check, and for each measurement on which no claim bears."""
+    """Columns of the page's searchable table: a row for each check, and each measurement on which no claim bears."""
 
     def key(m: Measurement) -> tuple[Any, ...]:  # the same for a copy that another process has judged
         conditions = tuple(sorted(m.conditions.items()))

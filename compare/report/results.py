@@ -44,7 +44,7 @@ class Summary:
 
     @classmethod
     def of(cls, verdicts: Iterable[Verdict], level: Level, measured: Files) -> Summary:
-        """The verdicts of now on the measurements in the files `measured`."""
+        """The summary of verdicts that were reached now, on the measurements in the files `measured`."""
         provenance = {
             "versions": dict(current_versions()),
             "commit": current_commit(),
@@ -54,7 +54,7 @@ class Summary:
         return cls(level.name, measured, {verdict.claim.id: _outcome(verdict) for verdict in verdicts}, provenance)
 
 
-def testimony(directory: Path, files: Files) -> RecordsByEngine:
+def load_measurements(directory: Path, files: Files) -> RecordsByEngine:
     """The measurements in files of a directory; raises `StorageError` for one that is not whole."""
     return {
         engine: {n: sum((record.load(directory / name) for name in names), Records()) for n, names in steps.items()}
@@ -77,7 +77,7 @@ def described(verdict: Verdict) -> dict[str, Any]:
 
 
 def _outcome(verdict: Verdict) -> dict[str, Any]:
-    """What a claim came to, with the numbers of its checks."""
+    """A verdict in numbers, without its checks: outcome, counts, resolving power, witnesses; JSON-able."""
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
     counts = {name: sum(getattr(check, name) for check in verdict.checks) for name in ("agrees", "conclusive")}
     counts["left_out"] = verdict.left_out

@@ -59,13 +59,13 @@ def conditions(of: Mapping[str, Condition]) -> str:
 
 
 def where(m: Measurement) -> str:
-    """With what a number was measured: "reference, ω₀ = 25 rad/s: case SS"."""
+    """The set, flow and conditions of a measurement: "reference, ω₀ = 25 rad/s: case SS"."""
     flow = f"{m.set}, ω₀ = {m.parameters.omega_0:.6g} rad/s"
     return f"{flow}: {conditions(m.conditions)}" if m.conditions else flow
 
 
 def mark(check: Check) -> str:
-    """What a check comes to, in one word."""
+    """Pass, coarse or fail: what a check comes to."""
     return "fail" if not check.agrees else "pass" if check.conclusive else "coarse"
 
 
@@ -88,7 +88,7 @@ def findings(verdict: Verdict) -> dict[str, str]:
         found = {"Largest deviation": "none: all equal" if check.agrees else f"not equal: {where}"}
     elif math.isnan(check.predicted):
         found = {"Largest deviation": f"theory knows no such state: {where}"}
-    if errors := noticed(verdict.resolving_power):
+    if errors := noticed_errors(verdict.resolving_power):
         found["Would notice"] = errors
     if coarse := sum(not each.conclusive for each in verdict.checks):
         found["Too coarse to tell"] = str(coarse)
@@ -97,8 +97,8 @@ def findings(verdict: Verdict) -> dict[str, str]:
     return found
 
 
-def noticed(powers: Mapping[str, float]) -> str:
-    """Which errors of theory would be noticed, from the resolving power by quantity; empty where all are counts."""
+def noticed_errors(powers: Mapping[str, float]) -> str:
+    """In words which errors of theory would be noticed, by resolving power; empty where all quantities are counts."""
     alike: dict[str, list[str]] = {}
     for name, power in powers.items():
         if quantity(name).resolves:
@@ -114,15 +114,15 @@ def coarsest(witness: Witness) -> float:
     return max((power for name, power in witness.resolving_power.items() if quantity(name).resolves), default=math.nan)
 
 
-def said(witness: Witness) -> str:
-    """The outcome of an engine beside the one on trial, and to what relative error it confirms."""
+def witness_outcome(witness: Witness) -> str:
+    """In words the outcome by an engine beside the one on trial, and to what relative error it confirms."""
     if witness.outcome is not Outcome.CONFIRMED:
         return witness.outcome
     power = coarsest(witness)
     return f"{witness.outcome} to {power:.1e}" if math.isfinite(power) else f"{witness.outcome} by counts"
 
 
-def heard(witness: Witness) -> str:
+def witness_sentence(witness: Witness) -> str:
     """What an engine beside the one on trial says of a claim, in a sentence."""
     if witness.outcome in (Outcome.NOT_ASKED, Outcome.ERROR):
         return f"{witness.outcome}: {witness.reason}"
@@ -131,7 +131,7 @@ def heard(witness: Witness) -> str:
     left_out = f"; {witness.left_out} not measured" if witness.left_out else ""
     count = len(witness.checks)
     numbers = f" on {count} number{'s' if count > 1 else ''}" if count else ""
-    errors = f"; would notice {found}" if (found := noticed(witness.resolving_power)) else ""
+    errors = f"; would notice {found}" if (found := noticed_errors(witness.resolving_power)) else ""
     off, why = at if math.isfinite(witness.worst) else "", f"; {witness.reason}" if witness.reason else ""
     return f"{witness.outcome}{numbers}{order}{errors}{off}{left_out}{why}"
 
@@ -169,14 +169,14 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
     return rows
 
 
-def unsure(ran: Sequence[Verdict]) -> list[str]:
-    """The claims that were to come out one way or the other, and can't be told from what was measured."""
+def undecided_claims(ran: Sequence[Verdict]) -> list[str]:
+    """Ids of the claims that were expected to be decided, but can't be from what was measured."""
     return [verdict.claim.id for verdict in ran if verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed]
 
 
 def headline(ran: Sequence[Verdict]) -> str:
-    """The verdicts in a sentence."""
-    undecided = unsure(ran)
+    """All verdicts in a sentence: the claims that failed or are undecided, or that the engine agrees."""
+    undecided = undecided_claims(ran)
     failed = [verdict.claim.id for verdict in ran if not verdict.passed and verdict.claim.id not in undecided]
     parts = []
     for what, ids in (("did not come out as expected", failed), ("can't be told from what was measured", undecided)):
@@ -190,10 +190,10 @@ def headline(ran: Sequence[Verdict]) -> str:
     return f"{ENGINES[name].title or name if name else 'The engine'} agrees with the paper"
 
 
-def kinds(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
+def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims came out as expected, by kind, and how many didn't: counts with what they count."""
     passed = [verdict for verdict in ran if verdict.passed]
-    left = len(unsure(ran))
+    left = len(undecided_claims(ran))
     counts = {
         "confirmed by measurement": sum(v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed),
         "refuted as expected": sum(v.outcome is Outcome.REFUTED for v in passed),
@@ -204,7 +204,7 @@ def kinds(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     return [(str(n), what) for what, n in counts.items() if n]
 
 
-def missing(ran: Sequence[Verdict]) -> str:
+def coarse_and_missing(ran: Sequence[Verdict]) -> str:
     """How many numbers are too coarse or missing, and what follows from that, in a sentence; empty if none is."""
     coarse = sum(not check.conclusive for verdict in ran for check in verdict.checks)
     left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
@@ -216,7 +216,7 @@ def missing(ran: Sequence[Verdict]) -> str:
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims and numbers came out how: counts with what they count."""
     checks = [check for verdict in ran for check in verdict.checks]
-    counts = [*kinds(ran), (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance")]
+    counts = [*by_kind(ran), (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance")]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
         counts.append(
             (str(corrected), f"claim{'s hold' if corrected > 1 else ' holds'} in a corrected form, see the errata")

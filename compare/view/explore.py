@@ -65,7 +65,7 @@ class Tab:
     """Shows the run."""
 
 
-def changed(p: Parameters, name: str, value: float | str) -> Parameters:
+def with_value(p: Parameters, name: str, value: float | str) -> Parameters:
     """The set with another value of a slider or another law of drag; raises `InputError` for one out of its range."""
     if name == "kappa":
         return p.replace(c=float(value) * np.sqrt(p.g / p.R))
@@ -92,7 +92,7 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
          "line": {"color": COLOURS[case], "dash": dash, "width": 3}}
         for text, case, x, y, dash in lines
     ]  # fmt: skip
-    data.append(_here(p.omega_0, start))
+    data.append(_cross(p.omega_0, start))
     guides = [(name, getattr(t, name)) for name in ("omega_01", "omega_02", "omega_03", "omega_04")]
     shown = [(name, at) for name, at in guides if at < fastest and not (name == "omega_03" and folds)]
     guide = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "line": {"color": "#999", "dash": "dot"}}
@@ -100,7 +100,7 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     label = {"yref": "paper", "y": 0.98, "xanchor": "left", "showarrow": False, "font": {"size": 11}}
     annotations = [label | {"x": at, "text": str(typeset(SYMBOLS[name]))} for name, at in shown]
     cells = np.linspace(0.0, fastest, 81).tolist()
-    data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": _packed(np.zeros((81, 81))), "opacity": 0.0,
+    data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": _as_bytes(np.zeros((81, 81))), "opacity": 0.0,
                     "showscale": False, "hoverinfo": "none"})  # fmt: skip
     return _figure(data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, shapes=shapes, annotations=annotations)
 
@@ -123,21 +123,22 @@ def regions(p: Parameters, fastest: float) -> Figure:
         if depth.max() > 3:
             names_at.append({"x": eta[x], "y": flows[y], "text": name, "showarrow": False})
     heat = {
-        "type": "heatmap", "x": eta.tolist(), "y": flows.tolist(), "z": _packed(cells),
+        "type": "heatmap", "x": eta.tolist(), "y": flows.tolist(), "z": _as_bytes(cells),
         "colorscale": colours, "zmin": -0.5, "zmax": len(kinds) - 0.5, "showscale": False,
         "hovertemplate": "η %{x:.2f}, ω₀ %{y:.1f} rad/s<extra></extra>",
     }  # fmt: skip
-    return _figure([heat, _here(p.eta, p.omega_0)], "friction of the wall η", "ω₀ (rad/s)", eta[-1], fastest,
+    return _figure([heat, _cross(p.eta, p.omega_0)], "friction of the wall η", "ω₀ (rad/s)", eta[-1], fastest,
                    annotations=names_at)  # fmt: skip
 
 
-def _packed(cells: npt.NDArray[Any]) -> dict[str, str]:
-    """Small numbers as plotly unpacks them, a byte each: a page takes a long list of numbers apart one by one."""
+def _as_bytes(cells: npt.NDArray[Any]) -> dict[str, str]:
+    """Small whole numbers as bytes, in the form that plotly reads: much faster on a page than a list of numbers."""
     cells = cells.astype(np.uint8)
     return {"bdata": base64.b64encode(cells.tobytes()).decode(), "dtype": "u1", "shape": "{}, {}".format(*cells.shape)}
 
 
-def _here(x: float, y: float) -> Figure:
+def _cross(x: float, y: float) -> Figure:
+    """A black cross at a point, as data of plotly."""
     look = {"symbol": "cross", "size": 12, "color": "black"}
     return {
         "type": "scatter",
@@ -170,8 +171,8 @@ def simulated(p: Parameters, start: State) -> Trajectory:
         return run
 
 
-def said(p: Parameters) -> str:
-    """Thresholds and what the set comes to, in a line."""
+def in_words(p: Parameters) -> str:
+    """Thresholds of a set, and the motions to which its ball settles, in a line."""
     t = bifurcation.thresholds(p)
     parts = [f"{symbol} = {at:.4g}" for name, symbol in SYMBOLS.items() if np.isfinite(at := getattr(t, name))]
     stable = " or ".join(
@@ -233,7 +234,7 @@ def page(p: Parameters) -> None:
 
 
 def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[], None]:
-    """Sliders, the law of drag and files; what is returned draws all and, once nothing moves any more, simulates."""
+    """Build sliders, choice of drag law and buttons; return a function that draws all and, a bit later, simulates."""
     from nicegui import run
 
     async def again(mine: int) -> None:
@@ -252,7 +253,7 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
         if event.value is None or (name in SLIDERS and float(event.value) == value(name)):
             return
         try:
-            tab.p = changed(tab.p, name, event.value)
+            tab.p = with_value(tab.p, name, event.value)
         except InputError as error:
             ui.notify(str(error), type="negative")
             return
@@ -272,7 +273,7 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
         return float(getattr(tab.p, name))
 
     def show() -> None:
-        line.set_content(typeset(said(tab.p)))
+        line.set_content(typeset(in_words(tab.p)))
         for name, slider in sliders.items():
             slider.set_value(value(name))
 
@@ -307,7 +308,7 @@ def _bytes(save: Callable[[Path], object], name: str) -> bytes:
 
 
 def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[[], None]) -> None:
-    """The characteristic curve and the map of cases; a click chooses where the ball starts, or the set."""
+    """Build the characteristic curve and the map of cases; a click chooses where the ball starts, or the set."""
     fastest = SLIDERS["omega_0"][2]
     figures = {
         "curve": lambda: characteristic(tab.p, float(tab.start.omega_c), fastest),
@@ -334,7 +335,7 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
 
 
 def _motion(ui: Any, tab: Tab) -> Callable[[], None]:
-    """The page that `render` writes of a run, as a part of this one; what is returned hands it the run of the tab."""
+    """Build the part with the motion in 3-D; return a function that hands it the run of the tab."""
     within = ui.element("iframe").props('src="/motion" title="motion"').classes("w-full motion")
     within.style("height: 48rem; border: 0")
 

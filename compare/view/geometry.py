@@ -41,7 +41,7 @@ class Geometry:
 
 
 def geometry(run: Trajectory, now: Trajectory, force_arrow: float = ARROW, slip_arrow: float = ARROW) -> Geometry:
-    """Where all is at the samples of `now`, which is `run` resampled; lengths of arrows as `ARROW` says, in radii."""
+    """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled; see `ARROW`."""
     p = run.header.parameters
     steps = max(1, math.ceil((run.time[-1] - run.time[0]) / STEP))
     past = resampled(run, np.linspace(run.time[0], run.time[-1], steps + 1))

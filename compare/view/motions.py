@@ -13,7 +13,7 @@ import numpy as np
 from rich.table import Table
 
 from compare.kit import pages
-from compare.testing import UNITS, Series, common, difference
+from compare.testing import UNITS, Series, common_times, difference
 from model import Case, Flow, InputError, Parameters, Trajectory, kinematics, storage
 from model.kinematics import VARIABLES
 
@@ -164,7 +164,7 @@ def draw_both(a: Series, b: Series) -> Figure:
     seen = [n for n in shown if n in names and (n not in "yh" or max(a[n].max(), b[n].max()) > SEEN)]
     names = seen or names[:1]
     figure, panels = style.panels(9, 1.6 * len(names) + 2.2, len(names) + 1, sharex=True)
-    t = common(a, b)
+    t = common_times(a, b)
     for axes, name in zip(panels, names, strict=False):
         symbol = style.symbol(name)
         for each, colour, line in zip((a, b), PAIR_COLOURS, ("-", "--"), strict=True):

@@ -264,7 +264,7 @@ def frames(
 
 
 def _add(drawn: Any, kind: Any, colour: str, alpha: float = 1.0) -> Any:
-    """Another thing in MuJoCo's scene."""
+    """Add a thing of a colour to MuJoCo's scene, and return it."""
     geom = drawn.geoms[drawn.ngeom]
     rgba = np.array([*to_rgb(colour), alpha], np.float32)
     mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)

@@ -27,7 +27,7 @@ import analytic
 import mjsim
 from compare.bench import forecast, forecast_page, league, native, settled
 from compare.kit.engines import newcomer
-from compare.kit.progress import nowhere
+from compare.kit.progress import show_nothing
 from mjsim import ContactSettings
 from model import Case, Parameters
 
@@ -72,7 +72,7 @@ print(f"floor: solref {mine.A.solref}, solimp {mine.A.solimp}")
 def tested(*files: str, **engines: object) -> None:
     """Print the errors of settings, and of other engines, on the cases."""
     settings = {file: native.entry(Path(file)) for file in files}
-    found = league.measure(settings | engines, None, 2, nowhere)
+    found = league.measure(settings | engines, None, 2, show_nothing)
     for row in league.rows(found):
         print("".join(f"{cell:>22}" for cell in row))
     for name, results in found.items():

@@ -280,7 +280,7 @@ def main() -> None:
     args = parser.parse_args()
     axes = Axis.several(args.range, dict.fromkeys(BOX, "1"), "group", POSITIVE)
     asked = AttractorSearch(BOX | {axis.name: axis.ends for axis in axes}, args.starts, args.seed)
-    with progress.shown(False) as show:
+    with progress.reporter(False) as show:
         found = run(args.output, asked, args.sets, processes(args.workers), show)
     if args.save:
         found.save(args.save)

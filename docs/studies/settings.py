@@ -55,7 +55,7 @@ def main() -> None:
     matplotlib.rcParams["svg.hashsalt"] = "dualball"  # equal figures make equal files
     runs, pictures = Path("results/settings"), Path(__file__).parents[1] / "settings"
     make_directory(pictures)
-    with progress.shown(counted=True) as show, Campaign(runs, os.cpu_count() or 1, report=show) as campaign:
+    with progress.reporter(counted=True) as show, Campaign(runs, os.cpu_count() or 1, report=show) as campaign:
         drawing.save(draw_ladder(reached(campaign, rungs(STEP))), pictures / "ladder.svg")
         drawing.save(draw_frontier(frontier(campaign, STEPS)), pictures / "frontier.svg")
 

@@ -108,7 +108,7 @@ def _league(kept: Path) -> dict[str, list[Result]]:
             file.write_bytes(pickle.dumps(found))
         return cast(list[Result], pickle.loads(file.read_bytes()))
 
-    with progress.shown(counted=True) as show, ThreadPoolExecutor(os.cpu_count()) as pool:
+    with progress.reporter(counted=True) as show, ThreadPoolExecutor(os.cpu_count()) as pool:
         found = dict(zip(league.ENTRIES, pool.map(results, league.ENTRIES), strict=True))
     if missing := [results[0].skipped for results in found.values() if all(result.skipped for result in results)]:
         raise InputError(f"the page is about all engines: {missing[0]}")
@@ -149,7 +149,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     check_choice("page", args.page.name, list(PAGES))
     runs, tables = PAGES[args.page.name]
     check_names(args.only or (), list(tables), "table")
-    with progress.shown(counted=True) as show, Campaign(args.output / runs, args.workers, report=show) as campaign:
+    with progress.reporter(counted=True) as show, Campaign(args.output / runs, args.workers, report=show) as campaign:
         for name in args.only or tables:
             campaign.doing = name
             write(args.page, name, tables[name](campaign))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.kit.statistics import hops
-from compare.kit.trials import finer
+from compare.kit.trials import with_step_error
 from compare.subjects.attractors import measure as attractors
 from model import Parameters
 from tests.commands import told
@@ -76,7 +76,7 @@ def test_where_hopping_begins_and_ends():
     """At no height; and where disturbances neither grow nor shrink."""
     flows = (58.0, 56.0, 54.0)
     curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
-    place = finer(attractors.birth(flows, curved).value, attractors.birth(flows, straight))
+    place = with_step_error(attractors.birth(flows, curved).value, attractors.birth(flows, straight))
     assert place.value == pytest.approx(52.0, abs=1e-9)
     assert 0 < place.uncertainty < 0.1
     place = attractors.death([0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)])

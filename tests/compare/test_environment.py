@@ -44,7 +44,7 @@ def test_any_encoding(here, encoding):
 
 def test_what_cannot_be_shown_is_spelled():
     def shown(text, encoding):
-        return "".join(pages.spelled(UnicodeEncodeError(encoding, text, k, k + 1, ""))[0] for k in range(len(text)))
+        return "".join(pages.spell_out(UnicodeEncodeError(encoding, text, k, k + 1, ""))[0] for k in range(len(text)))
 
     assert shown("ω₀₁Ωω̃²√±…é", "ascii") == "omega01Omegaomega2sqrt +-...e"
     assert shown("\udcff✓", "ascii") == "??"

@@ -128,9 +128,9 @@ def test_without_the_extra_it_is_named(monkeypatch):
 def test_every_set_has_its_figures_and_a_motion(changes):
     p = P
     for name, value in changes.items():
-        p = explore.changed(p, name, value)
+        p = explore.with_value(p, name, value)
     curve, plane = explore.characteristic(p, 0.0, 80.0), explore.regions(p, 80.0)
-    assert "Settles to: " in explore.said(p)
+    assert "Settles to: " in explore.in_words(p)
     assert curve["data"][0]["type"] == plane["data"][0]["type"] == "heatmap"
     cells = base64.b64decode(plane["data"][0]["z"]["bdata"])
     assert len(cells) == len(plane["data"][0]["x"]) * len(plane["data"][0]["y"])
@@ -139,7 +139,7 @@ def test_every_set_has_its_figures_and_a_motion(changes):
 
 
 def test_a_slider_changes_the_set():
-    assert explore.changed(P, "kappa", 0.5).kappa == pytest.approx(0.5)
-    assert explore.changed(P, "drag", "schiller-naumann").nu_f == explore.OIL
+    assert explore.with_value(P, "kappa", 0.5).kappa == pytest.approx(0.5)
+    assert explore.with_value(P, "drag", "schiller-naumann").nu_f == explore.OIL
     with pytest.raises(InputError, match="j = 2"):
-        explore.changed(P, "j", 2.0)
+        explore.with_value(P, "j", 2.0)

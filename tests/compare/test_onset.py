@@ -15,7 +15,7 @@ from compare.kit.lab import time_unit
 from compare.kit.levels import Level, sets
 from compare.kit.record import Missing, Records
 from compare.kit.settling import PRESSES
-from compare.kit.statistics import Measured, turning, zero_and_slope
+from compare.kit.statistics import Measured, extrapolated_maximum, zero_and_slope
 from compare.subjects.thresholds.measure import answers, thresholds
 from model import Case, Parameters, State
 from tests.measured import measured
@@ -93,7 +93,7 @@ def test_a_line_has_no_maximum(bend):
     """Nor has one that is bent by round-off, or so little that a maximum would be far away."""
     where = np.linspace(1.0, 2.0, 6)[::-1]
     order = [Measured(float(w), 0.0) for w in where]
-    assert not math.isfinite(turning(where - bend * where**2, order).value)
+    assert not math.isfinite(extrapolated_maximum(where - bend * where**2, order).value)
 
 
 def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):

@@ -135,7 +135,7 @@ def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page):
             assert html.unescape(typeset(found)) in row(text, verdict.claim.id)
     assert wording.headline(RAN) in summary
     for said in (text, summary):
-        assert wording.missing(RAN) in said
+        assert wording.coarse_and_missing(RAN) in said
     for count, what in wording.totals(RAN):
         assert f"{count} {what}" in summary
         assert f"<b>{count}</b>{what}" in text

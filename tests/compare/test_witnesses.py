@@ -10,7 +10,7 @@ from compare.claim import Bearing, Claim, Outcome
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
-from compare.witnesses import CEILING, COARSEST, _limit, extrapolated, full_verdict
+from compare.witnesses import CEILING, COARSEST, _limit_of_no_step, extrapolated, full_verdict
 from model import Parameters
 from tests.measured import measured
 
@@ -109,7 +109,7 @@ def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
     """Two that are the same don't show a limit that well, and one that moves far shows none; one that stays off is."""
     places = [measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors]
     checks = [Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places]
-    limit = _limit(list(zip((2, 3, 4), checks, strict=True)))
+    limit = _limit_of_no_step(list(zip((2, 3, 4), checks, strict=True)))
     assert (limit and limit[0].agrees) is agrees
 
 

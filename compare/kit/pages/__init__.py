@@ -28,8 +28,8 @@ def readable(unit: str) -> str:
 _SIGNS = {"√": "sqrt ", "±": "+-", "×": "x", "–": "-", "—": "-", "·": "*", "≈": "~", "≤": "<=", "≥": ">="}
 
 
-def spelled(error: UnicodeError) -> tuple[str, int]:
-    """An error handler of `codecs`: Greek letters as their names, digits and letters without what sets them apart."""
+def spell_out(error: UnicodeError) -> tuple[str, int]:
+    """An error handler of `codecs`: spells out Greek letters, and shows others without accents and digits as such."""
     assert isinstance(error, UnicodeEncodeError)
     shown = []
     for letter in error.object[error.start : error.end]:
@@ -86,7 +86,7 @@ def markdown(rows: Rows) -> str:
 
 
 def pairs(rows: Mapping[str, str]) -> Table:
-    """Names and what they stand for, for the terminal."""
+    """A table of two columns for the terminal: names, and what they stand for."""
     from rich.table import Table  # here, because help has no tables
     from rich.text import Text
 

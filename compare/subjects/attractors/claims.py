@@ -36,7 +36,7 @@ def _hops_on(m: Measurement) -> float:
     return float(orbit.stable)
 
 
-def _death(orbit: Orbit) -> float:
+def _eta_at_torus(orbit: Orbit) -> float:
     """The wall friction at which multipliers leave the unit circle, on the branch of an orbit; nan if they don't."""
     branch = orbit_branch.follow(orbit, "eta", orbit.p.eta, 1.1 * orbit.p.eta)
     return next((place.value for place in branch.places if place.kind is Bifurcation.TORUS), math.nan)
@@ -47,13 +47,13 @@ _ORBIT: dict[str, Callable[[Orbit], float]] = {
     "omega_c": lambda orbit: orbit.turn / orbit.period,
     "height": lambda orbit: float(orbit.cycle.y.max()),
     "multiplier": lambda orbit: float(np.abs(orbit.multipliers).max()),
-    "death": _death,
+    "death": _eta_at_torus,
     "size": lambda orbit: float(np.ptp(orbit.cycle.omega_c)),
 }
 
 
-def _orbiting(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
-    """Numbers of the closed orbit of theory near what was measured."""
+def _orbit_bearings(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
+    """Bearings on quantities of the periodic orbit that theory has near the measured one."""
 
     def predict(m: Measurement) -> float:
         _, _, of = m.quantity.partition("_")
@@ -68,8 +68,8 @@ def _after_rest(m: Measurement) -> float:
     return float(getattr(run, m.quantity)[-1])
 
 
-def _only(m: Measurement) -> float:
-    """The one stationary motion that lasts by Definitions 1-3; nan if there are more."""
+def _only_lasting(m: Measurement) -> float:
+    """Case or omega_c of the only stationary motion that attracts, by Definitions 1-3; nan if there are more."""
     those = analytic.stable_solutions(m.parameters)
     lasts = those[0].case if m.quantity == "case" else those[0].state.omega_c
     return float(lasts) if len(those) == 1 else math.nan
@@ -83,28 +83,28 @@ CLAIMS = (
         "Definitions 1-3",
         "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
         *bearings("choice", ("case", "omega_c"), _after_rest, by=_RULE),
-        *bearings("choice", ("case", "omega_c"), _only, by="analytic.stable_solutions"),
+        *bearings("choice", ("case", "omega_c"), _only_lasting, by="analytic.stable_solutions"),
     ),
     claim(
         "hopping",
         _PERIODIC,
         "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall. The engine "
         "and Moreau-Jean time stepping come to the closed orbit of the event-driven simulation.",
-        *_orbiting("recurrent", *_HOP),
-        *_orbiting("stepped", *_HOP),
+        *_orbit_bearings("recurrent", *_HOP),
+        *_orbit_bearings("stepped", *_HOP),
     ),
     claim(
         "hopping-multiplier",
         _PERIODIC,
         "Disturbances of a hop shrink from one to the next by a factor: the largest Floquet multiplier of its orbit.",
-        *_orbiting("recurrent", "orbit_multiplier"),
+        *_orbit_bearings("recurrent", "orbit_multiplier"),
         level=Level.DEFAULT,
     ),
     claim(
         "swing",
         _PERIODIC,
         "Between the Hopf points of SS the ball swings for ever and slips all the time (very rough floor).",
-        *_orbiting("swing", "swing_period", "swing_omega_c", "swing_size"),
+        *_orbit_bearings("swing", "swing_period", "swing_omega_c", "swing_size"),
         level=Level.DEFAULT,
     ),
     claim(
@@ -140,7 +140,7 @@ CLAIMS = (
         "hopping-death",
         _PERIODIC,
         "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit circle.",
-        *_orbiting("followed", "orbit_death"),
+        *_orbit_bearings("followed", "orbit_death"),
         Bearing("followed", "hops", _hops, by="analytic.simulate"),
         level=Level.DEFAULT,
     ),

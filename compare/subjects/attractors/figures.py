@@ -38,25 +38,25 @@ def select(evidence: Evidence, quantity: str) -> Diagram:
 
 
 def of_set(p: Parameters, quantity: str) -> Diagram:
-    """The hops of a set."""
+    """The figure's data of a set: the orbits are found when it is drawn."""
     if quantity == "orbit_death" and p.eta == 0:
         raise GapError("its wall has no friction that could grow")
-    _orbit(p)
+    _orbit_or_gap(p)
     return Diagram(quantity, p)
 
 
 @functools.cache
-def _hops(p: Parameters) -> orbits.Orbit | None:
-    """By Newton's method, from about a state and the period, or what is found from random starts, if anything is."""
+def _hopping_orbit(p: Parameters) -> orbits.Orbit | None:
+    """The orbit of a ball that hops for ever: by Newton's method from a guess, or of a random start, if there is one."""
     if p == SET:
         return orbits.refine(p, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
     found = (each.fate.orbit for each in analytic.attractors(p, STARTS, seed=0))
     return next((o for o in found if o and {case.A is Contact.N for case in o.cases} == {True, False}), None)
 
 
-def _orbit(p: Parameters) -> orbits.Orbit:
+def _orbit_or_gap(p: Parameters) -> orbits.Orbit:
     """The ball that hops for ever; `GapError` if none is found."""
-    if orbit := _hops(p):
+    if orbit := _hopping_orbit(p):
         return orbit
     raise GapError(f"no ball hops for ever that starts in one of {STARTS} random states at ω₀ = {p.omega_0:g} rad/s")
 
@@ -69,8 +69,9 @@ def _fastest(p: Parameters) -> float:
 
 @functools.cache
 def _branch(p: Parameters) -> OrbitBranch:
+    """The branch of hops over the flow."""
     edge = bifurcation.thresholds(p).omega_02
-    return orbit_branch.follow(_orbit(p), "omega_0", LOWEST_FLOW * edge, _fastest(p))
+    return orbit_branch.follow(_orbit_or_gap(p), "omega_0", LOWEST_FLOW * edge, _fastest(p))
 
 
 def draw_branch(of: Diagram) -> tuple[Figure, str]:
@@ -125,7 +126,7 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
 
 def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     """Height over time, height over its rate, and height over the slip."""
-    orbit = _orbit(of.p)
+    orbit = _orbit_or_gap(of.p)
     cycle = orbit.cycle
     figure, axes = style.panels(9.0, 3.2, 1, 3, sharey=True)
     shown = {"$t$ (ms)": 1e3 * cycle.time, "$v_y$ (m/s)": cycle.v_y, "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x}
@@ -145,20 +146,20 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     )
 
 
-def _row(orbit: orbits.Orbit) -> dict[str, float]:
+def _orbit_data(orbit: orbits.Orbit) -> dict[str, float]:
     """What is drawn of an orbit: eta, the height of the hops in m, mean omega_c in rad/s, and whether it is stable."""
     height, omega_c = float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c)
     return {"eta": orbit.p.eta, "height": height, "omega_c": omega_c, "stable": orbit.stable}
 
 
 @functools.cache
-def _walls(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifurcation, dict[str, float]]]]:
+def _wall_branch(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifurcation, dict[str, float]]]]:
     """The branch of hops over the friction of the wall, and what happens on it: both lie on the line.
 
     Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
     """
-    branch = orbit_branch.follow(_orbit(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
-    rows, places = [_row(orbit) for orbit in branch.orbits], list[tuple[Bifurcation, dict[str, float]]]()
+    branch = orbit_branch.follow(_orbit_or_gap(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
+    rows, places = [_orbit_data(orbit) for orbit in branch.orbits], list[tuple[Bifurcation, dict[str, float]]]()
     for place in branch.places:
         if place.kind is Bifurcation.BIRTH:
             at, (one, two) = (len(rows), rows[:-3:-1]) if place is branch.places[-1] else (0, rows[:2])
@@ -166,7 +167,7 @@ def _walls(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifurcatio
             row = {name: one[name] + share * (two[name] - one[name]) for name in ("eta", "height", "omega_c")}
             row["stable"] = one["stable"]
         else:  # where the line is bent least by it
-            row = _row(place.orbit) | {"eta": place.value}
+            row = _orbit_data(place.orbit) | {"eta": place.value}
             x = np.array([(r["eta"] / p.eta, r["height"] / p.r) for r in (*rows, row)])
             detour = np.hypot(*(x[:-1] - x[-1]).T)
             at = 1 + int(np.argmin(detour[:-1] + detour[1:] - np.hypot(*np.diff(x[:-1], axis=0).T)))
@@ -179,7 +180,7 @@ def _walls(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifurcatio
 
 def draw_walls(of: Diagram) -> tuple[Figure, str]:
     """Height and mean omega_c of the hops over the friction of the wall."""
-    rows, places = _walls(of.p)
+    rows, places = _wall_branch(of.p)
     figure, panels = style.panels(9.0, 3.8, 1, 2)
     shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
     eta, stable = np.array([row["eta"] for row in rows]), np.array([row["stable"] for row in rows], dtype=bool)
@@ -222,14 +223,14 @@ _VARIABLES = {
 
 
 def draw_basins(basins: Basins) -> Figure:
-    """The map as a figure."""
+    """The map of basins as a figure."""
     figure = style.figure(6.2, 4.4)
     fill_basins(figure.add_subplot(), basins)
     return figure
 
 
 def fill_basins(axes: Axes, basins: Basins) -> None:
-    """The map by theory, and a point for each run of MuJoCo."""
+    """Draw the map of basins by theory, and a point for each run of MuJoCo."""
     look: dict[str, Any] = {
         "cmap": ListedColormap(_SHADES),
         "vmin": -0.5,

@@ -23,11 +23,11 @@ from compare.kit.engines import MOREAU
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import Protocol
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
-from compare.kit.settling import reading
+from compare.kit.settling import settled_readings
 from compare.kit.statistics import Measured, hops, peaks, top
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, TrialResult, carry_out, constrained, finer
+from compare.kit.trials import Start, Trial, TrialResult, carry_out, constrained, with_step_error
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
@@ -72,14 +72,14 @@ def hopping(
             break
         row = partial(measurement, lab, protocol, SET, q, tasks=result.tasks, **fine.conditions(q))
         for quantity, value in fine.values.items():
-            yield row(quantity=quantity, value=finer(coarse.values[quantity].value, value))
+            yield row(quantity=quantity, value=with_step_error(coarse.values[quantity].value, value))
         if k:
             factor = row(quantity="orbit_multiplier", value=_multiplier(result, k * HOLD, end - LAST, q))
             yield if_found(factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s")
         heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
     if len(heights) >= 3:
         coarse_birth, fine_birth = (birth(flows[: len(heights)], each) for each in zip(*heights, strict=True))
-        yield result.row(lab, "orbit_birth", finer(coarse_birth.value, fine_birth))
+        yield result.row(lab, "orbit_birth", with_step_error(coarse_birth.value, fine_birth))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
@@ -117,7 +117,7 @@ def _multiplier(result: TrialResult, begin: float, end: float, p: Parameters) ->
     """By which factor disturbances by a step of the flow shrink between two times; a later part shows how surely."""
     parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
     slow, fast, later = (hop_map(tops(run, begin + after, end).x, p)[0] for run, after in parts)
-    return finer(slow, Measured(fast, abs(fast - later)))
+    return with_step_error(slow, Measured(fast, abs(fast - later)))
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
@@ -191,7 +191,7 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
     again = [task(walls[k], np.array(tasks[k][1].x0), ALONE_FOR, MARGINAL[0]) for k in (-4, -1)]
-    yield from _left_alone(lab, "followed", SET, again)
+    yield from _hops_at_end(lab, "followed", SET, again)
 
 
 RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
@@ -236,7 +236,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured
     Factors are those with the coarser step, with the finer one, and in a later part of the run with the finer one.
     """
     slow, fast, later = (float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True))
-    return finer(slow, Measured(fast, abs(fast - later)))
+    return with_step_error(slow, Measured(fast, abs(fast - later)))
 
 
 SWINGING, SWUNG = 24.0, 4.0
@@ -263,7 +263,7 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     ]
     conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
     for name, coarse, fine, before in zip(("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True):
-        yield result.row(lab, name, finer(coarse, Measured(fine, abs(fine - before))), **conditions)
+        yield result.row(lab, name, with_step_error(coarse, Measured(fine, abs(fine - before))), **conditions)
 
 
 def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
@@ -288,10 +288,10 @@ def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
             slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
             x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
             tasks.append(lab.task(p, x, lasts, coarse_step(p) / 4, samples=2000))
-    yield from _left_alone(lab, "calm", "strong drag", tasks)
+    yield from _hops_at_end(lab, "calm", "strong drag", tasks)
 
 
-def _left_alone(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterator[Measurement | Missing]:
+def _hops_at_end(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterator[Measurement | Missing]:
     """Whether each ball hops at the end of a run from a state: 1 or 0."""
     for task, run in zip(tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
@@ -309,7 +309,7 @@ def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
         "rough-floor-2": with_groups(p, 0.1198, 2.099, mu=1.2277, eta=0.1721, j=0.611, r=0.154 * p.R),
     }
     starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
-    yield from reading(lab, "choice", starts[: lab.effort.choice_sets])
+    yield from settled_readings(lab, "choice", starts[: lab.effort.choice_sets])
 
 
 _HOPS = "hops that last are those of the set hopping"

@@ -10,12 +10,12 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
-from compare.claim import Bearing, Text, bearings, claim, every, given
+from compare.claim import Bearing, Text, all_of, bearings, claim, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
 from compare.kit.settling import physical_case
 from compare.kit.statistics import Measured
-from compare.states import cases, detected, from_floor, is_in, lasting, lifts_first, reached, slips_first
+from compare.states import case_of, from_floor, is_in, lasting_cases, lifts_first, slips_first, solution_of, solutions
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES
@@ -26,22 +26,23 @@ RTOL = 1e-9
 
 
 def _slope(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> tuple[Bearing]:
-    """Slopes measured in one way, in units of the slope of rolling."""
-    when = every(given(by=by), is_in(*cases))
+    """A bearing on slopes of the characteristic curve that were measured in one way, in some cases."""
+    when = all_of(given(by=by), is_in(*cases))
     return (Bearing("slope", "slope", predict, when=when, by=f"analytic.{function}"),)
 
 
-def _local(m: Measurement) -> float:
-    return theory(analytic.characteristic_slope, m.parameters, detected(m))
+def _slope_at(m: Measurement) -> float:
+    """d omega_c/d omega_0 in the case that was detected."""
+    return theory(analytic.characteristic_slope, m.parameters, case_of(m))
 
 
 def _only_rolling(m: Measurement) -> float:
-    """Within the operating range RR, whatever the start on the floor or, as long as it lasts there, on the wall."""
+    """The case: RR within the operating range, from every start; beyond it one that lasts, and not RR."""
     if m.parameters.omega_0 < analytic.operating_range(m.parameters):
         return float(Case.RR)
     # The start that shows that the range has ended: the ball slips on the floor, or stays on the wall.
     ended = m.conditions["start"] == ("rest" if slips_first(m) else "on the wall")
-    if detected(m) not in cases(m.parameters) - ({Case.RR} if ended else set()):
+    if case_of(m) not in lasting_cases(m.parameters) - ({Case.RR} if ended else set()):
         raise LookupError("beyond the range, rolling is not the only motion that lasts")
     return m.value
 
@@ -49,15 +50,15 @@ def _only_rolling(m: Measurement) -> float:
 def _reads_flow(m: Measurement) -> float:
     """omega_0 within the reading range; beyond it, that of slipping on the floor, which is less: never for eta > j."""
     p = m.parameters
-    within, reads = p.omega_0 < analytic.reading_range(p), float(reached(m).state.omega_c)
-    if not within and (lifts_first(m) or (detected(m) is not Case.NR and reads >= p.omega_0)):
+    within, reads = p.omega_0 < analytic.reading_range(p), float(solution_of(m).state.omega_c)
+    if not within and (lifts_first(m) or (case_of(m) is not Case.NR and reads >= p.omega_0)):
         raise LookupError("beyond the range a ball on the floor lags")
     return p.omega_0 if within else reads
 
 
-def _branch(m: Measurement) -> Case:
+def _loop_case(m: Measurement) -> Case:
     """Case at a level of the hysteresis loop: that of the branch it comes from while it attracts, else of the other."""
-    states = cases(m.parameters) - {Case.NS}
+    states = lasting_cases(m.parameters) - {Case.NS}
     lifted = m.conditions["before"] == Case.NR.name
     here = {case for case in states if (case is Case.NR) == lifted}
     if len(here or states) != 1:
@@ -67,33 +68,35 @@ def _branch(m: Measurement) -> Case:
 
 def _jumps_up(m: Measurement) -> bool:
     """Whether the ball was lifted off the floor at a level of the hysteresis loop."""
-    return detected(m) is Case.NR and m.conditions["before"] != Case.NR.name
+    return case_of(m) is Case.NR and m.conditions["before"] != Case.NR.name
 
 
 def _jumps_down(m: Measurement) -> bool:
-    """Whether it came down to the floor."""
-    return detected(m) is not Case.NR and m.conditions["before"] == Case.NR.name
+    """Whether the ball came down to the floor at a level of the hysteresis loop."""
+    return case_of(m) is not Case.NR and m.conditions["before"] == Case.NR.name
 
 
-def _reading(m: Measurement) -> float:
-    case = _branch(m)
-    return next(float(s.state.omega_c) for s in lasting(m.parameters) if s.case is case)
+def _loop_reading(m: Measurement) -> float:
+    """omega_c at a level of the hysteresis loop, in the case of `_loop_case`."""
+    case = _loop_case(m)
+    return next(float(s.state.omega_c) for s in solutions(m.parameters) if s.case is case)
 
 
-def _stays(m: Measurement) -> bool:
+def _does_not_sink(m: Measurement) -> bool:
     """Whether there is a flow, and the ball doesn't sink."""
-    return m.parameters.omega_0 > 0 and detected(m) is not Case.NS
+    return m.parameters.omega_0 > 0 and case_of(m) is not Case.NS
 
 
-def _run(m: Measurement) -> Trajectory:
+def _simulated(m: Measurement) -> Trajectory:
+    """Theory's motion from the state that was measured."""
     return simulated(m.parameters, state(m), m.at("duration"), 2000, rtol=RTOL)
 
 
-def _ends(*starts: str) -> tuple[Bearing, ...]:
-    """The case in which motions end that start in one of these ways."""
+def _end_cases(*starts: str) -> tuple[Bearing, ...]:
+    """Bearings on the case in which motions end that start in one of these ways."""
 
     def case(m: Measurement) -> float:
-        return physical_case(Case(_run(m).case[-1]))
+        return physical_case(Case(_simulated(m).case[-1]))
 
     ends = (given(start=start) for start in starts)
     return tuple(Bearing("unloading", "case", case, when=when, by=_SIMULATED) for when in ends)
@@ -101,7 +104,7 @@ def _ends(*starts: str) -> tuple[Bearing, ...]:
 
 def _at_event(m: Measurement) -> Measured:
     """A number at an event of theory's motion; LookupError if there is no such event."""
-    run, events, event, unsure = _run(m), _run(m).events, m.conditions["event"], 0.0
+    run, events, event, unsure = _simulated(m), _simulated(m).events, m.conditions["event"], 0.0
     changes = list(zip(map(Case, events.from_case), map(Case, events.to_case), strict=True))
     if m.quantity == "lift":
         top = Measured(float(run.y[-1]), 0.0) if event == "end" else first_top(run)
@@ -126,7 +129,7 @@ TOLERANCES = {"mu": 0.05, "eta": 0.05}
 """Relative tolerances with which a meter's limit is claimed to be within its spread."""
 
 
-def _limit(m: Measurement, relation: Relation) -> float:
+def _design_limit(m: Measurement, relation: Relation) -> float:
     """The flow at which a design says that its operating range ends; at the soonest, and at the latest, by the spread.
 
     Of a meter as meant, or with the worst and the best of friction within `TOLERANCES`.
@@ -143,13 +146,13 @@ def _stokes(m: Measurement) -> bool:
     return m.parameters.drag == STOKES
 
 
-def _one_end(m: Measurement) -> bool:
+def _limit_is_one_threshold(m: Measurement) -> bool:
     """Whether one and the same threshold ends the operating range at every corner of `TOLERANCES`."""
     p, off = m.parameters, TOLERANCES["eta"]
     return not p.eta * (1 - off) < p.j < p.eta * (1 + off)
 
 
-def _between(m: Measurement) -> float:
+def _loop_reading_of_design(m: Measurement) -> float:
     """The reading of a rising or falling flow, from the design's characteristic curve."""
     low, high = design.readings(m.parameters, m.parameters.omega_0)
     return float(low if m.conditions["side"] == "up" else high)
@@ -160,13 +163,13 @@ CLAIMS = (
         "slope-rolling",
         "Section 5.3",
         "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = 1.",
-        *_slope("neighbours", _local, "characteristic_slope", Case.RR, Case.NR),
+        *_slope("neighbours", _slope_at, "characteristic_slope", Case.RR, Case.NR),
     ),
     claim(
         "slope-slipping",
         "Section 5.3, (38), (41)",
         "While the ball slips at both points its reading rises by (38), (41), at first hardly at all.",
-        *_slope("neighbours", _local, "characteristic_slope", Case.SS),
+        *_slope("neighbours", _slope_at, "characteristic_slope", Case.SS),
     ),
     claim(
         "slope-jump",
@@ -187,9 +190,9 @@ CLAIMS = (
         "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, from rest the ball "
         "slips (η < j), and on the wall it stays (η > j).",
         # Slipping on the floor no ball sinks.
-        Bearing("settled", "case", _only_rolling, when=every(from_floor, _stays, slips_first)),
-        Bearing("settled", "case", _only_rolling, when=every(_stays, lifts_first)),
-        Bearing("settled", "omega_c", _reads_flow, when=_stays),
+        Bearing("settled", "case", _only_rolling, when=all_of(from_floor, _does_not_sink, slips_first)),
+        Bearing("settled", "case", _only_rolling, when=all_of(_does_not_sink, lifts_first)),
+        Bearing("settled", "omega_c", _reads_flow, when=_does_not_sink),
         *(
             Bearing("thresholds", end, lambda m: analytic.operating_range(m.parameters), when=first)
             for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
@@ -218,10 +221,10 @@ CLAIMS = (
         "Fig. 13, left",
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
         *(
-            Bearing("hysteresis", "case", lambda m: float(_branch(m)), when=when, by="analytic.stable_solutions")
+            Bearing("hysteresis", "case", lambda m: float(_loop_case(m)), when=when, by="analytic.stable_solutions")
             for when in (_jumps_up, _jumps_down, lambda m: not (_jumps_up(m) or _jumps_down(m)))
         ),
-        Bearing("hysteresis", "omega_c", _reading, by="(32), (38), (46)"),
+        Bearing("hysteresis", "omega_c", _loop_reading, by="(32), (38), (46)"),
         text=Text.CORRECTED,
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",
     ),
@@ -230,14 +233,14 @@ CLAIMS = (
         "Fig. 13, right; section 5.3",
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
         "rolling at both points.",
-        *_ends(UNLOADED),
+        *_end_cases(UNLOADED),
         *bearings("unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED),
     ),
     claim(
         "push",
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
-        *_ends(UPWARDS, BY_SPIN),
+        *_end_cases(UPWARDS, BY_SPIN),
         Bearing("unloading", "lift", _at_event, by=_SIMULATED),
     ),
     claim(
@@ -249,8 +252,8 @@ CLAIMS = (
             Bearing(
                 "thresholds",
                 end,
-                partial(_limit, relation=relation),
-                when=every(first, _stokes, *([_one_end] if relation is Relation.AT_MOST else ())),
+                partial(_design_limit, relation=relation),
+                when=all_of(first, _stokes, *([_limit_is_one_threshold] if relation is Relation.AT_MOST else ())),
                 relation=relation,
                 by="analytic.flowmeter.design",
             )
@@ -262,7 +265,7 @@ CLAIMS = (
         "design-reading",
         "extension, Fig. 13",
         "A meter reads the lowest of a design's readings while the flow rises, the highest while it falls.",
-        Bearing("hysteresis", "omega_c", _between, by="analytic.flowmeter.design.readings"),
+        Bearing("hysteresis", "omega_c", _loop_reading_of_design, by="analytic.flowmeter.design.readings"),
     ),
     claim(
         "time-constants",
@@ -272,7 +275,7 @@ CLAIMS = (
             "rates",
             "slowest_decay",
             lambda m: 1 / design.response_time(m.parameters),
-            when=every(given(case="RR"), lambda m: m.parameters.drag != QUADRATIC),
+            when=all_of(given(case="RR"), lambda m: m.parameters.drag != QUADRATIC),
             by="analytic.flowmeter.design.response_time",
         ),
     ),

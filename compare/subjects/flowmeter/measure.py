@@ -30,10 +30,10 @@ from compare.kit.settling import (
     Patience,
     Settled,
     duration,
-    judged,
-    lasting,
+    judge_run,
     named_start,
     physical_case,
+    rounded_duration,
     safe_height,
     settle_groups,
     settled_cases,
@@ -87,7 +87,7 @@ class Curve:
 
 
 def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
-    """Where slopes of a set are wanted.
+    """Rows of flows at which states are to settle for slopes of the characteristic curve of a set.
 
     Between neighbours of settled states that slip on the floor, at most so many, and of the fastest of the others;
     across the onset of slipping; and from there to the flow at which the wall begins to carry the ball.
@@ -149,7 +149,7 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
     why = "no flow at which slipping on the floor gives way to riding the wall"
     yield from (Missing("hysteresis", name, why) for name, loop in loops.items() if not loop)
     loops = {name: loop for name, loop in loops.items() if loop}
-    tasks = [_round(lab, [level.p for level in loop]) for loop in loops.values()]
+    tasks = [_loop_task(lab, [level.p for level in loop]) for loop in loops.values()]
     for (name, loop), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
             yield Missing("hysteresis", name, f"the run {run}")
@@ -161,7 +161,7 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
         for k, level in enumerate(loop):
             held = slice(k * count, (k + 1) * count)
             part = replace(run, **{column: getattr(run, column)[held] for column in columns(Trajectory)})
-            ended = judged(replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose)
+            ended = judge_run(replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose)
             if ended.failure:
                 where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
                 yield Missing("hysteresis", name, f"{where}: {ended.failure}")
@@ -175,8 +175,8 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
             before = physical_case(ended.case).name
 
 
-def _round(lab: Lab, levels: Sequence[Parameters]) -> Task:
-    """One run through all levels, each held."""
+def _loop_task(lab: Lab, levels: Sequence[Parameters]) -> Task:
+    """A run through all levels of the flow, each held for a time."""
     p, flows = levels[0], [level.omega_0 for level in levels]
     hold = duration(p, lab.effort.hysteresis_hold)
     samples = round(hold / (STEPS_A_SAMPLE * coarse_step(p))) * len(flows)
@@ -209,7 +209,7 @@ def _levels(name: str, records: Records, parts: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Shown:
-    """What a trial shows at an event."""
+    """A quantity that a trial of unloading shows at an event, by names."""
 
     trial: str
     quantity: str
@@ -278,7 +278,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
     coarse, fine = (times if name == LANDING else times // 4 for times in lab.effort.unloading_refine)
     # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of many kinds.
     lands = 1.2 + 7 * p.c * time_unit(p)
-    t_end, step = lasting(p, lands if name == LANDING else 6.0), coarse_step(p) / fine
+    t_end, step = rounded_duration(p, lands if name == LANDING else 6.0), coarse_step(p) / fine
 
     def read(run: Trajectory) -> tuple[Case, dict[Shown, Measured]]:
         numbers = {}

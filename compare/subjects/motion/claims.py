@@ -36,23 +36,23 @@ def _sinking(m: Measurement) -> float:
     return -drag.sinking_speed(**{name: m.at(name) for name in FLUIDS[m.set]})
 
 
-def _end(m: Measurement) -> float:
+def _end_of_motion(m: Measurement) -> float:
     """A column of theory's motion where the measured one ends."""
     flow = late_ramp(m.parameters, m.at("rate"), m.at("time")) if "rate" in m.conditions else None
     motion = simulated(m.parameters, state(m), m.at("time"), flow=flow)
     return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
 
 
-def _ends(*starts: str) -> tuple[Bearing, ...]:
-    """The state at the end of motions from starts whose names begin so, in units of what gravity does."""
+def _end_states(*starts: str) -> tuple[Bearing, ...]:
+    """Bearings on the state at the end of motions from starts whose names begin so."""
 
     def when(m: Measurement) -> bool:
         return str(m.conditions["start"]).startswith(starts)
 
-    return bearings("runs", [f"end_{name}" for name in VARIABLES], _end, when=when, by=_RUN)
+    return bearings("runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=when, by=_RUN)
 
 
-def _holds(case: Case, m: Measurement) -> bool:
+def _is_stable(case: Case, m: Measurement) -> bool:
     """Whether slip out of a case dies out."""
     return slip_stability.stability(case, m.parameters) is SlipStability.STABLE
 
@@ -63,29 +63,30 @@ def _exists(case: Case, m: Measurement) -> bool:
 
 
 def _rolls_or_slips(holds: Callable[[Case, Measurement], bool], m: Measurement) -> float:
-    """Along a smooth wall: RS as long as it holds, SS beyond."""
+    """The case along a smooth wall: RS as long as `holds` says that it lasts, SS beyond."""
     return float(Case.RS if holds(Case.RS, m) else Case.SS)
 
 
 def _braked_rolls(m: Measurement) -> float:
-    """RR, if friction suffices for it; LookupError else."""
+    """The case of a ball whose spin the fluid brakes: RR, if friction suffices for it; LookupError else."""
     if not real_fluid.rolling(m.parameters).friction < 1:
         raise LookupError("friction doesn't balance the fluid's torque")
     return float(Case.RR)
 
 
-def _last(m: Measurement, leave_rolling: str = "slip-stability") -> float:
+def _last_case(m: Measurement, leave_rolling: str = "slip-stability") -> float:
     """The case in which theory's motion ends."""
     run = theory(analytic.simulate, m.parameters, state(m), m.at("time"), leave_rolling=leave_rolling, rtol=RTOL)
     return float(run.case[-1])
 
 
-def _either(m: Measurement) -> float:
-    """The same. Where forces admit rolling at both points and slip would last, too, the internal force between floor
-    and wall decides, which the state doesn't contain (docs/theory.md, 7): both outcomes then agree with theory.
+def _last_case_either(m: Measurement) -> float:
+    """The case in which theory's motion ends, or the measured one where both rolling and slipping agree with theory.
+
+    There the internal force between floor and wall decides, which the state doesn't contain (docs/theory.md, 7).
     """
-    leaves = _last(m)
-    return leaves if leaves == m.value or _last(m, "infeasible") != m.value else m.value
+    leaves = _last_case(m)
+    return leaves if leaves == m.value or _last_case(m, "infeasible") != m.value else m.value
 
 
 LAW_CLAIMS = (
@@ -121,13 +122,13 @@ LAW_CLAIMS = (
         "Fig. 2, Table 3",
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
         "equations of motion say.",
-        Bearing("motions", "case", _either, by=_RUN),
+        Bearing("motions", "case", _last_case_either, by=_RUN),
     ),
     claim(
         "flight",
         "extension, (9), (20)",
         "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and keeps its spin.",
-        *_ends("thrown"),
+        *_end_states("thrown"),
         reason=_OWN,
     ),
     claim(
@@ -135,14 +136,14 @@ LAW_CLAIMS = (
         "(12), section 1.1",
         "A wall contact that carries nothing, or less than friction at the floor takes from it, opens, and the ball "
         "leaves the wall as the equations say.",
-        *_ends("pulled off"),
+        *_end_states("pulled off"),
     ),
     claim(
         "sliding",
         "(20), (23)-(29)",
         "A ball that slips or rolls at one contact or both moves on from case to case as the equations say, also while "
         "the flow rises or falls.",
-        *_ends("slips", "rolls", "sinks"),
+        *_end_states("slips", "rolls", "sinks"),
     ),
     claim(
         "smooth-wall",
@@ -151,7 +152,7 @@ LAW_CLAIMS = (
         "as long as slip at the floor dies out, and friction suffices; faster, it slips.",
         *(
             Bearing("runs", "case", partial(_rolls_or_slips, holds), when=given(start="smooth wall"), by=by)
-            for holds, by in ((_holds, _HOLDS), (_exists, "analytic.stationary_solutions"))
+            for holds, by in ((_is_stable, _HOLDS), (_exists, "analytic.stationary_solutions"))
         ),
     ),
     claim(
@@ -163,7 +164,7 @@ LAW_CLAIMS = (
         Bearing(
             "runs",
             "case",
-            lambda m: Case.RR if _holds(Case.RR, m) else _last(m),
+            lambda m: Case.RR if _is_stable(Case.RR, m) else _last_case(m),
             when=given(start="rough floor"),
             by=_HOLDS,
         ),
@@ -182,7 +183,7 @@ LAW_CLAIMS = (
         "extension",
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
         Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
-        *bearings("impacts", [f"after_{name}" for name in LANDED], _end, by=_RUN),
+        *bearings("impacts", [f"after_{name}" for name in LANDED], _end_of_motion, by=_RUN),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
 )
@@ -203,8 +204,8 @@ _FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
 """Where both contacts roll only A_z, B_z and the sums are determined, and measured."""
 
 
-def _moving(case: Case) -> Iterator[Bearing]:
-    """Rates of change, and forces."""
+def _motion_bearings(case: Case) -> Iterator[Bearing]:
+    """Bearings on rates of change and forces of a moving ball in a case."""
 
     def rate(m: Measurement) -> float:
         rates = theory(analytic.vector_field, case, state(m), m.parameters)
@@ -232,7 +233,7 @@ EQUATIONS = tuple(
         f"motion-{case.name}",
         _SOURCES.get(case, "(20)"),
         f"In case {case.name} the accelerations and contact forces are those of the equations of motion.",
-        *_moving(case),
+        *_motion_bearings(case),
         text=Text.CORRECTED if case in _CORRECTED else Text.PRINTED,
         reason=_CORRECTED.get(case, "" if case in _SOURCES else _OWN),
     )

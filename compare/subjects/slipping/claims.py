@@ -10,7 +10,7 @@ import numpy as np
 import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
-from compare.claim import Bearing, Outcome, Text, When, claim, every, given
+from compare.claim import Bearing, Outcome, Text, When, all_of, claim, given
 from compare.judge import simulated
 from compare.kit.record import Measurement, Relation, state
 from model import Case
@@ -20,7 +20,7 @@ from model.kinematics import SLIP_XYZ
 _NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS)
 
 
-def _x(m: Measurement) -> Array:
+def _state(m: Measurement) -> Array:
     return np.array(state(m))
 
 
@@ -35,49 +35,51 @@ def _along(arrow: tuple[Case, Case], *by: str) -> When:
 
 
 def _gamma(m: Measurement) -> float:
+    """gamma (53) along the measured direction of slip, rad s-2."""
     n = [m.at(f"n_{name[-1]}") for name in slip_stability.normals(*_arrow(m))]
-    return float(slip_stability.gamma(*_arrow(m), _x(m), np.array(n), m.parameters))
+    return float(slip_stability.gamma(*_arrow(m), _state(m), np.array(n), m.parameters))
 
 
-def _followed(m: Measurement) -> float:
+def _following_case(m: Measurement) -> float:
     """The case that follows where a slip doesn't last."""
-    x = _x(m)
+    x = _state(m)
     x[SLIP_XYZ] += m.at("slip") * np.array([m.at(name) for name in ("n_x", "n_y", "n_z")])
     return float(simulated(m.parameters, tuple(x.tolist()), m.at("time")).case[-1])
 
 
 def _gamma_nr(m: Measurement) -> float:
-    return float(slip_bounds.gamma_nr(math.atan2(m.at("n_y"), m.at("n_z")), _x(m), m.parameters))
+    return float(slip_bounds.gamma_nr(math.atan2(m.at("n_y"), m.at("n_z")), _state(m), m.parameters))
 
 
-def _lacking(m: Measurement) -> float:
+def _by_forces(m: Measurement) -> float:
     """gamma from the forces of NR: friction that rolling needs along the slip, minus eta times the normal force."""
     p = m.parameters
-    _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _x(m), p)
+    _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _state(m), p)
     return float((1 + p.j) / (p.j * p.m * p.r) * (B_y * m.at("n_z") - B_z * m.at("n_y") - p.eta * B_x))
 
 
 def _steepest(m: Measurement) -> float:
-    return float(slip_bounds.steepest_nr(_x(m), m.parameters))
+    return float(slip_bounds.steepest_nr(_state(m), m.parameters))
 
 
 def _greatest_as_printed(m: Measurement) -> float:
+    """The larger of gamma at the two directions that the paper takes for its extrema, rad s-2."""
     n = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-    return float(slip_stability.gamma(*_RR_SS, _x(m), n, m.parameters).max())
+    return float(slip_stability.gamma(*_RR_SS, _state(m), n, m.parameters).max())
 
 
-def _bound(
+def _bounds(
     arrow: tuple[Case, Case],
     by: str,
     bound: Callable[[Measurement], SlipBound | HeldBound],
     side: int = 0,
     from_rest: bool = False,
 ) -> tuple[Bearing, Bearing]:
-    """Zero and slope of gamma.
+    """Bearings on the zero and the slope of gamma over the flow, which a bound of the paper predicts.
 
     `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly so.
     """
-    when = every(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
+    when = all_of(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
     power = "_square" if by == "stationary" else ""
     size = (lambda m: m.parameters.g / m.parameters.R) if from_rest else None
     return (
@@ -86,7 +88,7 @@ def _bound(
     )
 
 
-def _neutral(quantity: str, case: Case, by: str) -> Bearing:
+def _neutral_flow(quantity: str, case: Case, by: str) -> Bearing:
     return Bearing(
         "thresholds",
         quantity,
@@ -96,11 +98,11 @@ def _neutral(quantity: str, case: Case, by: str) -> Bearing:
     )
 
 
-def _share(m: Measurement) -> float:
+def _filippov_share(m: Measurement) -> float:
     return slip_bounds.filippov_share(_arrow(m)[1], m.at("omega_c"), m.parameters)
 
 
-def _on_the_wall(m: Measurement) -> float:
+def _case_on_wall(m: Measurement) -> float:
     """NR where it is stable with respect to slipping, else NS."""
     stable = slip_stability.stability(Case.NR, m.parameters) is slip_stability.SlipStability.STABLE
     return float(Case.NR if stable else Case.NS)
@@ -120,7 +122,7 @@ CLAIMS = (
                 if gamma is _gamma or arrow == _NR_NS
             ),
             *(
-                Bearing(protocol, "case", _followed, when=_along(arrow, *by), by="analytic.simulate")
+                Bearing(protocol, "case", _following_case, when=_along(arrow, *by), by="analytic.simulate")
                 for protocol, by in (
                     ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
                     ("bounds", ("held", "stationary")),
@@ -140,19 +142,19 @@ CLAIMS = (
         "3.2, last paragraph",
         "On the wall alone slip in a direction grows in proportion to the friction that rolling needs in it, less "
         "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
-        Bearing("growth", "gamma", _lacking, when=_along(_NR_NS, "", "dragged"), by="analytic.contact_forces, (13)"),
+        Bearing("growth", "gamma", _by_forces, when=_along(_NR_NS, "", "dragged"), by="analytic.contact_forces, (13)"),
     ),
     claim(
         "eq-61",
         "(60), (61)",
         "Rolling on the wall alone is stable with respect to slipping above ω₀₂.",
-        *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+        *_bounds(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
     ),
     claim(
         "eq-66",
         "(66)",
         "A ball that rolls round slower than the fluid begins to slip at the wall once the difference exceeds (66).",
-        *_bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y")))),
+        *_bounds(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y")))),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
     ),
@@ -160,45 +162,45 @@ CLAIMS = (
         "eq-67",
         "(67)",
         "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = 0.",
-        *_bound(_RR_RS, "stationary", lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
+        *_bounds(_RR_RS, "stationary", lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
     ),
     claim(
         "eq-73",
         "(73)",
         "A ball that rolls round slower than the fluid begins to slip at the floor once the difference exceeds (73).",
-        *_bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x")))),
+        *_bounds(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x")))),
     ),
     claim(
         "eq-74",
         "(74)",
         "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it lifts (η > j).",
-        *_bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
-        _neutral("omega_03", Case.RR, "loss of the floor"),
+        *_bounds(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
+        _neutral_flow("omega_03", Case.RR, "loss of the floor"),
     ),
     claim(
         "eq-82",
         "(82)",
         "Slip at both points at once, in the directions α = β = 0, grows above ω₀₁ and dies out below.",
-        *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
+        *_bounds(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
     ),
     claim(
         "eq-83",
         "(83)",
         "Slip at both points in the directions α = β = π dies out: (83) has no bound for η < 1.",
-        *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
+        *_bounds(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
     ),
     claim(
         "fig-4-5",
         "Figs. 4 and 5",
         "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps slipping.",
-        *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
-        Bearing("settled", "case", _on_the_wall, when=given(start="on the wall"), by="slip_stability.stability"),
+        *_bounds(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+        Bearing("settled", "case", _case_on_wall, when=given(start="on the wall"), by="slip_stability.stability"),
     ),
     claim(
         "eq-69",
         "(69)",
         "Rolling is the mean of slipping to one side and to the other, weighted so that no slip is left.",
-        Bearing("growth", "filippov_share", _share, by="slip_bounds.filippov_share"),
+        Bearing("growth", "filippov_share", _filippov_share, by="slip_bounds.filippov_share"),
     ),
     claim(
         "definition-3",
@@ -206,9 +208,9 @@ CLAIMS = (
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
         Bearing("growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
-        _neutral("omega_01", Case.RR, "onset of slip"),
-        _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
-        _neutral("omega_03", Case.RR, "loss of the floor"),
+        _neutral_flow("omega_01", Case.RR, "onset of slip"),
+        _neutral_flow("omega_02", Case.NR, "onset of sliding on the wall"),
+        _neutral_flow("omega_03", Case.RR, "loss of the floor"),
     ),
     claim(
         "extrema",
@@ -237,8 +239,8 @@ CLAIMS = (
             *(
                 Bearing("lift", quantity, predict, when=given(inner=inner.name), by="slip_stability: lift")
                 for quantity, predict in (
-                    ("lifts", lambda m: slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0),
-                    ("lift_onset", lambda m: slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)),
+                    ("lifts", lambda m: slip_stability.lift_acceleration(*_arrow(m), _state(m), m.parameters) > 0),
+                    ("lift_onset", lambda m: slip_stability.lift_onset(*_arrow(m), _state(m), m.parameters)),
                 )
                 if quantity == "lifts" or inner is not Case.RS
             ),

@@ -37,7 +37,7 @@ def _spectrum(m: Measurement) -> tuple[complex, ...]:
 
 
 def _mode(m: Measurement) -> complex:
-    """The eigenvalue that belongs to a measured one: each to one, in the order of frequency and decay."""
+    """The eigenvalue of theory for a measured mode, by its number in the order of frequency and decay, rad s-1."""
     values = _spectrum(m)
     real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
     upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag >= -real)
@@ -47,7 +47,8 @@ def _mode(m: Measurement) -> complex:
     return complex(-decay, frequency)
 
 
-def _size(m: Measurement) -> float:
+def _mode_size(m: Measurement) -> float:
+    """Natural size of decay rate or frequency of a mode, s-1."""
     value = _mode(m)
     parts = (-value.real, value.imag)
     return natural_size(*(parts if m.quantity == "decay_rate" else parts[::-1]), m.parameters)
@@ -62,24 +63,25 @@ def _response(m: Measurement) -> float:
         values, rows = theory(analytic.leaning_modes, p)
         moved = (rows.T * np.exp(values * time)) @ np.linalg.inv(rows.T)
     else:
-        moved = theory(_moved, case, tuple(stationary.x), p, time)
+        moved = theory(_propagator, case, tuple(stationary.x), p, time)
     units = state_units(p)[[VARIABLES.index(name) for name in names]]
     return float(moved[i, j].real * units[j] / units[i])
 
 
-def _moved(case: Case, x: tuple[float, ...], p: Parameters, time: float) -> Array:
+def _propagator(case: Case, x: tuple[float, ...], p: Parameters, time: float) -> Array:
+    """How the linear motion about a state carries disturbances on by a time in s, (d, d)."""
     from scipy.linalg import expm  # here, because it takes long to load
 
     return np.asarray(expm(time * dynamics.jacobian(case, State.of(np.array(x)), p)))
 
 
 def _bearings(case: Case) -> tuple[Bearing, ...]:
-    """The whole spectrum of the state of a case."""
+    """Bearings on all eigenvalues of the stationary state of a case."""
     when = given(case=case.name)
     leans = case is Case.SR
     return (
-        Bearing("rates", "decay_rate", lambda m: -_mode(m).real, when=when, size=_size, by=_JACOBIAN),
-        Bearing("rates", "frequency", lambda m: _mode(m).imag, when=when, size=_size, by=_JACOBIAN),
+        Bearing("rates", "decay_rate", lambda m: -_mode(m).real, when=when, size=_mode_size, by=_JACOBIAN),
+        Bearing("rates", "frequency", lambda m: _mode(m).imag, when=when, size=_mode_size, by=_JACOBIAN),
         Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=_JACOBIAN),
         Bearing(
             "rates", "response", _response, when=when, by=_LEANING if leans else "exponential of the exact Jacobian"
@@ -95,7 +97,7 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
     )
 
 
-def _slowest(m: Measurement) -> float:
+def _slowest_decay(m: Measurement) -> float:
     """The slowest decay of SR: that of leaning below omega_03, where it grows."""
     p, decay = m.parameters, -theory(analytic.leaning_modes, m.parameters)[0].real
     return float(decay[0] if p.omega_0 < theory(analytic.thresholds, p.replace(omega_0=1.0)).omega_03 else min(decay))
@@ -121,7 +123,7 @@ CLAIMS = (
         "In SR a load on the floor dies out above ω₀₃ = √(g/jR) and grows "
         "below, at the rates of the eigenvalues of f_SR.",
         *_bearings(Case.SR),
-        Bearing("rates", "decay_rate", _slowest, when=given(case="SR", mode=1), size=_size, by=_LEANING),
+        Bearing("rates", "decay_rate", _slowest_decay, when=given(case="SR", mode=1), size=_mode_size, by=_LEANING),
         text=Text.CORRECTED,
         reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side where the ball leans "
         "on the floor; on the other it lifts off, and its height is then free. (35) needs ω₀ ≥ √(g/(ηR)), not ≤.",

@@ -55,7 +55,7 @@ Exponents = npt.NDArray[np.complex128]
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    found = [each for name, p in sets.items() for each in chosen(records, name, p, lab.effort.rates_more)]
+    found = [each for name, p in sets.items() for each in chosen_states(records, name, p, lab.effort.rates_more)]
     yield from (each for each in found if isinstance(each, Missing))
     states = [each for each in found if isinstance(each, Pushed)]
     tasks = [state.tasks(lab) for state in states]
@@ -64,7 +64,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield state.missing(f"a run {runs}")
             continue
         count = 2 * len(state.active)
-        answers = [answer(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
+        answers = [push_response(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
         # An almost unloaded floor follows its load less exactly. (48 was 32 before rates of leaning by shorter records
         # had been seen to be off.)
         if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
@@ -148,13 +148,13 @@ class Pushed:
         return tasks
 
     def missing(self, why: str, modes: int = 0) -> Missing:
-        """That the rates (decay and frequency) of some modes, or of all, were not measured."""
+        """A record of modes, all by default, whose decay rates and frequencies were not measured, and why."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
         return Missing(PROTOCOL, self.start.set, f"{at}: {why}", 2 * (modes or len(self.active)))
 
 
-def chosen(records: Records, name: str, p: Parameters, more: float) -> Iterator[Pushed | Missing]:
-    """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
+def chosen_states(records: Records, name: str, p: Parameters, more: float) -> Iterator[Pushed | Missing]:
+    """States of a set to be pushed: one that spins on the spot next to the wall, and several settled ones of each case.
 
     Where there are fewer that can be pushed, the rest is missing.
     """
@@ -191,8 +191,8 @@ def _settled(records: Records, name: str) -> Iterator[Pushed]:
             yield Pushed(Start(name, p, "settled", x.stacked()), Case.SR)
 
 
-def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
-    """D (n, d, d): how the active variables, in `units`, follow pushes of one size; runs in the order of the tasks.
+def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
+    """The response D (n, d, d) of the active variables, in `units`, to pushes of one size, from the runs of `tasks`.
 
     Only as long as the ball stays in the case and no variable is 0.4 away from the state, and without the first sample:
     forces build up then.
@@ -290,7 +290,7 @@ def _modes(
 
 
 def _responses(state: Pushed, answers: Sequence[Array], turns: float, row: Row) -> Iterator[Measurement]:
-    """How each active variable follows one of each, in `units`, a third of the record later.
+    """Measurements of how each active variable follows a push of each, in `units`, a third of the record later.
 
     This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum` does, to a
     vanishing push and step; what the exponents may be off, s-1, turns it.

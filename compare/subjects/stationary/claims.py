@@ -9,11 +9,11 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
-from compare.claim import Bearing, Text, When, bearings, claim, every, given
+from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
-from compare.states import cases, detected, from_floor, is_in, lifts_first, number, reached, slips_first
+from compare.states import case_of, from_floor, is_in, lasting_cases, lifts_first, quantity_of, slips_first, solution_of
 from model import Case
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
@@ -25,18 +25,18 @@ def case(m: Measurement) -> float:
     From the floor it may settle to whatever attracts. High up on the wall it stays where the wall carries it, and
     sinks where not.
     """
-    allowed = cases(m.parameters)
+    allowed = lasting_cases(m.parameters)
     if m.conditions["start"] == "on the wall":
-        if detected(m) is Case.NS and _exists(Case.NR, m):
+        if case_of(m) is Case.NS and _exists(Case.NR, m):
             raise LookupError("NR exists, and yet the ball sinks")
         allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
     else:
         allowed -= {Case.NS}
-    if detected(m) in allowed:
+    if case_of(m) in allowed:
         return m.value
     if len(allowed) == 1:
         return float(allowed.pop())
-    raise LookupError(f"{detected(m).name} is none of {allowed}")
+    raise LookupError(f"{case_of(m).name} is none of {allowed}")
 
 
 def rolling(m: Measurement) -> float:
@@ -45,45 +45,47 @@ def rolling(m: Measurement) -> float:
     limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
-    if detected(m) is Case.RR or (_exists(Case.RR, m) and m.parameters.mu < 1):  # beyond, forces may hold it
+    if case_of(m) is Case.RR or (_exists(Case.RR, m) and m.parameters.mu < 1):  # beyond, forces may hold it
         raise LookupError("RR has ended")
     return case(m)
 
 
 def _exists(case: Case, m: Measurement) -> bool:
+    """Whether theory has a stationary state of a case."""
     return any(s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters))
 
 
-def _values(
+def _value_bearings(
     quantities: Iterable[str], when: When, by: str, of: Case | None = None, protocol: str = "settled"
 ) -> tuple[Bearing, ...]:
-    """Values of settled states, predicted by the state of a case, or of that detected."""
+    """Bearings on values of settled states: predicted in the case `of`, or in the one that was detected."""
 
     def predict(m: Measurement) -> float:
-        state = theory(analytic.solution, m.parameters, of) if of else reached(m)
-        return number(m.quantity, state, m.parameters)
+        state = theory(analytic.solution, m.parameters, of) if of else solution_of(m)
+        return quantity_of(m.quantity, state, m.parameters)
 
     return bearings(protocol, quantities, predict, when=when, by=by)
 
 
-def _cases(when: When) -> Bearing:
+def _case_bearing(when: When) -> Bearing:
+    """A bearing on the case to which a ball settles."""
     return Bearing("settled", "case", case, when=when, by="analytic.stable_solutions")
 
 
-def _with_fluid(when: When = lambda m: True) -> Bearing:
-    chosen = every(given(start="with the fluid"), when)
+def _rolling_bearing(when: When = lambda m: True) -> Bearing:
+    chosen = all_of(given(start="with the fluid"), when)
     return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
 def _along_branch(m: Measurement) -> float:
-    """A force along the branch of SS in closed form, N, at the flow and before the fold."""
+    """A contact force of SS in closed form at the flow, before the fold, N."""
     p = m.parameters
     branch = slipping_branch.branch(slipping_branch.points_at(p)[0], p)
     return float({"force_Ay": branch.A_y, "force_Bx": branch.B_x, "force_Az": -branch.drag}[m.quantity]) * p.m * p.g
 
 
 def _region(m: Measurement) -> Exists:
-    """The region of Fig. 7 or 8."""
+    """The region of Fig. 7 or 8 in which a measurement lies: which stationary solutions exist."""
     p = m.parameters
     return Exists(int(bifurcation.case_map(p, [p.mu], [p.eta], [p.omega_0])[0, 0]))
 
@@ -98,21 +100,21 @@ _LASTING = {
 """What a ball can settle in where a state exists, SR counted as NR: itself, or both that it divides."""
 
 
-def _in_region(m: Measurement) -> float:
+def _cases_in_region(m: Measurement) -> float:
     """The bit mask of the cases in which a ball can settle, by the labels of the region."""
     region = _region(m)
     lasting = set[Case]().union(*(those for flag, those in _LASTING.items() if flag in region))
     return float(sum(1 << case for case in lasting))
 
 
-def _dividing(m: Measurement) -> float:
-    """omega_c of SS beyond the fold; LookupError where the region lacks it, or an attractor that it divides."""
+def _omega_c_beyond_fold(m: Measurement) -> float:
+    """omega_c of the unstable SS; LookupError where the region lacks it, or one of the attractors that it divides."""
     if Exists.SS | Exists.SS_BEYOND_FOLD | Exists.NR not in _region(m):
         raise LookupError("the region lacks SS, SS beyond the fold, or NR")
     return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
 
 
-def _born(m: Measurement) -> float:
+def _drag_at_birth(m: Measurement) -> float:
     """The drag c at which the fold is born at the eta of the set; the eta at which it is born is proportional to c^2.
     Computed from that point at the measured drag, since at the set's own there may be no fold for any eta below j.
     """
@@ -124,7 +126,7 @@ def _born(m: Measurement) -> float:
 
 
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
-_LEANS = every(_LIFTED, from_floor)
+_LEANS = all_of(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
 _DOUBLE = "analytic.bifurcation.diagram.double_points"
 
@@ -134,31 +136,31 @@ CLAIMS = (
         "Prop. 1, (30)-(32)",
         "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
         "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
-        *_values((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
-        _cases(_ROLLS),
-        _with_fluid(),
+        *_value_bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
+        _case_bearing(_ROLLS),
+        _rolling_bearing(),
     ),
     claim(
         "prop-1-rough",
         "Prop. 1, (83), (86)",
         "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
-        *_values(("omega_c",), every(lifts_first, _ROLLS), "(32)"),
-        _with_fluid(lifts_first),
+        *_value_bearings(("omega_c",), all_of(lifts_first, _ROLLS), "(32)"),
+        _rolling_bearing(lifts_first),
     ),
     claim(
         "prop-2-forces",
         "Prop. 2, (33), (34)",
         "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
-        *_values(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
+        *_value_bearings(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
     ),
     claim(
         "prop-3-5",
         "Props. 3 and 5, (35), (36), (46), (47)",
         "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
         "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
-        *_values(_STATE, _LIFTED, "(46), (47)"),
-        *_values(_STATE, _LEANS, "(35), (36)", Case.SR),
-        _cases(_LIFTED),
+        *_value_bearings(_STATE, _LIFTED, "(46), (47)"),
+        *_value_bearings(_STATE, _LEANS, "(35), (36)", Case.SR),
+        _case_bearing(_LIFTED),
         text=Text.CORRECTED,
         reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
     ),
@@ -167,8 +169,8 @@ CLAIMS = (
         "Prop. 4, (37)-(42)",
         "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
         "its contact forces are (42)-(44).",
-        *_values(_STATE, _SLIPS, "(37)-(44)"),
-        _cases(_SLIPS),
+        *_value_bearings(_STATE, _SLIPS, "(37)-(44)"),
+        _case_bearing(_SLIPS),
     ),
     claim(
         "eq-40",
@@ -194,8 +196,8 @@ CLAIMS = (
         "Prop. 6, (49), (50)",
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
-        *_values(_STATE, _SINKS, "(49), (50)"),
-        _cases(given(start="on the wall")),
+        *_value_bearings(_STATE, _SINKS, "(49), (50)"),
+        _case_bearing(given(start="on the wall")),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),
@@ -203,8 +205,8 @@ CLAIMS = (
         "mirrored",
         "Props. 1, 4 and 5",
         "In a flow the other way round the ball settles in the mirror images of the same states.",
-        *_values(_STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"),
-        *_values((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
+        *_value_bearings(_STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"),
+        *_value_bearings((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
         Bearing("mirrored", "case", case, by="analytic.stable_solutions"),
     ),
 )
@@ -214,23 +216,23 @@ DIAGRAMS = (
         "fig-9",
         "Fig. 9",
         "Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
-        *_values(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
+        *_value_bearings(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
     ),
     claim(
         "fig-10",
         "Fig. 10",
         "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall lie on the curves "
         "of Fig. 10.",
-        *_values(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
-        *_values(("wall_spin",), every(slips_first, _LEANS), "(91)", Case.SR),
+        *_value_bearings(("wall_spin",), all_of(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
+        *_value_bearings(("wall_spin",), all_of(slips_first, _LEANS), "(91)", Case.SR),
     ),
     claim(
         "fig-11",
         "Fig. 11",
         "For η > j rolling ends at ω₀₃, where it meets SR, whose spin on the wall falls like 1/ω₀.",
-        *_values(("wall_spin",), every(lifts_first, _ROLLS), "(91)"),
-        *_values(("wall_spin",), every(lifts_first, _LEANS), "(91)", Case.SR),
-        _with_fluid(lifts_first),
+        *_value_bearings(("wall_spin",), all_of(lifts_first, _ROLLS), "(91)"),
+        *_value_bearings(("wall_spin",), all_of(lifts_first, _LEANS), "(91)", Case.SR),
+        _rolling_bearing(lifts_first),
     ),
     *(
         claim(
@@ -241,7 +243,7 @@ DIAGRAMS = (
             Bearing(
                 "plane",
                 "cases",
-                lambda m: sum(1 << case for case in cases(m.parameters)),
+                lambda m: sum(1 << case for case in lasting_cases(m.parameters)),
                 when=given(figure=figure),
                 by="analytic.stable_solutions",
             ),
@@ -253,15 +255,15 @@ DIAGRAMS = (
         "Figs. 7 and 8, (84)-(90)",
         "In every region of Figs. 7 and 8 the stationary states of its label exist: balls settle in the attracting "
         "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the floor.",
-        Bearing("plane", "cases", _in_region, by="analytic.bifurcation.diagram.case_map"),
-        Bearing("edge", "edge_omega_c", _dividing, by="case_map, analytic.solution"),
+        Bearing("plane", "cases", _cases_in_region, by="analytic.bifurcation.diagram.case_map"),
+        Bearing("edge", "edge_omega_c", _omega_c_beyond_fold, by="case_map, analytic.solution"),
         Bearing("rates", "modes", lambda m: 2.0 * (Exists.SR in _region(m)), when=given(case="SR"), by="case_map"),
     ),
     claim(
         "double-points",
         "Figs. 7 and 8, black dots",
         "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j rolling ends at ω₀₃ = √(g/(jR)), where all meet.",
-        Bearing("birth", "critical_drag", _born, by=_DOUBLE),
+        Bearing("birth", "critical_drag", _drag_at_birth, by=_DOUBLE),
         Bearing("thresholds", "omega_03", lambda m: bifurcation.double_points(m.parameters)[-1].omega_0, by=_DOUBLE),
     ),
 )

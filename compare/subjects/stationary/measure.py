@@ -44,8 +44,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if state.failure:
             yield _unsettled(state, 1)
         else:
-            yield _record(lab, state, "case", state.case)
-        if why := "no values of it" if state.failure else _fading(state):
+            yield _row(lab, state, "case", state.case)
+        if why := "no values of it" if state.failure else _why_drag_fades(state):
             why = f"{state.case.name} at omega_0 = {state.start.p.omega_0:.4g} rad/s: {why}"
             without[Attractor.of(state)] = Missing(PROTOCOL, state.start.set, why, len(state.values))
         else:
@@ -73,7 +73,7 @@ class Attractor:
 
     @classmethod
     def of(cls, state: Settled) -> Self:
-        """That of a settled state."""
+        """The attractor of a settled state."""
         return cls(state.start.set, state.start.p.omega_0, physical_case(state.case))
 
 
@@ -86,7 +86,7 @@ def _starts(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Start]:
         yield Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked())
 
 
-def _fading(state: Settled) -> str:
+def _why_drag_fades(state: Settled) -> str:
     """Why drag fades as the ball settles; empty if it doesn't, and a round lasts for ten times 1/c or more."""
     p = state.start.p
     if p.drag != QUADRATIC:
@@ -110,7 +110,7 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
             changes = [abs(s.values[n].value - fine.values[n].value) / sizes[n] for s in same for n in sizes]
             for n, size in sizes.items():
                 uncertainty = math.hypot(fine.values[n].uncertainty, max(changes) * size)
-                yield _record(lab, fine, n, Measured(fine.values[n].value, uncertainty))
+                yield _row(lab, fine, n, Measured(fine.values[n].value, uncertainty))
 
 
 def mirrored(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -124,19 +124,20 @@ def mirrored(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         if state.failure:
             yield _unsettled(state, 1 + len(state.values), "mirrored")
             continue
-        yield _record(lab, state, "case", state.case, "mirrored")
+        yield _row(lab, state, "case", state.case, "mirrored")
         for quantity, value in state.values.items():
-            yield _record(lab, state, quantity, value, "mirrored")
+            yield _row(lab, state, quantity, value, "mirrored")
 
 
 def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
-    """That a start did not settle, and what it did last."""
+    """A record of a start from which the ball did not settle, and of what it did last."""
     p = each.start.p
     at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
     return Missing(protocol, each.start.set, f"not settled at {at} (start: {each.start.name}): {each.failure}", rows)
 
 
-def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float, protocol: str = PROTOCOL) -> Measurement:
+def _row(lab: Lab, each: Settled, quantity: str, value: Measured | float, protocol: str = PROTOCOL) -> Measurement:
+    """The measurement of a quantity of a settled state."""
     start, at = each.start, {"case": each.case.name, "start": each.start.name}
     return measurement(lab, protocol, start.set, start.p, quantity, value, [each.task], **at)
 

@@ -13,7 +13,7 @@ from analytic.mechanics import rolling_forces
 from compare.claim import Bearing, When, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
-from compare.states import number
+from compare.states import quantity_of
 from model import Case, Parameters
 
 _BY = "analytic.thresholds"
@@ -21,21 +21,23 @@ SLIPPING = "floor force of settled slipping → 0"
 """How omega_02 is measured where slipping at both points ends without a fold: that is a claim of its own."""
 
 
-def _at(quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, protocol: str = "thresholds") -> Bearing:
-    """A threshold."""
+def _threshold(
+    quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, protocol: str = "thresholds"
+) -> Bearing:
+    """A bearing on a threshold, which `analytic.thresholds` predicts."""
     by = f"{_BY}: {quantity}"
-    return Bearing(protocol, quantity, lambda m: float(getattr(_known(m), quantity)), when=when, by=by)
+    return Bearing(protocol, quantity, lambda m: float(getattr(_thresholds(m), quantity)), when=when, by=by)
 
 
-def _known(m: Measurement) -> analytic.Thresholds:
-    """The thresholds of a set, without the flow at which one was measured."""
+def _thresholds(m: Measurement) -> analytic.Thresholds:
+    """The thresholds of a set by theory: independent of the flow at which one was measured."""
     return theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
 
 
-def _edge(m: Measurement) -> float:
-    """A quantity of the unstable state."""
+def _unstable_quantity(m: Measurement) -> float:
+    """A quantity of the unstable SS, which is on the border between two basins."""
     unstable = theory(analytic.solution, m.parameters, Case.SS, stable=False)
-    return number(m.quantity.removeprefix("edge_"), unstable, m.parameters)
+    return quantity_of(m.quantity.removeprefix("edge_"), unstable, m.parameters)
 
 
 _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
@@ -46,7 +48,7 @@ _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
 """Functions that change sign where the contacts can no longer hold a ball that rolls with the fluid."""
 
 
-def _ends(name: str, p: Parameters) -> float:
+def _end_of_rolling(name: str, p: Parameters) -> float:
     """The flow up to which forces admit rolling, which is where rolling ends for mu < 1."""
     unit = math.sqrt(p.g / p.R)
     return float(brentq(_HOLDS[name], 0.01 * unit, 100 * unit, args=(p,), rtol=1e-12))
@@ -57,7 +59,7 @@ CLAIMS = (
         "table-5-P3",
         "Table 5, P3",
         "At ω₀₁ two-point rolling gives way to slipping at both points, whose slip begins at zero.",
-        _at("omega_01"),
+        _threshold("omega_01"),
     ),
     claim(
         "rolling-holds",
@@ -67,7 +69,7 @@ CLAIMS = (
             Bearing(
                 "thresholds",
                 quantity,
-                lambda m, name=name: theory(_ends, name, m.parameters.replace(omega_0=1.0)),  # type: ignore[misc]
+                lambda m, name=name: theory(_end_of_rolling, name, m.parameters.replace(omega_0=1.0)),  # type: ignore[misc]
                 when=lambda m: m.parameters.mu < 1,
                 by=f"rolling_forces.{name}",
             )
@@ -79,28 +81,28 @@ CLAIMS = (
         "table-5-P2",
         "Table 5, P2",
         "At ω₀₂ the sinking state (NS) and the state carried by the wall (NR) meet.",
-        _at("omega_02"),
+        _threshold("omega_02"),
     ),
     claim(
         "table-5-NF2",
         "Table 5, NF2",
         "At ω₀₂ the unstable state of slipping at both points merges with the state carried by the wall.",
-        _at("omega_02", protocol="edge"),
+        _threshold("omega_02", protocol="edge"),
     ),
     claim(
         "table-5-NT1",
         "Table 5, NT1",
         "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in it; above, it "
         "leaves it.",
-        _at("omega_03"),
-        Bearing("thresholds", "lifts", lambda m: math.isnan(_known(m).omega_01), by=f"{_BY}: omega_01"),
+        _threshold("omega_03"),
+        Bearing("thresholds", "lifts", lambda m: math.isnan(_thresholds(m).omega_01), by=f"{_BY}: omega_01"),
     ),
     claim(
         "table-5-F",
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
-        _at("omega_04"),
-        Bearing("thresholds", "folds", lambda m: math.isfinite(_known(m).omega_04), by=f"{_BY}: omega_04"),
+        _threshold("omega_04"),
+        Bearing("thresholds", "folds", lambda m: math.isfinite(_thresholds(m).omega_04), by=f"{_BY}: omega_04"),
     ),
     claim(
         "sub-branches",
@@ -109,7 +111,7 @@ CLAIMS = (
         *bearings(
             "edge",
             [f"edge_{name}" for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")],
-            _edge,
+            _unstable_quantity,
             by="analytic.solution: SS beyond the fold, (37)-(41)",
         ),
     ),
@@ -118,11 +120,11 @@ CLAIMS = (
         "(87), Fig. 7",
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
         "the wall at ω₀₂, without a jump.",
-        Bearing("thresholds", "folds", lambda m: m.parameters.eta > _known(m).eta_cr, by=f"{_BY}: eta_cr"),
+        Bearing("thresholds", "folds", lambda m: m.parameters.eta > _thresholds(m).eta_cr, by=f"{_BY}: eta_cr"),
         Bearing(
             "birth", "critical_drag", lambda m: bifurcation.critical_drag(m.parameters), by="diagram.critical_drag"
         ),
-        _at("omega_02", given(by=SLIPPING)),
+        _threshold("omega_02", given(by=SLIPPING)),
     ),
     claim(
         "one-fold",
@@ -131,7 +133,7 @@ CLAIMS = (
         Bearing(
             "thresholds",
             "omega_04",
-            lambda m: max(_known(m).omega_01, _known(m).omega_02),
+            lambda m: max(_thresholds(m).omega_01, _thresholds(m).omega_02),
             relation=Relation.AT_LEAST,
             by=f"{_BY}: omega_01, omega_02",
         ),

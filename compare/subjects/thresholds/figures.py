@@ -47,7 +47,7 @@ TINTS = {
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane of parameters, and where runs ended in it."""
+    """A plane of friction and flow, and the cases in which runs ended at points of it."""
 
     p: Parameters
     equal: bool
@@ -73,9 +73,9 @@ def draw_plane(plane: Plane) -> tuple[Figure, str]:
         axes.text(section, 0.985, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3",
                   transform=axes.get_xaxis_transform())  # fmt: skip
     for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
-        axes.plot(*_places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
+        axes.plot(*_places_of(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
     if failed := [check for check in plane.checks if not check.agrees]:
-        axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
+        axes.plot(*_places_of(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
     style.legend(figure, loc="outside lower center", ncols=6, handlelength=3.2)
     style.dimensionless(axes, p, y=style.FREE_0)
     fixed = style.named(p, "j", "kappa") if plane.equal else style.named(p, "mu", "j", "kappa")
@@ -149,7 +149,7 @@ def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, 
             style.beside(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
 
 
-def _places(checks: Sequence[Check]) -> Array:
+def _places_of(checks: Sequence[Check]) -> Array:
     return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])
 
 
@@ -191,7 +191,7 @@ def diagram_of_set(p: Parameters, figure: str) -> Diagram:
     return Diagram(figure, p)
 
 
-def _round(
+def _draw_round_with_fluid(
     axes: Axes,
     p: Parameters,
     case: Case,
@@ -199,7 +199,7 @@ def _round(
     name: Name = ("RR", (0.5, (-5, 5))),
     line: Line = STABLE,
 ) -> None:
-    """A branch on which the ball goes round with the fluid, from one flow to another."""
+    """Draw the branch of a case in which the ball goes round with the fluid, from one flow to another."""
     slip_x, flows = round_with_fluid(p, case, *span)
     style.curve(axes, case, flows, spin(p, slip_x, flows), name, line)
 
@@ -208,7 +208,7 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     """One diagram, with both scales."""
     figure, p = style.figure(5.8, 4.1), of.p
     axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
-    draw = partial(_round, axes, p)
+    draw = partial(_draw_round_with_fluid, axes, p)
     guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
     bottom, top = 0.0, 2 * t.omega_02
     if of.figure == "fig-9":

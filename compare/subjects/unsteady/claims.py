@@ -19,22 +19,18 @@ _BY = "analytic.flowmeter"
 _RATE = f"{_BY}.response.rolling_rate"
 
 
-def _at(m: Measurement, name: str = "f") -> float:
-    return float(m.conditions[name])
-
-
-def _ratio(m: Measurement) -> complex:
-    """omega_c divided by omega_0 in a pulsation."""
+def _gain(m: Measurement) -> complex:
+    """omega_c divided by omega_0 in a pulsation, complex, while the ball rolls."""
     if m.parameters.drag == STOKES:
-        return complex(theory(response.transfer, m.parameters, Case.RR, _at(m)))
-    return theory(pulsation.first_harmonic, m.parameters, _at(m, "amplitude"), _at(m))
+        return complex(theory(response.transfer, m.parameters, Case.RR, m.at("f")))
+    return theory(pulsation.first_harmonic, m.parameters, m.at("amplitude"), m.at("f"))
 
 
-def _slips(rule: str, relation: Relation) -> Bearing:
-    """The amplitude at which slip begins, if rolling ends as a rule says."""
+def _onset_bearing(rule: str, relation: Relation) -> Bearing:
+    """A bearing on the amplitude at which slip begins, if rolling ends by a rule of `Settings.leave_rolling`."""
 
     def onset(m: Measurement) -> float:
-        return theory(pulsation.slip_onset, m.parameters, _at(m), rule)
+        return theory(pulsation.slip_onset, m.parameters, m.at("f"), rule)
 
     by = f"{_BY}.pulsation.slip_onset, {rule}"
     return Bearing("pulsation", "slip_amplitude", onset, relation=relation, by=by)
@@ -42,7 +38,7 @@ def _slips(rule: str, relation: Relation) -> Bearing:
 
 def _ramp_end(m: Measurement) -> float:
     """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
-    p, rate = m.parameters, _at(m, "rate")
+    p, rate = m.parameters, m.at("rate")
     # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
     beyond = analytic.thresholds(p).omega_04 + 3.0 * response.ramp_coefficient(p) * rate ** (2 / 3)
     t_end = (beyond - p.omega_0) / rate
@@ -58,8 +54,8 @@ CLAIMS = (
         "(23)",
         "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag alone accelerates it "
         "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
-        Bearing("pulsation", "gain", lambda m: abs(_ratio(m)), by=f"{_BY}.response.transfer, pulsation.first_harmonic"),
-        Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_ratio(m)), by="the same"),
+        Bearing("pulsation", "gain", lambda m: abs(_gain(m)), by=f"{_BY}.response.transfer, pulsation.first_harmonic"),
+        Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_gain(m)), by="the same"),
         Bearing("unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE),
     ),
     claim(
@@ -68,8 +64,8 @@ CLAIMS = (
         "In a pulsating flow a rolling ball begins to slip once rolling needs more friction than floor and wall can "
         "give: not below the amplitude at which slip first lasts, and not above the one up to which forces allow "
         "rolling. Mostly the two are the same; in between Coulomb's law allows both.",
-        _slips("slip-stability", Relation.AT_LEAST),
-        _slips("infeasible", Relation.AT_MOST),
+        _onset_bearing("slip-stability", Relation.AT_LEAST),
+        _onset_bearing("infeasible", Relation.AT_MOST),
     ),
     claim(
         "pulsation-limits",
@@ -94,7 +90,7 @@ CLAIMS = (
         Bearing(
             "bounds",
             "gamma_zero",
-            lambda m: _at(m, "omega_c") + pulsation.fast_onset(m.parameters.replace(omega_0=_at(m, "omega_c"))),
+            lambda m: m.at("omega_c") + pulsation.fast_onset(m.parameters.replace(omega_0=m.at("omega_c"))),
             when=given(inner="RR", outer="RS", by="held"),
             by=f"{_BY}.pulsation.fast_onset",
         ),
@@ -114,7 +110,7 @@ CLAIMS = (
         Bearing(
             "pulsation",
             "mean_error",
-            lambda m: theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m)),
+            lambda m: theory(pulsation.mean_error, m.parameters, m.at("amplitude"), m.at("f")),
             by=f"{_BY}.pulsation.mean_error",
         ),
     ),

@@ -43,7 +43,7 @@ class Measurements:
     p: Parameters = REFERENCE
 
     def of(self, quantity: str) -> list[Measurement]:
-        """Those of one quantity."""
+        """The measurements of one quantity."""
         return [m for m in self.rows if m.quantity == quantity]
 
     @property
@@ -59,7 +59,7 @@ class Measurements:
         return t.omega_01, t.omega_02 if math.isnan(t.omega_04) else t.omega_04
 
     def slipping(self, share: float) -> Parameters:
-        """The set, with a flow that is so far between those."""
+        """The set with a flow between the ends of `slips`: a share of the way from the first."""
         low, high = self.slips
         return self.p.replace(omega_0=low + share * (high - low))
 

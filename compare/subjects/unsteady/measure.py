@@ -26,10 +26,10 @@ from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
-from compare.kit.settling import lasting, settle
+from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Measured, peaks, top
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, TrialResult, carry_out, finer
+from compare.kit.trials import Start, Trial, TrialResult, carry_out, with_step_error
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -49,11 +49,11 @@ carries the ball; and ends of a ramp, as parts of the way to where slipping ends
 
 def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
-    ends = {name: _known(records, name, "omega_01") for name in sets}
+    ends = {name: _threshold(records, name, "omega_01") for name in sets}
     why = "no flow was measured at which two-point rolling ends by slipping"
     yield from (Missing("pulsation", name, why) for name, end in ends.items() if end is None)
-    small = [each for name, end in ends.items() if end is not None for each in _small(lab, name, sets[name], end)]
-    followed = _followed(lab, small)
+    small = [each for name, end in ends.items() if end is not None for each in _pulsations(lab, name, sets[name], end)]
+    followed = _as_followed(lab, small)
     for each in followed:
         yield from _response(lab, each)
     rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
@@ -113,8 +113,8 @@ class Pulsation:
         grown = (amplitude / self.amplitude) ** self.power
         return State(omega_c=self.p.omega_0 + amplitude * self.lead * grown).stacked()
 
-    def leading(self, omega_c: float) -> Pulsation:
-        """The same with this omega_c as a period begins."""
+    def with_omega_c(self, omega_c: float) -> Pulsation:
+        """The pulsation with a ball whose omega_c is this as a period begins, rad s-1."""
         return replace(self, lead=(omega_c - self.p.omega_0) / self.amplitude)
 
     def task(self, lab: Lab, amplitude: float, x: Array, timing: Timing, largest: float = 0.0) -> Task:
@@ -131,8 +131,8 @@ class Pulsation:
         return measurement(lab, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at)
 
 
-def _small(lab: Lab, name: str, p: Parameters, end: float) -> list[Pulsation]:
-    """Small pulsations of a set about a part of the flow at which rolling ends."""
+def _pulsations(lab: Lab, name: str, p: Parameters, end: float) -> list[Pulsation]:
+    """Small pulsations of several frequencies about a flow at which a ball of a set rolls."""
     q = p.replace(omega_0=ROLLS_AT * end)
     room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
     octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach
@@ -171,7 +171,7 @@ class Round(NamedTuple):
     omega_c: float
 
 
-def _rounds(
+def _settled_rounds(
     lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
 ) -> list[list[Round] | str]:
     """Runs in pulsations of these amplitudes until they are settled: the last two of each, the last with half the step,
@@ -190,16 +190,16 @@ def _rounds(
                 continue
             omega_c = limit(run.omega_c[samples::samples])
             slid = State.of(run.x[-1])._replace(omega_c=omega_c).stacked()
-            states[k] = slid if slips else each.leading(omega_c).start(a)
+            states[k] = slid if slips else each.with_omega_c(omega_c).start(a)
             seen[k] = [*before[-1:], Round(task, run, omega_c)]
     return seen
 
 
-def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
-    """How balls follow pulsations of their own amplitudes."""
+def _as_followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
+    """Pulsations with omega_c at the beginning of a period as runs show it."""
     followed, samples = [], lab.effort.pulsation_samples
     last = slice(-2 * samples, None)
-    rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False)
+    rounds = _settled_rounds(lab, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False)
     for each, seen in zip(pulsations, rounds, strict=True):
         if isinstance(seen, str):
             followed.append(replace(each, failure=seen))
@@ -209,7 +209,7 @@ def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
             for t, x in ((run.time, run.omega_c) for _, run, _ in seen)
         )
         failure = "" if rolls_on(seen[-1].run) else "a ball slips in a pulsation half as large as in a slow one"
-        new, change, tasks = each.leading(seen[-1].omega_c), abs(ratio - first), tuple(task for task, *_ in seen)
+        new, change, tasks = each.with_omega_c(seen[-1].omega_c), abs(ratio - first), tuple(task for task, *_ in seen)
         followed.append(replace(new, ratio=ratio, uncertainty=change, failure=failure, tasks=tasks))
     return followed
 
@@ -222,7 +222,7 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
             replace(each, amplitude=RAISE * each.amplitude, lead=each.lead * RAISE**each.power)
             for each in (raised[k] for k in todo)
         ]
-        still = [(k, each) for k, each in zip(todo, _followed(lab, higher), strict=True) if not each.failure]
+        still = [(k, each) for k, each in zip(todo, _as_followed(lab, higher), strict=True) if not each.failure]
         for k, each in still:
             raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, RAISE))
         todo = [k for k, _ in still]
@@ -259,7 +259,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
     """
 
     samples = 8 * PHASES
-    rounds = _rounds(lab, slipping, 1, samples, slips=True)
+    rounds = _settled_rounds(lab, slipping, 1, samples, slips=True)
     anew = [
         each.task(lab, a, x, Timing(1, samples, 1, phase=2 * math.pi * k / PHASES))
         for (each, a), seen in zip(slipping, rounds, strict=True)
@@ -286,7 +286,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         yield if_found(row, f"{at} is none")
 
 
-def _known(records: Records, set: str, threshold: str) -> float | None:
+def _threshold(records: Records, set: str, threshold: str) -> float | None:
     """The flow that was measured first as a threshold of a set, rad s-1; None if it was not."""
     return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
 
@@ -307,7 +307,7 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     flows: dict[str, tuple[float, float, float]] = {}  # where slipping begins, the wall carries the ball, a jump ends
     trials, starts = list[Trial](), list[Start]()  # from rest, to settle slipping before a jump or a ramp
     for name, p in sets.items():
-        begins, holds, ends = (_known(records, name, f"omega_0{n}") for n in (1, 2, 4))
+        begins, holds, ends = (_threshold(records, name, f"omega_0{n}") for n in (1, 2, 4))
         if begins is None or holds is None:
             yield Missing("unsteady", name, "no flows were measured between which the ball slips at both points")
             continue
@@ -333,16 +333,16 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         else:
             trials += _ramps(lab, begun, begins, ends)
     for result in carry_out(lab, "unsteady", trials):
-        yield from [result] if isinstance(result, Missing) else _changed(lab, result)
+        yield from [result] if isinstance(result, Missing) else _rows_of_change(lab, result)
 
 
 def _jump(lab: Lab, start: Start, size: float) -> Trial:
     """Jumps up and down of the flow, rad s-1, from a state in the case that the start is named by."""
-    p, t_end = start.p, lasting(start.p, lab.effort.unsteady_lasts)
+    p, t_end = start.p, rounded_duration(start.p, lab.effort.unsteady_lasts)
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
     refine, at = lab.effort.unsteady_refine, {"case": start.name}
-    return Trial(start.set, p, start.name, start.x0, t_end, refine, samples, _jumped, None, sides, at)
+    return Trial(start.set, p, start.name, start.x0, t_end, refine, samples, _jump_quantities, None, sides, at)
 
 
 def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial]:
@@ -356,15 +356,15 @@ def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial
         yield Trial(start.set, p, "ramp", start.x0, t_end, refine, 16000, caught_up, flow, (), at)
 
 
-def _changed(lab: Lab, result: TrialResult) -> Iterator[Measurement | Missing]:
-    """What a jump or a ramp shows."""
+def _rows_of_change(lab: Lab, result: TrialResult) -> Iterator[Measurement | Missing]:
+    """Measurements of the delay, peak or end that a jump or a ramp of the flow shows."""
     trial, coarse, fine = result.trial, result.coarse, result.fine
     if trial.flow is None:
         for quantity in ("jump_delay",) if trial.name == "RR" else ("jump_peak", "jump_height"):
-            row = result.row(lab, quantity, finer(coarse[quantity].value, fine[quantity]))
+            row = result.row(lab, quantity, with_step_error(coarse[quantity].value, fine[quantity]))
             yield if_found(row, f"{quantity} in {trial.name}: no peak")
     elif math.isfinite(coarse) and math.isfinite(fine):
-        yield result.row(lab, "ramp_end", finer(coarse, Measured(fine, 0.0)))
+        yield result.row(lab, "ramp_end", with_step_error(coarse, Measured(fine, 0.0)))
     else:
         why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
         yield Missing("unsteady", trial.set, why)
@@ -376,7 +376,7 @@ def odd_part(up: Trajectory, down: Trajectory) -> Array:
     return np.asarray(odd / odd[-1])
 
 
-def _jumped(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
+def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
     """The delay; time and height of the highest peak, nan where there is none in the first half of the runs."""
     t, y = up.time, odd_part(up, down)
     # Forces act in the middle of a step: times are known to half a finer step.

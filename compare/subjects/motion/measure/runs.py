@@ -25,7 +25,7 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, state_of
-from compare.kit.settling import PRESSES, reading
+from compare.kit.settling import PRESSES, settled_readings
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start, Trial, carry_out
 from model import Flow, Parameters, State
@@ -62,7 +62,7 @@ def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
     for name, p in sets.items():
         q = p.replace(mu=1.0, eta=1.0, fluid_torque=0.5 * p.c, omega_0=0.6 / time_unit(p))
         starts.append(Start(name, q, "rest", np.zeros(8)))
-    yield from reading(lab, "torque", starts)
+    yield from settled_readings(lab, "torque", starts)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

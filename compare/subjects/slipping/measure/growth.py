@@ -85,7 +85,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 yield push.row(lab, "growth", "gamma", value, own)
                 continue
             sized = ((size, slice(2 * k, 2 * k + 2)) for k, size in enumerate(push.sizes))
-            strays = (push.stray(lab, "growth", size, own[of], pairs[of]) for size, of in sized)
+            strays = (push.following_case(lab, "growth", size, own[of], pairs[of]) for size, of in sized)
             if stray := next(filter(None, strays), None):
                 yield stray
             else:
@@ -149,7 +149,7 @@ class Push:
         along = {"inner": self.inner.name, "outer": self.outer.name, "by": start.name} | state_of(start.x0) | n
         return measurement(lab, protocol, start.set, start.p, quantity, value, tasks, **along, **at)
 
-    def stray(
+    def following_case(
         self, lab: Lab, protocol: str, size: float, tasks: Sequence[Task], runs: Sequence[Trajectory]
     ) -> Measurement | None:
         """The case that follows where a slip doesn't last, if runs with both steps agree; None if it lasts, or they
@@ -173,16 +173,16 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     if np.isnan(coarse).any() or np.isnan(fine).any():
         return None
     best = fine + (fine - coarse) * EXTRAPOLATION
-    value, lower = without_size(best)
-    step = without_size(fine - coarse)[0] * DOUBT
-    size = (value - without_size(best[-2:])[0]) / 3
+    value, lower = limit_of_no_size(best)
+    step = limit_of_no_size(fine - coarse)[0] * DOUBT
+    size = (value - limit_of_no_size(best[-2:])[0]) / 3
     p = push.start.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
     least = lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
     return Measured(float(value), math.hypot(step, value - lower, size, least))
 
 
-def without_size(rates: Array) -> Array:
+def limit_of_no_size(rates: Array) -> Array:
     """The limit of rows (2 or 3, n), each of which belongs to half the size of the one before."""
     *first, before, last = rates
     return np.asarray((first[0] - 6 * before + 8 * last) / 3 if first else 2 * last - before)

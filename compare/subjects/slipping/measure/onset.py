@@ -20,10 +20,10 @@ import numpy as np
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import named_start, settle_groups
-from compare.kit.statistics import Measured, straight_line, vanishing, zero_and_slope
+from compare.kit.statistics import Measured, extrapolated_zero, straight_line, zero_and_slope
 from compare.kit.tasks import Task
 from compare.kit.trials import DOUBT, EXTRAPOLATION, REFINED, Start, lag_error, polynomials, slip_unit
-from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, without_size
+from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, limit_of_no_size
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -44,10 +44,10 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
     """Zero and slope of gamma along every line: from two flows, then from two more around the zero that these show."""
     yield from (Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta))
     sets = {name: p for name, p in sets.items() if p.mu and p.eta}
-    hanging = _hanging(lab, sets, records)
+    hanging = _lines_on_wall(lab, sets, records)
     for name in (name for name in sets if name not in hanging):
         yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
-    lines = [*(line for name, p in sets.items() for line in _rolling(name, p)), *hanging.values()]
+    lines = [*(line for name, p in sets.items() for line in _lines_from_rolling(name, p)), *hanging.values()]
     first = _growths(lab, [line.pushes[:2] for line in lines])
     around = _growths(lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)])
     for line, seen, more in zip(lines, first, around, strict=True):
@@ -67,7 +67,7 @@ class Crossing:
         return 1 if self.pushes[0].start.name == "held" else 2
 
     @property
-    def bent(self) -> bool:
+    def is_curved(self) -> bool:
         """Whether gamma isn't a straight line over omega_0, because drag isn't in proportion to the lag."""
         return self.power == 1 and self.pushes[0].start.p.drag != STOKES
 
@@ -83,7 +83,7 @@ class Crossing:
             return ()
         least, first = flows[0] if self.power == 1 else 0.0, self.pushes[0]
         pushes = []
-        for factor in AROUND_BENT if self.bent else AROUND:
+        for factor in AROUND_BENT if self.is_curved else AROUND:
             omega_0 = float(least + (zero ** (1 / self.power) - least) * factor)
             orbit = State.of(first.start.x0).omega_c if self.power == 1 else omega_0
             p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
@@ -102,7 +102,7 @@ class Growths:
     """What became of slips that didn't last, and of runs that broke down."""
 
 
-def _hanging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[str, Crossing]:
+def _lines_on_wall(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[str, Crossing]:
     """For each set the line out of rolling on the wall alone, from settled states; none where one is no such state."""
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
     starts = [
@@ -138,10 +138,10 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
                 points.append((p.omega_0, math.nan, math.nan))
                 continue
             size = push.sizes[0] if push.inner is not Case.NR else MEDIUM[0]
-            if stray := push.stray(lab, "bounds", size, own[:2], runs[:2]):
+            if stray := push.following_case(lab, "bounds", size, own[:2], runs[:2]):
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
-            best, change = without_size(np.array([fine, half])), (fine - coarse)[0]
+            best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
             noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p, refine) * slip_unit(p))
             points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
         found.append(Growths(np.reshape(points, (-1, 3)).T, used, strays))
@@ -159,7 +159,7 @@ def _zero_and_slope(lab: Lab, line: Crossing, seen: Growths, more: Growths) -> I
     flows, gamma, noise = points[:, ~np.isnan(points[1])]
     # What the step changes may be little by chance at one of the flows.
     q, noise = flows**line.power, np.maximum(noise, seen.points[2].max())
-    if line.bent:
+    if line.is_curved:
         zero, slope = zero_and_slope(q, gamma, noise)
     else:  # the points share causes of error: more of them don't reduce the uncertainty
         zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
@@ -172,7 +172,7 @@ def _zero_and_slope(lab: Lab, line: Crossing, seen: Growths, more: Growths) -> I
     yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
 
 
-def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
+def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
     """The lines out of rolling at both points, in natural units; what friction and inertia there are sets the scale."""
     unit = time_unit(p)
     slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
@@ -220,8 +220,8 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
     arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
     orbits = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
     first = list(lab.groups(orbits))
-    kept = [[] if isinstance(got, str) else arrow.kept(got) for arrow, got in zip(arrows, first, strict=True)]
-    nearer = [arrow.nearer(runs) for arrow, runs in zip(arrows, kept, strict=True)]
+    kept = [[] if isinstance(got, str) else arrow.staying(got) for arrow, got in zip(arrows, first, strict=True)]
+    nearer = [arrow.tasks_near_onset(runs) for arrow, runs in zip(arrows, kept, strict=True)]
     rows = zip(arrows, orbits, first, kept, nearer, lab.groups(nearer), strict=True)
     for arrow, tasks, got, runs, later, near in rows:
         leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
@@ -251,7 +251,7 @@ class Arrow:
     outer: Case
 
     def start(self, omega_c: float) -> tuple[Parameters, Array]:
-        """The state at an orbit, and the flow."""
+        """Parameters with the flow, and the state (8,), of a ball that goes round with omega_c."""
         unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
         leads = 1.0 if self.inner is Case.RR else LEADS  # a ball that rolls at both points can hardly lag
@@ -262,15 +262,15 @@ class Arrow:
         step = coarse_step(self.p) / (2 * REFINED * times)
         return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
 
-    def kept(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
-        """The first orbits that stay in the cases at the ends of the arrow, up to one that passes into another."""
+    def staying(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
+        """Of runs those of the first row of orbits that stay in the two cases of the arrow, without a third."""
         strays = [not np.isin(run.case[SKIPPED:], [self.inner, self.outer]).all() for run in runs]
         first = [*strays, False].index(False)
         return runs[first : [*strays, True].index(True, first)]
 
-    def nearer(self, kept: Sequence[Trajectory]) -> list[Task]:
-        """Runs below the orbit at which the ball leaves, if it does: there the line over omega_c^2 through the forces
-        at the last two orbits before vanishes.
+    def tasks_near_onset(self, kept: Sequence[Trajectory]) -> list[Task]:
+        """Tasks just below the orbit at which the ball lifts off, if it does: where the line over omega_c^2 through the
+        floor's forces at the last two orbits before vanishes.
         """
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
         if not 2 <= len(pressed) < len(kept):
@@ -308,7 +308,7 @@ def _onset(runs: Sequence[Trajectory]) -> Measured | None:
             return None
         change = fine.value - coarse.value
         forces.append(Measured(fine.value + change * EXTRAPOLATION, math.hypot(fine.uncertainty, change * DOUBT)))
-    square = vanishing(squares, forces) if forces else Measured(0.0, math.inf)
+    square = extrapolated_zero(squares, forces) if forces else Measured(0.0, math.inf)
     if not square.value > 0 or math.isinf(square.uncertainty):
         return None
     return Measured(math.sqrt(square.value), square.uncertainty / (2 * math.sqrt(square.value)))

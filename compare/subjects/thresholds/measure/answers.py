@@ -21,7 +21,7 @@ CREEPS = 100.0
 
 
 def lifts(end: Bracket) -> bool:
-    """Whether two-point rolling ends by lifting off: the floor carries no more than what hovers, and the wall holds.
+    """Whether rolling at both points ends by lifting off the floor, not by slip, from the runs at its end.
 
     Just below omega_03 the floor carries as little, but rolling may end there by slip at both contacts, which is as
     fast at one as at the other, and lasts. A ball that lifts off slips on the floor alone before, or rolls on the wall

@@ -23,8 +23,8 @@ from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
-from compare.kit.settling import Patience, lasting, named_start, physical_case, settle_groups
-from compare.kit.statistics import Measured, tail, taper, vanishing
+from compare.kit.settling import Patience, named_start, physical_case, rounded_duration, settle_groups
+from compare.kit.statistics import Measured, extrapolated_zero, tail, taper
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -42,7 +42,7 @@ WAYS = ("rest", "half as fast", "with the fluid", "on the wall")
 def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
     plane = sets["reference"].replace(c=DRAG)
-    points = {figure: spread(lab.effort.plane_spread, 7 + k) for k, figure in enumerate(FIGURES)}
+    points = {figure: spread_points(lab.effort.plane_spread, 7 + k) for k, figure in enumerate(FIGURES)}
     seen: dict[str, list[tuple[Array, int]]] = {figure: [] for figure in FIGURES}
     tried: dict[str, set[tuple[float, ...]]] = {figure: set() for figure in FIGURES}
     for count in (*lab.effort.plane_added, 0):
@@ -63,7 +63,7 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
                 yield measurement(lab, "plane", "reference", p, "cases", mask, tasks, figure=figure)
         for figure in FIGURES:
             tried[figure] |= {tuple(u.tolist()) for u in points[figure]}
-            fresh = (u for u in added(seen[figure]) if tuple(u.tolist()) not in tried[figure])
+            fresh = (u for u in added_points(seen[figure]) if tuple(u.tolist()) not in tried[figure])
             points[figure] = list(islice(fresh, count))
     for figure in FIGURES:
         if out := len(tried[figure]) - len(seen[figure]):
@@ -72,14 +72,14 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             yield Missing("plane", "reference", reason)
 
 
-def spread(count: int, seed: int) -> list[Array]:
+def spread_points(count: int, seed: int) -> list[Array]:
     """Points (2,) of the unit square, evenly spread."""
     from scipy.stats import qmc  # slow to import
 
     return list(qmc.Halton(2, seed=seed).random(count))
 
 
-def added(seen: Sequence[tuple[Array, int]]) -> list[Array]:
+def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     """Midpoints between neighbours that differ, each kind of border in turn, the longest first; and among rare ones.
 
     A set of cases is rare if it was seen less than half as often as if all were seen equally often.
@@ -128,14 +128,14 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     ]
     edges = yield from _edges(lab, flows)
     for _ in range(lab.effort.edge_lines):
-        edges = _crossed(lab, edges)
+        edges = _crossed_once_more(lab, edges)
     for edge in edges:
-        yield from _rows(lab, edge)
+        yield from _edge_rows(lab, edge)
     for name, (low, high) in limits.items():
         last = low + (max(CLOSING) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
         if len(near) >= len(CLOSING):
-            yield _closed(lab, near)
+            yield _edge_meets_lifted(lab, near)
         elif name == soonest or lab.level > Level.QUICK:
             yield Missing("edge", name, "too few crossings to follow the edge to where it meets the lifted ball")
 
@@ -174,14 +174,14 @@ def _edges(lab: Lab, flows: Sequence[tuple[str, Parameters]]) -> Generator[Missi
             fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
             yield Missing("edge", name, f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}")
         else:
-            a, b = _grounded(slipping.mean), _grounded(lifted.mean)
+            a, b = _on_floor(slipping.mean), _on_floor(lifted.mean)
             edges.append(Edge(name, p, a, b, a, b - a))
     return edges
 
 
-def _crossed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
-    """The edges once they were crossed on one line more each."""
-    lines, found = [_onward(edge) for edge in edges], []
+def _crossed_once_more(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
+    """The edges, each crossed on one line more."""
+    lines, found = [_next_line(edge) for edge in edges], []
     brackets = narrow(lab, [_search(lab, line) for line in lines], careful=False)
     for edge, line, bracket in zip(edges, lines, brackets, strict=True):
         if None in bracket.runs:
@@ -193,7 +193,7 @@ def _crossed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
     return found
 
 
-def _grounded(x: Array) -> Array:
+def _on_floor(x: Array) -> Array:
     """The state put on the floor: the motion of a lifted ball doesn't depend on its height."""
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
@@ -203,7 +203,7 @@ def _search(lab: Lab, edge: Edge) -> Search:
 
     Later lines are a hundredth as long, and four times as long after each that missed the border.
     """
-    t_end, step = lasting(edge.p, lab.effort.edge_time), coarse_step(edge.p)
+    t_end, step = rounded_duration(edge.p, lab.effort.edge_time), coarse_step(edge.p)
     reach = 5e-3 * 4.0**edge.missed
     around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 1e-5)
 
@@ -231,8 +231,8 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
     return rests[0] if any(rests) else None
 
 
-def _onward(edge: Edge) -> Edge:
-    """A line through the mean of the time in which the last two runs have stayed together, the way they part.
+def _next_line(edge: Edge) -> Edge:
+    """The edge with the line to cross it on next: where the last two runs stayed together, the way they part.
 
     Together they are within 2e-3 of the distance of the attractors.
     """
@@ -245,9 +245,9 @@ def _onward(edge: Edge) -> Edge:
     length = max(together - together // 4, 1)
     weights = taper(length)
     mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
-    parting = _grounded((high - low)[together - 1])
+    parting = _on_floor((high - low)[together - 1])
     line = parting * float(edge.line @ edge.line) / float(parting @ edge.line)
-    return replace(edge, centre=_grounded(mean), line=line)
+    return replace(edge, centre=_on_floor(mean), line=line)
 
 
 def _uncertainty(edge: Edge) -> Array:
@@ -259,7 +259,7 @@ def _uncertainty(edge: Edge) -> Array:
     assert edge.bracket is not None
     *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in edge.moves))
     ratio = min(last / before, 0.9) if before else 0.0
-    onward, roll = _onward(edge), edge.p.R / edge.p.r
+    onward, roll = _next_line(edge), edge.p.R / edge.p.r
     alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
     off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
     ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
@@ -267,8 +267,8 @@ def _uncertainty(edge: Edge) -> Array:
     return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
-def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
-    """omega_c, the slips and the spin on the wall; the uncertainties are alike."""
+def _edge_rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
+    """Measurements of the state on an edge: omega_c, slips and the spin on the wall."""
     if not (edge.moves and edge.bracket):  # it is to be crossed by the last line, and by one before
         at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
         yield Missing("edge", edge.set, f"{at} the last lines missed the border between the two attractors", 5)
@@ -282,11 +282,11 @@ def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
         yield measurement(lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
 
 
-def _closed(lab: Lab, near: Sequence[Edge]) -> Measurement | Missing:
+def _edge_meets_lifted(lab: Lab, near: Sequence[Edge]) -> Measurement | Missing:
     """Where the edge of a set meets the lifted ball: where they don't differ in omega_c."""
     noise = max(float(_uncertainty(edge)[2]) for edge in near)
     apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
-    place = vanishing(np.array([edge.p.omega_0 for edge in near]), apart)
+    place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
     tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
     p, by = near[0].p.replace(omega_0=place.value), "unstable slipping meets the lifted ball"
     row = measurement(lab, "edge", near[0].set, p, "omega_02", place, tasks, side="from above", by=by)

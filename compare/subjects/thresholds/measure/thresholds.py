@@ -24,14 +24,14 @@ from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.settling import (
     Patience,
     Settled,
-    lasting,
     named_start,
     physical_case,
+    rounded_duration,
     safe_height,
     settle_groups,
     settled_cases,
 )
-from compare.kit.statistics import COVERAGE, POINTS, Measured, turning, vanishing
+from compare.kit.statistics import COVERAGE, POINTS, Measured, extrapolated_maximum, extrapolated_zero
 from compare.kit.tasks import Task
 from compare.subjects.thresholds.measure.answers import ASKED, lifts, slip
 from model import Case, Parameters, State
@@ -102,47 +102,47 @@ class Findings:
 
         def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
             q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
-            t_end = lasting(q, units * time * attempt.time)
+            t_end = rounded_duration(q, units * time * attempt.time)
             return self.lab.task(q, last.x[-1] if last else start(q), t_end, coarse_step(q) / attempt.refine)
 
         return kind, Search(around, task, answer, width)
 
-    def shown(self, kind: str) -> Bracket | None:
+    def bracket_seen(self, kind: str) -> Bracket | None:
         """A bracket both of whose ends were seen in runs."""
         bracket = self.brackets.get(kind)
         return bracket if bracket and None not in bracket.runs else None
 
     def missing(self, why: str, rows: int = 1) -> Missing:
-        """What was not found."""
+        """A record of a threshold that was not found, and why."""
         return Missing(PROTOCOL, self.set, why, rows)
 
     def row(
         self, quantity: str, at: Measured | None, tasks: Sequence[Task], side: str, by: str
     ) -> Measurement | Missing:
-        """A threshold that was found."""
+        """The measurement of a threshold that was found, or why it was not."""
         if at is None:
             return self.missing(f"too few states settled for {quantity} by {by}, or their extrapolation has no zero")
         p = self.p.replace(omega_0=at.value)
         return measurement(self.lab, PROTOCOL, self.set, p, quantity, at, tasks, side=side, by=by)
 
     def count(self, quantity: str, value: float, tasks: Sequence[Task]) -> Measurement:
-        """How many there are of something."""
+        """The measurement of a count on the set."""
         return measurement(self.lab, PROTOCOL, self.set, self.p, quantity, value, tasks)
 
-    def bisected(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
-        """A threshold in a bracket."""
+    def row_of_bracket(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
+        """The measurement of a threshold that lies in a bracket."""
         # Slip that is still too small to count may have begun below: it is proportional to the distance.
         speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run))
         unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
         return self.row(quantity, place, of.tasks, side, by)
 
-    def vanishes(self, kind: str, what: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
-        """A threshold where something vanishes, if states settled beside it."""
+    def rows_of_zero(self, kind: str, what: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
+        """The measurement of a threshold at which something is zero, extrapolated from settled states beside it."""
         if kind in self.states:
             states = self.states[kind]
             tasks = [state.task for state in states]
-            yield self.row(quantity, extrapolated(states, what, vanishing), tasks, side, f"{by} → 0")
+            yield self.row(quantity, extrapolated(states, what, extrapolated_zero), tasks, side, f"{by} → 0")
 
 
 Questions = Callable[[Findings], Iterator[tuple[str, Search]]]
@@ -185,17 +185,17 @@ def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
     """The largest flow at which a ball that rolls on both goes on so."""
     if change := each.changes.get("rolling"):
         width = each.lab.effort.thresholds_width * change.high
-        yield each.search("rolling", change, _begun("with the fluid"), width)
+        yield each.search("rolling", change, _start_state("with the fluid"), width)
 
 
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
     """Roughly, up to which flow the wall doesn't hold a ball, and a slipping one settles on the floor."""
     if change := each.changes.get("sinking"):
-        yield each.search("sinking", change, _begun("on the wall"), COARSE * change.low)
+        yield each.search("sinking", change, _start_state("on the wall"), COARSE * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
     if change and end and not lifts(end) and end.high < change.high:
         change = replace(change, low=max(change.low, end.high))
-        yield each.search("slipping", change, _begun("rest"), COARSE * change.low)
+        yield each.search("slipping", change, _start_state("rest"), COARSE * change.low)
 
 
 def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
@@ -207,7 +207,7 @@ def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
         seen = [{k: b for k, b in each.brackets.items() if b.runs[1] or b.high in each.cases[k]} for each in found]
         found = [replace(each, brackets=own) for each, own in zip(found, seen, strict=True)]
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
-    places = [_beside(each) for each in found]
+    places = [_flows_beside(each) for each in found]
     starts = [
         [named_start(each.set, each.p.replace(omega_0=flow), how) for flow in flows.tolist()]
         for each, own in zip(found, places, strict=True)
@@ -225,8 +225,8 @@ def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
     return settled
 
 
-def _beside(each: Findings) -> dict[str, tuple[Array, str]]:
-    """Flows of states beside every change, by kind, and how they start."""
+def _flows_beside(each: Findings) -> dict[str, tuple[Array, str]]:
+    """By kind of change the flows beside it at which states are to settle, rad s-1, and how they start."""
     places = {}
     if carried := each.brackets.get("sinking"):
         places["riding"] = carried.high * (1 + RIDES), "on the wall"
@@ -250,11 +250,11 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
     width = each.lab.effort.thresholds_width
     begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
     if begins and len(riding) == len(RIDES):
-        ride = rider(riding, height=safe_height(each.p))
+        ride = riding_start(riding, height=safe_height(each.p))
         yield each.search("riding", begins, ride, width * begins.high)
     end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
     if end and len(lifted) == len(RIDES):
-        pressed = rider(lifted, height=0.0, less=1e-3)
+        pressed = riding_start(lifted, height=0.0, less=1e-3)
         change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
         yield each.search("leaning", change, pressed, width * end.high)
 
@@ -266,9 +266,12 @@ def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
     just where the wall begins to carry the ball.
     """
     turned, held = each.states.get("turning", []), each.brackets.get("riding")
-    top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
+    top, unloaded = (
+        extrapolated(turned, "slip_x", extrapolated_maximum),
+        extrapolated(turned, "force_Ay", extrapolated_zero),
+    )
     off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
-    forces = partial(turning, others=np.array([state.values["force_Ay"].value for state in turned]))
+    forces = partial(extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in turned]))
     if pressing := extrapolated(turned, "slip_x", forces):
         sure = COVERAGE * pressing.uncertainty
         return top if pressing.value > sure else None, pressing.value < -sure
@@ -294,69 +297,69 @@ NONE = "no flow that was tried, up to twice the fastest of the settled states,"
 
 def _rolling_rows(each: Findings) -> Iterator[Measurement | Missing]:
     """The end of rolling on both: by lifting off, or by slip."""
-    if not (rolling := each.shown("rolling")):
+    if not (rolling := each.bracket_seen("rolling")):
         yield each.missing(f"{NONE} ends two-point rolling")
     elif lifts(rolling):
         yield each.count("lifts", 1.0, rolling.tasks)
-        yield each.bisected("omega_03", rolling, "from below", "loss of the floor")
-        if leaning := each.shown("leaning"):
-            yield each.bisected("omega_03", leaning, "from above", "return to rolling when pressed")
+        yield each.row_of_bracket("omega_03", rolling, "from below", "loss of the floor")
+        if leaning := each.bracket_seen("leaning"):
+            yield each.row_of_bracket("omega_03", leaning, "from above", "return to rolling when pressed")
         else:
             why = "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
             yield each.missing(why)
     else:
         yield each.count("lifts", 0.0, rolling.tasks)
-        yield each.bisected("omega_01", rolling, "from below", "onset of slip")
-        yield from each.vanishes("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
+        yield each.row_of_bracket("omega_01", rolling, "from below", "onset of slip")
+        yield from each.rows_of_zero("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
 
 
 def _riding_rows(each: Findings) -> Iterator[Measurement | Missing]:
     """The least flow that holds a ball on the wall."""
-    if riding := each.shown("riding"):
-        yield each.bisected("omega_02", riding, "from above", "onset of sliding on the wall")
+    if riding := each.bracket_seen("riding"):
+        yield each.row_of_bracket("omega_02", riding, "from above", "onset of sliding on the wall")
     else:
         yield each.missing(f"{NONE} is the least to hold a ball on the wall")
-    yield from each.vanishes("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
+    yield from each.rows_of_zero("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
 
 
 def _slipping_rows(each: Findings) -> Iterator[Measurement | Missing]:
     """The end of slipping on both: at a fold, or where the wall begins to carry the ball; and at how many folds."""
     if "turning" not in each.states:
-        if (rolling := each.shown("rolling")) and not lifts(rolling):
+        if (rolling := each.bracket_seen("rolling")) and not lifts(rolling):
             yield each.missing("no end of slipping at both points was found", 3)
         return
     (top, smooth), tasks = _end_of_slipping(each), [state.task for state in each.states["turning"]]
-    settles, ends = len(tasks) >= POINTS, _ends(each.cases["slipping"], each.brackets.get("slipping"))
+    settles, ends = len(tasks) >= POINTS, _count_ends(each.cases["slipping"], each.brackets.get("slipping"))
     # Beside known flows only a ball may have settled at none beyond the last.
     if settles and (ends or not each.lab.effort.granted):
         yield each.count("folds", ends - smooth, tasks)
     if smooth:
-        yield from each.vanishes("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
+        yield from each.rows_of_zero("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
     elif top is None:
         yield each.missing("settled slipping points to no flow at which it ends", 2 if settles else 3)
     else:
         yield each.row("omega_04", top, tasks, "from below", "maximum of omega_0 along the branch")
-        if fold := each.shown("fold"):
-            yield each.bisected("omega_04", fold, "from below", "last settled slipping")
+        if fold := each.bracket_seen("fold"):
+            yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
         else:
             slow = "costs more than an engine beside the one on trial may"
             why = "could not be done" if each.lab.effort.slow else slow
             yield each.missing(f"the end of slipping at both points is extrapolated; to bracket it {why}")
 
 
-def _ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
+def _count_ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
     """How often, the flow rising over all that were tried, a ball from rest ceases to settle slipping at both."""
     said = {flow: case is Case.SS for flow, case in cases.items()} | dict(bracket.said if bracket else ())
     settles = [said[flow] for flow in sorted(said)]
     return sum(bool(before) and after is False for before, after in pairwise(settles))
 
 
-def _begun(how: str) -> From:
-    """As `settling.named_start` says."""
+def _start_state(how: str) -> From:
+    """A function from parameters to the state at the start of a kind of run, see `settling.named_start`."""
     return lambda p: named_start("", p, how).x0
 
 
-def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> From:
+def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) -> From:
     """A state that rides the wall at a height, continued in omega_0 from settled states, with less spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
     fit = np.polynomial.Polynomial.fit(omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1)
