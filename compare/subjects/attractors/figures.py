@@ -47,7 +47,7 @@ def of_set(p: Parameters, quantity: str) -> Diagram:
 
 @functools.cache
 def _hopping_orbit(p: Parameters) -> orbits.Orbit | None:
-    """The orbit of a ball that hops for ever: by Newton's method from a guess, or of a random start, if there is one."""
+    """The orbit of a ball that hops for ever: by Newton's method from a guess, or of a random start, if any hops."""
     if p == SET:
         return orbits.refine(p, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
     found = (each.fate.orbit for each in analytic.attractors(p, STARTS, seed=0))
