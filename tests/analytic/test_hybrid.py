@@ -97,15 +97,6 @@ def test_rolling_follows_any_flow(flow, method, error):
     assert run.header.settings["energy_residual"] < RTOL * run.header.settings["energy_scale"]
 
 
-def test_a_jump_of_the_flow_ends_rolling_at_once():
-    """When the fluid jumps so far that no forces can hold RR, slip sets in at the jump itself."""
-    p = P.replace(c=5.0, omega_0=10.0)
-    run = simulate(p, [0, 0, 10.0, 0, 0, 0], 1.0, Flow.staircase([10.0, 60.0], 0.5), sample_interval=0.01)
-    assert rolling_forces.margin(10.0, p, 60.0) < 0
-    assert run.events.time[0] == 0.5
-    assert run.events.from_case[0] == Case.RR
-
-
 def test_near_the_axis_is_an_ordinary_place():
     """A flight that passes 1e-7 m from the axis is a straight line (no drag), though omega_c is huge there."""
     p, miss, v, rho = P.replace(c=0.0), 1e-7, 0.2, 0.02

@@ -6,9 +6,10 @@ from scipy.optimize import minimize
 
 from analytic import stationary_solutions, thresholds
 from analytic.mechanics import rolling_forces
+from analytic.slipping import slip_bounds
 from analytic.slipping import slip_stability as slip
+from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from model import Case, InputError, Parameters, State
-from model.cases import TRAITS
 
 P = Parameters.named("reference")
 
@@ -114,45 +115,6 @@ def test_normal_forces_while_a_slip_is_slight():
     assert (A_y, B_x) == pytest.approx((P.m * P.g, (1 + P.j) * P.m * P.R * 25.0))
 
 
-# --- arrows -----------------------------------------------------------------------------------------------------
-
-
-def test_arrows_of_figure_6():
-    for inner, outer in slip.SLIP_ARROWS:
-        assert len(slip.normals(inner, outer)) == len(TRAITS[outer].active) - len(TRAITS[inner].active)
-    for inner, outer in slip.LIFT_ARROWS:
-        assert inner.B is outer.B
-        assert outer.A.name == "N"
-    with pytest.raises(InputError, match="slip_x = 1 rad s-1 must be 0 in case RR"):
-        slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P)
-
-
-@pytest.mark.parametrize("eta", [0.2, 0.6])
-def test_definition_3(eta):
-    """Neutral on the thresholds (67), (74), (82), (61), found from wherever near, and where there is no friction."""
-    p = P.replace(eta=eta)
-    t, SlipStability = thresholds(p), slip.SlipStability
-    edge = t.omega_01 if eta < p.j else t.omega_03
-    for case, value, below, above in (
-        (Case.RR, edge, SlipStability.STABLE, SlipStability.UNSTABLE),
-        (Case.NR, t.omega_02, SlipStability.UNSTABLE, SlipStability.STABLE),
-        (Case.SR, t.omega_02, SlipStability.UNSTABLE, SlipStability.STABLE),
-    ):
-        for factor, expected in ((1 - 1e-12, below), (1.0, SlipStability.NEUTRAL), (1 + 1e-12, above)):
-            q = p.replace(omega_0=factor * value)
-            assert slip.stability(case, q) is expected
-            (s,) = (s for s in stationary_solutions(q) if s.case is case)
-            assert (s.slip_stability, s.slip_stable) == (expected, expected is not SlipStability.UNSTABLE)
-        assert slip.neutral_flow(case, p) == pytest.approx(value, 1e-14)
-    assert np.isnan(slip.neutral_flow(Case.NR, p.replace(eta=0.0)))
-    assert slip.stability(Case.RR, p.replace(omega_0=0.0)) is SlipStability.NEUTRAL
-    assert stationary_solutions(p.replace(omega_0=0.0))[0].slip_stability is SlipStability.NEUTRAL
-    assert slip.stability(Case.RR, p.replace(omega_0=5.0, eta=0.0)) is SlipStability.NEUTRAL
-    assert slip.stability(Case.RR, p.replace(omega_0=5.0, eta=0.6, mu=0.0)) is SlipStability.NEUTRAL
-    assert slip.stability(Case.RS, p.replace(omega_0=0.0)) is SlipStability.STABLE
-    assert slip.stability(Case.SS, p) is slip.stability(Case.NS, p) is SlipStability.STABLE
-
-
 def test_both_consistent_between_73_and_the_cone():
     """Off the stationary point the floor's cone allows more drag than gamma of (73), by 1/sqrt(1 - mu^2)."""
     p, omega_c = P.replace(mu=0.9, eta=1e6), 9.0
@@ -162,3 +124,36 @@ def test_both_consistent_between_73_and_the_cone():
         q = p.replace(omega_0=omega_c + factor * lag)
         assert (extreme(1, Case.RR, Case.SR, State(omega_c=omega_c), q)[1] > 0) == slips
         assert (rolling_forces.margin(omega_c, q) >= 0) == sticks
+
+
+# --- where nothing slips, or could ------------------------------------------------------------------------------------
+
+
+def test_bounds_are_infinite_where_gamma_never_vanishes():
+    """The zeros themselves claims hold, (56) claim eq-13-gamma."""
+    assert SlipBound(3.0, -2.0).zero == 1.5
+    assert SlipBound(3.0, 0.0).zero == HeldBound(P.replace(c=0.0), 1.0, 1, 1.0).zero == np.inf
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P), "slip_x = 1 rad s-1 must be 0"),
+        (lambda: slip_bounds.gamma_nr(0.0, [0.1, 0, 9.0, 0, 0, 1.0], P), "slip_z = 1"),
+        (lambda: slip_bounds.filippov_share(Case.SS, 9.0, P), "RR divides the states of RS and SR only"),
+    ],
+)
+def test_other_cases_are_refused(ask, message):
+    with pytest.raises(InputError, match=message):
+        ask()
+
+
+def test_definition_3_without_friction_or_flow():
+    """Elsewhere claim definition-3 holds it."""
+    stability, SlipStability = slip.stability, slip.SlipStability
+    still, slow = P.replace(omega_0=0.0), P.replace(omega_0=5.0)
+    assert np.isnan(slip.neutral_flow(Case.NR, P.replace(eta=0.0)))
+    assert stationary_solutions(still)[0].slip_stability is SlipStability.NEUTRAL
+    for neutral in (still, slow.replace(eta=0.0), slow.replace(eta=0.6, mu=0.0)):
+        assert stability(Case.RR, neutral) is SlipStability.NEUTRAL
+    assert stability(Case.RS, still) is stability(Case.SS, P) is stability(Case.NS, P) is SlipStability.STABLE

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from analytic import (
-    Stability,
     leaning_modes,
     solution,
     stationary_solutions,
@@ -22,27 +21,6 @@ EPS = np.finfo(float).eps
 
 def of_case(p, case):
     return [s for s in stationary_solutions(p) if s.case is case]
-
-
-@pytest.mark.parametrize("eta", [0.2, 0.6])
-def test_propositions_3_and_5(eta):
-    """(35) with the sign of its range corrected, (36); (46), (47). Stability in SR turns at sqrt(g/(jR))."""
-    for factor, exists in ((0.999999, False), (1.000001, True)):
-        p = P.replace(eta=eta)
-        p = p.replace(omega_0=factor * np.sqrt(p.g / (eta * p.R)))
-        for case in (Case.SR, Case.NR):
-            (s,) = of_case(p, case)
-            assert s.exists == s.slip_stable == exists
-            np.testing.assert_allclose(
-                s.state.slip_x, p.g / (p.j * p.omega_0 * p.r) - p.omega_0 * p.R / p.r, rtol=1e-13
-            )
-            np.testing.assert_allclose(s.force_B, [p.m * p.R * p.omega_0**2, p.m * p.g, 0], rtol=1e-13)
-            np.testing.assert_allclose(s.force_A, 0, atol=1e-13 * p.m * p.g)
-        (s,) = of_case(p, Case.NR)
-        assert (s.stability, s.family) == (Stability.NEUTRAL, ("y",))
-    for factor, kind in ((0.999, Stability.UNSTABLE), (1.001, Stability.ASYMPTOTIC)):
-        (s,) = of_case(P.replace(omega_0=factor * np.sqrt(P.g / (P.j * P.R))), Case.SR)
-        assert s.stability is kind
 
 
 # --- one solution, and those that attract -----------------------------------------------------------------------

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from model import Case, Contact, InputError, Parameters, State
-from model.cases import TRAITS
+from model import InputError, Parameters, State
 from model.kinematics import (
     angular_velocity,
     frame,
@@ -18,7 +18,6 @@ from model.kinematics import (
     slip_velocities,
     to_world,
 )
-from tests.directions import slip_directions
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
@@ -30,14 +29,16 @@ states = st.tuples(st.floats(0, 1), speeds, speeds, speeds, speeds, speeds, st.f
 angles = st.floats(-3.1, 3.1)
 
 
-@given(states, angles)
-def test_to_the_world_and_back(x, theta):
+@given(arrays(float, (2, 3, 8), elements=st.floats(-1, 1)), arrays(float, (2, 3), elements=angles))
+def test_to_the_world_and_back(unit, theta):
+    """Of many states at once."""
+    x = unit * [1, 100, 100, 100, 100, 100, 0.9 * P.R, 100]
     back, angle = from_world(to_world(x, theta, P), P)
     # Each entry is a sum of terms no larger than this scale; a dozen operations lose at most that many ulps of it,
     # and dividing by the orbit's radius (>= R/10) magnifies the tangential velocity's error.
     scale = 1 + np.abs(x).max() * (1 + P.R / P.r)
     np.testing.assert_allclose(back.stacked(), x, rtol=0, atol=64 * EPS * scale * 10 / P.R)
-    assert angle == pytest.approx(theta, abs=8 * EPS)
+    np.testing.assert_allclose(angle, theta, rtol=0, atol=8 * EPS)
 
 
 @given(st.tuples(speeds, speeds, speeds), st.tuples(speeds, speeds, speeds, st.floats(1, 2)))
@@ -59,25 +60,16 @@ def test_slip_is_the_velocity_of_the_material_point(x, theta):
         np.testing.assert_allclose(v, expected, atol=64 * EPS * scale)
 
 
-def test_slip_speeds_and_directions_are_7_and_8():
+def test_slip_speeds_and_spin():
     x = np.array([0, 0, 5.0, 3.0, -2.0, 4.0])
-    assert slip_speeds(x, P) == pytest.approx((P.r * 5, P.r * np.sqrt(20)))
-    assert slip_directions(x, P) == pytest.approx((np.arctan2(3, 4), np.arctan2(-2, 4)))
+    assert slip_speeds(x, P) == pytest.approx((P.r * 5, P.r * np.sqrt(20)))  # (7)
     # (4): without slip the ball turns against its orbit, R/r times as fast, about i and j.
     x = np.array([0, 0, 7.0, 0, 0, 0])
     assert not np.any(slip_velocities(x, P))
     np.testing.assert_allclose(angular_velocity(x, P), [P.R / P.r * 7, -P.R / P.r * 7, 0])
 
 
-def test_arrays_of_states_are_the_states_one_by_one():
-    rng = np.random.default_rng(1)
-    x, theta = rng.uniform(0, 0.04, (5, 3, 8)), rng.uniform(-3, 3, (5, 3))
-    many, angle = from_world(to_world(x, theta, P), P)
-    for index in np.ndindex(5, 3):
-        one, one_angle = from_world(to_world(x[index], theta[index], P), P)
-        np.testing.assert_array_equal(many.stacked()[index], one)
-        assert angle[index] == one_angle
-    # On the axis the orbit has no angular velocity.
+def test_on_the_axis_the_orbit_has_no_angular_velocity():
     world = to_world(np.array([0, 0, 3.0, 0, 0, 0, P.R, -1.0]), 0.0, P)
     x, theta = from_world(world, P)
     assert np.isnan(x.omega_c)
@@ -98,19 +90,9 @@ def test_a_state_that_is_none_is_refused(x, says):
         full_state(x)
 
 
-def test_a_state_of_many_keeps_its_columns():
+def test_a_state_is_one_or_many():
     columns = State.of(np.arange(24.0).reshape(3, 8))
     assert State.of(columns) is columns
     np.testing.assert_array_equal(columns.stacked(), np.arange(24.0).reshape(3, 8))
     with pytest.raises(InputError, match=r"one state is needed, not an array of shape \(3, 8\)"):
         State.one(columns.stacked())
-    with pytest.raises(InputError, match="omega_c = nan rad s-1 must be finite"):
-        State.one(State(omega_c=np.nan))
-
-
-def test_cases():
-    """Active variables and constraints fill the state space; a case is its two contacts."""
-    for case in Case:
-        assert len(TRAITS[case].constraints) + len(TRAITS[case].active) == 8
-        assert Case.of(case.A, case.B) is case
-    assert (Case.NS.A, Case.NS.B) == (Contact.N, Contact.S)
