@@ -1,7 +1,5 @@
 """Small scenes of what users build, and robots that others wrote: what memory holds still, and what it leaves alone."""
 
-import dataclasses
-
 import pytest
 
 from docs.studies import robot_scenes, small_scenes
@@ -91,6 +89,4 @@ def test_a_panda_lifts_and_lets_go():
 
 def test_a_scene_says_what_failed():
     """A plate that slides off its pad, in plain MuJoCo."""
-    found = small_scenes.tactile(WAYS["plain"])
-    assert found.wrong == ["slid off"]
-    assert set(dataclasses.asdict(found)) == {"values", "step", "contacts", "depth", "rise", "wrong"}
+    assert small_scenes.tactile(WAYS["plain"]).wrong == ["slid off"]
