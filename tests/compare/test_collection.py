@@ -10,12 +10,12 @@ import pytest
 import xarray
 
 import analytic
-from compare.commands import cli
 from compare.kit import collection
 from compare.kit.campaign import Campaign
 from compare.kit.tasks import Task
 from model import Parameters, StorageError, storage
 from model.hdf5 import column, dataset, reading
+from tests.commands import refused, told
 
 P = Parameters.named("reference")
 OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
@@ -121,28 +121,24 @@ def test_what_is_no_run_is_left_out(runs):
 
 def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(tmp_path, capsys):
     (file,) = ran(tmp_path / "runs", [P.replace(omega_0=omega) for omega in OMEGAS]).iterdir()
-    assert cli.main(["inspect", str(file), "--json"]) == 0
-    about = json.loads(capsys.readouterr().out)
+    about = json.loads(told(capsys, f"inspect {file} --json"))
     assert (about["varied"], about["ranges"]["omega_0"]) == (["omega_0"], [min(OMEGAS), max(OMEGAS)])
     for name, omega_0 in zip(about["names"], OMEGAS, strict=True):
-        assert cli.main(["inspect", name, "--json"]) == 0
-        assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == omega_0
+        assert json.loads(told(capsys, f"inspect {name} --json"))["parameters"]["omega_0"] == omega_0
     assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
-    assert [str(tmp_path / "runs" / name) for name in collection.describe(tmp_path / "all.h5")["names"]] == about[
-        "names"
-    ]
+    names = collection.describe(tmp_path / "all.h5")["names"]
+    assert [str(tmp_path / "runs" / name) for name in names] == about["names"]
 
 
 def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_path, capsys, monkeypatch):
     """In less than a third of the space; what is done is not done again."""
     monkeypatch.setattr(collection, "SHARE", 1)
-    ranges = ["--vary", "omega_0=5:10:6", "--vary", "eta=0.1,0.3"]
-    common = ["sweep", *ranges, "--time", "0.2", "--batch", "4", "--workers", "0", "--quiet"]
+    sweep = "sweep --vary omega_0=5:10:6 --vary eta=0.1,0.3 --time 0.2 --batch 4 --workers 0 --quiet"
     sizes, found = [], set()
-    for name, more in (("whole", []), ("means", ["--means-only"])):
+    for name, more in (("whole", ""), ("means", "--means-only")):
         where, before = tmp_path / name, None
         for _ in range(2):
-            assert cli.main([*common, *more, "-o", str(where)]) == 0
+            told(capsys, f"{sweep} {more} -o {where}")
             files = {path: path.stat().st_mtime_ns for path in where.glob("*.h5")}
             assert before in (None, files)
             before = files
@@ -154,19 +150,15 @@ def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_pat
                 found.add(repr({each: column(dataset(file, each)).tolist() for each in file}))  # nan, too
     assert len(found) == 1
     assert sizes[1] < sizes[0] / 3
-    (means, *_) = sorted((tmp_path / "means").glob("*.h5"))
-    assert collection.describe(means)["varied"] == ["eta", "omega_0"]
-    capsys.readouterr()
-    assert cli.main([*common, "-o", str(tmp_path / "means")]) == 2
-    assert "holds another sweep (means_only = True, not False)" in capsys.readouterr().err
+    assert collection.describe(min(files))["varied"] == ["eta", "omega_0"]
+    assert "holds another sweep (means_only = True, not False)" in refused(capsys, f"{sweep} -o {tmp_path / 'means'}")
 
 
 def test_a_sweep_is_sampled_as_often_as_asked(tmp_path, capsys):
-    common = ["sweep", "--vary", "omega_0=5,6", "--time", "0.2", "--workers", "0", "--quiet", "-o", str(tmp_path / "s")]
+    sweep = f"sweep --vary omega_0=5,6 --time 0.2 --workers 0 --quiet -o {tmp_path / 's'} --sample-interval"
     for wrong in ("0.5", "1e-5"):
-        assert cli.main([*common, "--sample-interval", wrong]) == 2
-        assert "within this run it must be >= 0.001 and <= 0.2" in capsys.readouterr().err
+        assert "within this run it must be >= 0.001 and <= 0.2" in refused(capsys, f"{sweep} {wrong}")
     assert not (tmp_path / "s").exists()
-    assert cli.main([*common, "--sample-interval", "0.05"]) == 0
+    told(capsys, f"{sweep} 0.05")
     (file,) = (tmp_path / "s").glob("*.h5")
     assert {len(run.time) for run in storage.load_runs(file).values()} == {5}

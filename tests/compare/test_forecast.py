@@ -4,7 +4,6 @@ import itertools
 import json
 import math
 import re
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -12,8 +11,8 @@ import pytest
 
 from compare.bench import forecast, forecast_page
 from compare.bench.settled import STILL, settle
-from compare.commands import cli
 from model import InputError
+from tests.commands import carried_out
 
 FLOOR = '<geom name="floor" type="plane" size="20 20 .1" {}/>'
 SLOPE = FLOOR.format('euler="0 15 0"')
@@ -92,6 +91,19 @@ def settled(text, limit=10.0):
 def unadvised(monkeypatch):
     """Forecasts without advice, whose search takes most of the time."""
     monkeypatch.setattr(forecast.advice, "best_change", lambda *scene: (None, {"creep": np.zeros(1)}))
+
+
+@pytest.fixture
+def forecasts(tmp_path, capsys):
+    """What the command says of a scene."""
+
+    def forecasts(text, *words, code=0):
+        (tmp_path / "scene.xml").write_text(text)
+        ended, out, err = carried_out(capsys, "forecast", tmp_path / "scene.xml", *words)
+        assert ended == code, err
+        return json.loads(out) if "--json" in words else err if code else out
+
+    return forecasts
 
 
 UNADVISED = pytest.mark.usefixtures("unadvised")
@@ -221,28 +233,12 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_what_has_no_forecast_gets_one_line(text, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("scene.xml").write_text(text)
+def test_what_has_no_forecast_gets_one_line(text, forecasts, tmp_path):
     code, said = REFUSED[text]
-    assert cli.main(["forecast", "scene.xml", "--settle", "2"]) == code
-    error = capsys.readouterr().err
+    error = forecasts(text, "--settle", "2", code=code)
     assert re.search(said, error)
     assert error.count("\n") == 1
     assert [each.name for each in tmp_path.iterdir()] == ["scene.xml"]
-
-
-@pytest.fixture
-def forecasts(tmp_path, capsys):
-    """What the command says of a scene."""
-
-    def forecasts(text, *words, code=0):
-        (tmp_path / "scene.xml").write_text(text)
-        assert cli.main(["forecast", str(tmp_path / "scene.xml"), *words]) == code
-        said = capsys.readouterr()
-        return json.loads(said.out) if "--json" in words else said.err if code else said.out
-
-    return forecasts
 
 
 def test_the_page_the_json_and_what_the_engine_replaces(forecasts, tmp_path):

@@ -8,7 +8,6 @@ import pytest
 
 from compare import validation
 from compare.claim import Bearing, Claim, Outcome, Verdict
-from compare.commands import cli
 from compare.kit import programme
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
@@ -16,6 +15,7 @@ from compare.kit.programme import UNDAMPED, Protocol
 from compare.kit.record import Check, Missing, Records
 from compare.report import results
 from model import Parameters, StorageError
+from tests.commands import carried_out
 from tests.measured import measured
 
 pytestmark = pytest.mark.usefixtures("few_figures")
@@ -161,15 +161,14 @@ def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing
 
 @pytest.mark.parametrize("command", ["validate", "judge"])
 def test_the_command_line(command, tmp_path, counted, capsys):
-    validate = ["validate", "--quick", "-o", str(tmp_path), "--workers", "0", "--set", "reference"]
-    assert cli.main([*validate, "--quiet"]) == 1
-    shown = capsys.readouterr().out
+    validate = f"validate --quick -o {tmp_path} --workers 0 --set reference"
+    code, shown, _ = carried_out(capsys, f"{validate} --quiet")
+    assert code == 1
     assert "of-round" in shown
     assert "it can't be done" in shown
     assert len(shown.splitlines()) < 12
-    again = ["judge", str(tmp_path), "--workers", "0"] if command == "judge" else validate
-    cli.main([*again, "--json"])
-    first, *_ = json.loads(capsys.readouterr().out)
+    again = f"judge {tmp_path} --workers 0" if command == "judge" else validate
+    first, *_ = json.loads(carried_out(capsys, f"{again} --json")[1])
     assert (first["id"], first["verdict"], first["passed"]) == ("of-round", "confirmed", True)
     assert set(first["resolving_power"]) == {"omega_c"}
     assert first["checks"][0]["predicted"] == Parameters.named("reference").omega_0
@@ -189,6 +188,7 @@ def test_what_a_set_of_ones_own_is_too_rough_for_is_no_failure(of, outcome, code
     check = Check(measurement=row, predicted=12.0, tolerance=1.0, scale=12.0)
     found = Verdict(claim=claim("of-round", "round"), outcome=outcome, checks=(check,))
     monkeypatch.setattr(validation, "judge_stored", lambda *_: [found])
-    assert cli.main(["judge", str(tmp_path)]) == code
-    told = "1 of 1 claims can't be told from what was measured: of-round"
-    assert (told in capsys.readouterr().out) == (outcome is Outcome.INCONCLUSIVE)
+    ended, said, _ = carried_out(capsys, f"judge {tmp_path}")
+    assert ended == code
+    unsure = "1 of 1 claims can't be told from what was measured: of-round"
+    assert (unsure in said) == (outcome is Outcome.INCONCLUSIVE)
