@@ -48,13 +48,15 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     if settings.rigid:  # the wall is the face of a block that goes with the ball, so heavy that it isn't moved
         option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
         half, (box, slide) = 4 * p.R, (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_SLIDE)
-        moving = spec.worldbody.add_body(name="wall")
+        moving = spec.worldbody.add_body(name="wall", explicitinertial=True)
+        moving.mass, moving.inertia = p.m / _HEAVY, body.inertia  # it doesn't turn: of any ball that MuJoCo takes
         for axis in ([-1, 0, 0], [0, 1, 0], [0, 0, 1]):  # inwards, onwards, up
             moving.add_joint(type=slide, axis=axis, armature=_HEAVY * p.m)
         rgba = list(wall.rgba)
         spec.delete(wall)
-        part = moving.add_geom(name="wall", type=box, size=[half] * 3, pos=(p.R + p.r + half, 0, 0), rgba=rgba)
-        part.mass, part.contype, part.conaffinity = p.m / _HEAVY, 0, 0
+        moving.ipos = centre = (p.R + p.r + half, 0, 0)
+        part = moving.add_geom(name="wall", type=box, size=[half] * 3, pos=centre, rgba=rgba)
+        part.contype, part.conaffinity = 0, 0
     if settings.scene == "facets":  # fixed planes, tangent to the vessel's cylinder
         sensor = spec.sensor("B")
         for facet in range(FACETS):

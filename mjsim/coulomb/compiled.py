@@ -1151,7 +1151,7 @@ def retain(m: int, d: int, head: int) -> None:
 @compiled
 def _put_back(m: int, d: int, head: int) -> bool:
     """Put back points that the collider has dropped, corners of patches that have others, if still overlapping."""
-    counts, share = _int64(head), _real(head)[NEAR]
+    counts, share, rigid = _int64(head), _real(head)[NEAR], _real(head)[RIGID] > 0
     ncon, size, contact = _number(d, NCON), _at(SIZE), _int64(d + _at(CONTACT))[0]
     xpos, xmat, bound = _array(d, XPOS), _array(d, XMAT), _array(m, RBOUND)
     before, count = _block(head, BEFORE), counts[COUNT_BEFORE]
@@ -1193,7 +1193,7 @@ def _put_back(m: int, d: int, head: int) -> bool:
             for j in range(3):
                 square += (place[j] - middle[j]) ** 2
             alone = alone and square > near**2
-        if not (0 < left < had and alone):
+        if not (0 < left < had + rigid and alone):  # a heightfield has one point at a time, by turns
             continue
         thin = 0  # the axis that is farthest from the normal
         for j in range(1, 3):

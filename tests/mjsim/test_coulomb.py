@@ -307,6 +307,14 @@ def test_scenes_of_the_page_hold(name, rigid):
     assert creep(mujoco.MjModel.from_xml_path(str(SCENES / name)), rigid) < 1e-12
 
 
+def test_a_rigid_box_stands_on_a_heightfield():
+    """Of which the collider reports a corner in each step, another one in the next."""
+    hill = '<hfield name="hill" nrow="3" ncol="3" size="1 1 .1 .1" elevation="0 0 0 0 1 0 0 0 0"/>'
+    box = f'<body pos=".3 .1 .12"><freejoint/>{FLAT}</body>'
+    scene = f'<worldbody><geom type="hfield" hfield="hill"/>{box}</worldbody>'
+    assert creep(mujoco.MjModel.from_xml_string(f"<mujoco><asset>{hill}</asset>{scene}</mujoco>"), True) < 1e-12
+
+
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "implicit"])
 def test_rigid_contacts_know_of_dampers(integrator):
     """They become inertia, once, and motions stay as they are; `implicit` has Coriolis forces' derivative, too."""
