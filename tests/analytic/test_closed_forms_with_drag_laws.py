@@ -6,7 +6,6 @@ used for what is expected. The equations of motion are those of `test_dynamics`.
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from analytic import (
     Stability,
@@ -21,7 +20,7 @@ from analytic.bifurcation.diagram import number_of_folds
 from analytic.stationary import slipping_branch as sb
 from model import Case, Parameters
 from model.drag import LAWS, QUADRATIC, SCHILLER_NAUMANN, STOKES
-from tests import drag_laws
+from tests.drag_laws import resistance
 
 P = Parameters.named("reference").replace(nu_f=2e-4)
 LIGHT = {STOKES: 1.0, SCHILLER_NAUMANN: 1.0, QUADRATIC: 0.0}
@@ -29,56 +28,51 @@ LIGHT = {STOKES: 1.0, SCHILLER_NAUMANN: 1.0, QUADRATIC: 0.0}
 NOT_STOKES = [law for law in LAWS if law != STOKES]
 
 
-def resistance(speed, p):
-    """Drag per mass, m s-2."""
-    return float(drag_laws.resistance(speed, p)) * speed if speed else 0.0
+def lag_of(needed, p):
+    """The lag in m/s whose drag is `needed`, m/s2: by bisection of its logarithm."""
+    low, high = np.full_like(needed, 1e-40), np.full_like(needed, 1e10)
+    for _ in range(70):
+        middle = np.sqrt(low * high)
+        enough = resistance(middle, p) * middle > needed
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return high
 
 
-def at_angle(angle, p):
-    """omega_c and omega_0 of SS at |alpha| from (38), (39), with the lag whose drag balances friction, (41)."""
+def flow_at(angle, p):
+    """omega_0 of SS at |alpha| from (38), (39), with the lag whose drag balances friction, (41)."""
     cos, sin = np.cos(angle), np.sin(angle)
     den = (1 + p.j * cos**2) * p.mu * p.eta + (p.j - p.eta) * cos
     omega_c = np.sqrt(p.g / p.R * p.mu * (1 + p.eta * cos**2) / den)
-    needed = p.g * p.mu * (p.j - p.eta) * cos * sin / den
-    top = 1.0
-    while resistance(top, p) < needed:
-        top *= 2
-    lag = brentq(lambda speed: resistance(speed, p) - needed, 0.0, top, xtol=1e-300, rtol=9e-16)
-    return omega_c, omega_c + lag / p.R
+    return omega_c + lag_of(p.g * p.mu * (p.j - p.eta) * cos * sin / den, p) / p.R
 
 
-def random_sets(law, count):
-    """With folds for the most; Re along the branch from 1 to 1e4."""
-    rng = np.random.default_rng([count, LAWS.index(law)])
-    sets = []
-    for _ in range(count):
-        j, mu = rng.uniform(0.1, 2 / 3), 10 ** rng.uniform(-1.5, 0.5)
-        kappa, nu_f = 10 ** rng.uniform(-3, 0.5), 10 ** rng.uniform(-5.5, -2)
-        eta = j * rng.uniform(0.001, 0.999)
-        c = kappa * np.sqrt(P.g / P.R)
-        sets.append(P.replace(j=j, mu=mu, eta=eta, c=c, nu_f=nu_f, drag=law, C_D=rng.uniform(0.3, 1.0)))
-    return sets
+def random_set(law, rng):
+    """With a fold, mostly; Re along the branch from 1 to 1e4."""
+    j, mu = rng.uniform(0.1, 2 / 3), 10 ** rng.uniform(-1.5, 0.5)
+    kappa, nu_f = 10 ** rng.uniform(-3, 0.5), 10 ** rng.uniform(-5.5, -2)
+    eta, c = j * rng.uniform(0.001, 0.999), kappa * np.sqrt(P.g / P.R)
+    return P.replace(j=j, mu=mu, eta=eta, c=c, nu_f=nu_f, drag=law, C_D=rng.uniform(0.3, 1.0))
 
 
 def scanned(p):
     """The greatest omega_0 of the branch inside its ends, by ever finer scans, and how many extrema the first saw."""
     angles = np.concatenate([np.geomspace(1e-9, 0.1, 100), np.linspace(0.1, np.pi / 2 - 0.1, 400)[1:]])
     angles = np.concatenate([angles, np.pi / 2 - np.geomspace(1e-9, 0.1, 200)[::-1][1:]])
-    flows = np.array([at_angle(angle, p)[1] for angle in angles])
+    flows = flow_at(angles, p)
     rises = np.sign(np.diff(flows))
     turns = int(np.sum(rises[1:] != rises[:-1]))
     for _ in range(8):
         top = int(np.clip(np.argmax(flows), 1, len(angles) - 2))
         angles = np.linspace(angles[top - 1], angles[top + 1], 21)
-        flows = np.array([at_angle(angle, p)[1] for angle in angles])
+        flows = flow_at(angles, p)
     return float(flows.max()), turns
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_fold_against_a_scan(law):
     """omega_04 to 1e-10, one fold beyond eta_cr and none before; omega_01, omega_02, omega_03 are those of Stokes."""
-    folds = []
-    for p in random_sets(law, 12):
+    folds, rng = [], np.random.default_rng([12, LAWS.index(law)])
+    for p in (random_set(law, rng) for _ in range(12)):
         t, stokes = thresholds(p), thresholds(p.replace(drag=STOKES))
         assert (t.omega_01, t.omega_02, t.omega_03) == (stokes.omega_01, stokes.omega_02, stokes.omega_03)
         assert t.eta_cr == LIGHT[law] * stokes.eta_cr
@@ -124,7 +118,9 @@ def test_solutions_are_zeros_of_the_equations(law, omega_0, eta):
         if s.case is Case.NS:
             assert s.moves
             assert s.state.v_y < 0
-            assert resistance(-s.state.v_y, p) == pytest.approx(p.g - p.eta * p.R * omega_0**2, rel=1e-12)
+            assert resistance(-s.state.v_y, p) * -s.state.v_y == pytest.approx(
+                p.g - p.eta * p.R * omega_0**2, rel=1e-12
+            )
 
 
 @pytest.mark.parametrize("law", NOT_STOKES)

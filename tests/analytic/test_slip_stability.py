@@ -14,60 +14,44 @@ from model import Case, InputError, Parameters, State
 P = Parameters.named("reference")
 
 
-def direction(alpha, beta):
-    """Unit vectors (slip_x, slip_y, slip_z) with slip directions alpha, beta: (75), shape (..., 3).
-
-    Both angles must lie in [-pi/2, pi/2] or both in [pi/2, 3 pi/2] (76); the quarter turns themselves are singular.
-    """
-    n = np.stack(np.broadcast_arrays(np.tan(alpha), np.tan(beta), 1.0), axis=-1)
-    sign = np.sign(np.pi / 2 - np.asarray(alpha, dtype=float))
-    return sign[..., None] * n / np.linalg.norm(n, axis=-1, keepdims=True)
+RR_SS = Case.RR, Case.SS
 
 
-def growth_of_energy(inner, outer, x, n, p):
+def directions():
+    """Slips (n, 3) of length 1 along alpha and beta, both in [-pi/2, pi/2] or both in [pi/2, 3 pi/2]: (75), (76)."""
+    angle = ((np.arange(60) + 0.5) / 60 - 0.5) * np.pi
+    tan_alpha, tan_beta = np.meshgrid(np.tan(angle), np.tan(angle))
+    sheet = np.stack([tan_alpha, tan_beta, np.ones_like(tan_alpha)], axis=-1).reshape(-1, 3)
+    sheet = np.append(sheet, [[0.0, 0.0, 1.0]], axis=0)
+    return np.concatenate([sheet, -sheet]) / np.tile(np.linalg.norm(sheet, axis=1), 2)[:, None]
+
+
+def growth_of_energy(x, n, p):
     """gamma out of RR into SS by kinetic energy: the work done on the slip, divided by its size in that product.
 
     The mass matrix of the slip in units of m r^2 is the kinetic energy with what else moves eliminated.
     """
     M = p.j / (1 + 2 * p.j) * np.array([[1 + p.j, p.j, 0], [p.j, 1 + p.j, 0], [0, 0, 1 + 2 * p.j]])
-    rates, _, _ = slip.slip_rates(inner, outer, x, n, p)
+    rates, _, _ = slip.slip_rates(*RR_SS, x, n, p)
     return np.sum(n @ M * rates, axis=-1) / np.sqrt(np.sum(n @ M * n, axis=-1))
 
 
-def extreme(side, inner, outer, x, p, gamma=slip.gamma, closed=False):
-    """The direction of greatest (side 1) or least (side -1) gamma of all, and that: the best of a grid, polished.
+def greatest(gamma, x, p, closed=False):
+    """The direction of greatest gamma out of RR into SS, and that: the best of a grid, polished.
 
     With `closed` only of those along which both contacts press: elsewhere the ball would lift instead of slipping.
     """
 
     def growth(n):
-        return side * gamma(inner, outer, x, n, p)
+        _, A_y, B_x = slip.slip_rates(*RR_SS, x, n, p)
+        return np.where((not closed) | (A_y >= 0) & (B_x >= 0), gamma(x, n, p), -np.inf)
 
-    def allowed(n):
-        _, A_y, B_x = slip.slip_rates(inner, outer, x, n, p)
-        return (not closed) | (A_y >= 0) & (B_x >= 0)
-
-    grid = directions(len(slip.normals(inner, outer)))
-    grid = grid[allowed(grid)]
+    grid = directions()
     values = growth(grid)
-    best, value, scale = grid[np.argmax(values)], values.max(), np.abs(values).max()
-    if grid.shape[1] > 1:
-        polished = minimize(lambda n: -float(growth(n)) / scale, best, method="BFGS", options={"gtol": 1e-9}).x
-        if growth(polished) > value and allowed(polished):
-            best, value = polished, float(growth(polished))
-    return best / np.linalg.norm(best), side * float(value)
-
-
-def directions(dimension):
-    """Directions (n, dimension) all over the unit sphere, but for those that leave a contact rolling."""
-    if dimension == 1:
-        return np.array([[1.0], [-1.0]])
-    if dimension == 2:
-        angle = np.linspace(0, 2 * np.pi, 360, endpoint=False)
-        return np.stack([np.sin(angle), np.cos(angle)], axis=-1)
-    angle = ((np.arange(60) + 0.5) / 60 - 0.5) * np.pi
-    sheets = [direction(angle[:, None] + half, angle + half).reshape(-1, 3) for half in (0.0, np.pi)]
-    return np.concatenate([*sheets, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+    best, scale = grid[np.argmax(values)], values.max()
+    polished = minimize(lambda n: -float(gamma(x, n, p)) / abs(scale), best, method="BFGS", options={"gtol": 1e-9}).x
+    best = max(best, polished, key=growth)
+    return best / np.linalg.norm(best), float(growth(best))
 
 
 @pytest.mark.parametrize(("mu", "eta"), [(0.2, 0.2), (0.1, 0.39), (0.9, 0.05), (0.5, 0.3)])
@@ -77,8 +61,8 @@ def test_energy_and_forces_agree_on_omega_01(mu, eta):
     for factor, holds in ((0.5, True), (1 - 1e-6, True), (1 + 1e-6, False)):
         omega = factor * thresholds(p).omega_01
         q, x = p.replace(omega_0=omega), State(omega_c=omega)
-        n, greatest = extreme(1, Case.RR, Case.SS, x, q, growth_of_energy, closed=True)
-        assert (greatest < 0) == (rolling_forces.margin(omega, q) > 0) == holds
+        n, value = greatest(growth_of_energy, x, q, closed=True)
+        assert (value < 0) == (rolling_forces.margin(omega, q) > 0) == holds
         if factor > 0.9:  # the direction in which it ends
             np.testing.assert_allclose(np.abs(n), [0, 0, 1], atol=1e-3)
 
@@ -93,19 +77,22 @@ def test_counter_example_to_the_claim_after_80():
     Euclidean gamma is positive: up to 0.61 omega_01.
     """
     omega = 0.5 * thresholds(P).omega_01
-    p = P.replace(omega_0=omega)
-    at_zero = float(slip.gamma(Case.RR, Case.SS, State(omega_c=omega), direction(0.0, 0.0), p))
-    n, greatest = extreme(1, Case.RR, Case.SS, State(omega_c=omega), p)
-    assert at_zero < 0 < greatest
-    assert extreme(1, Case.RR, Case.SS, State(omega_c=omega), p, growth_of_energy, closed=True)[1] < 0
+
+    def euclidean(x, n, p):
+        return slip.gamma(*RR_SS, x, n, p)
+
+    p, x = P.replace(omega_0=omega), State(omega_c=omega)
+    n, value = greatest(euclidean, x, p)
+    assert euclidean(x, [0.0, 0.0, 1.0], p) < 0 < value
+    assert greatest(growth_of_energy, x, p, closed=True)[1] < 0
     assert rolling_forces.margin(omega, p, omega) > 0
     # The direction of growth keeps both contacts closed: it isn't excluded by (12).
-    _, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, State(omega_c=omega), n, p)
+    _, A_y, B_x = slip.slip_rates(*RR_SS, x, n, p)
     assert A_y > 0
     assert B_x > 0
     for factor, grows in ((0.605, True), (0.615, False)):
-        x, q = State(omega_c=factor * 2 * omega), P.replace(omega_0=factor * 2 * omega)
-        assert (extreme(1, Case.RR, Case.SS, x, q)[1] > 0) == grows
+        flow = factor * 2 * omega
+        assert (greatest(euclidean, State(omega_c=flow), P.replace(omega_0=flow))[1] > 0) == grows
 
 
 def test_normal_forces_while_a_slip_is_slight():
@@ -122,7 +109,8 @@ def test_both_consistent_between_73_and_the_cone():
     lag = T * (1 + 2 * p.j) * p.g / (p.j * p.c * p.R)
     for factor, slips, sticks in ((0.99, False, True), (1.01, True, True), (1.01 / np.sqrt(1 - p.mu**2), True, False)):
         q = p.replace(omega_0=omega_c + factor * lag)
-        assert (extreme(1, Case.RR, Case.SR, State(omega_c=omega_c), q)[1] > 0) == slips
+        growths = [slip.gamma(Case.RR, Case.SR, State(omega_c=omega_c), [side], q) for side in (1.0, -1.0)]
+        assert (max(growths) > 0) == slips
         assert (rolling_forces.margin(omega_c, q) >= 0) == sticks
 
 
