@@ -21,7 +21,6 @@ import numpy.typing as npt
 from analytic.orbits import periodic as orbits
 from analytic.orbits.periodic import NoOrbitError, Orbit, active_variables, extent
 from analytic.simulation.ensemble import interval, random_starts
-from analytic.simulation.motion import natural_units
 from analytic.simulation.simulator import simulate
 from analytic.stationary.solutions import StationarySolution, stable_solutions
 from model import InputError, Parameters, SimulationError, Trajectory
@@ -156,7 +155,7 @@ def attractors(
     if lasting is None and p.c == 0:
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
-    groups, window = list[list[Fate]](), WINDOW * natural_units(p)[0]
+    groups, window = list[list[Fate]](), WINDOW * math.sqrt(p.R / p.g)
     todo = (_follow_to_attractor(p, x, duration, run, groups) for x in states)
     following = [(each, next(each)) for each in islice(todo, SIDE_BY_SIDE)]
     while following:
@@ -184,7 +183,7 @@ def _follow_to_attractor(
     Stationary is what hardly moves, and less than before. Where two windows are alike the motion is recurrent: it has
     the fate of one of the `known` groups, or closes; if it does neither, its largest Lyapunov exponent decides.
     """
-    solutions, unit = stable_solutions(p), natural_units(p)[0]
+    solutions, unit = stable_solutions(p), math.sqrt(p.R / p.g)
     seen, recurrent = list[Trajectory](), False
     for _ in range(math.ceil(lasting / (WINDOW * unit))):
         now = yield x

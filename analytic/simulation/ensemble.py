@@ -139,11 +139,6 @@ class _Run:
     over: npt.NDArray[np.bool_]
     """Whether nobody wants it any more."""
 
-    def rests(self, row: int) -> tuple[float, str]:
-        """Repeat the state of a row to the end; when the run ended there, s, without a failure."""
-        self.x[row:], self.case[row:] = self.x[row], self.case[row]
-        return float(self.times[row]), ""
-
 
 def _run_time_stepping(run: _Run) -> tuple[float, str]:
     """A run by time stepping, into its rows; when it ended, and why it failed, if it did."""
@@ -169,7 +164,8 @@ def _run_event_driven(run: _Run) -> tuple[float, str]:
     last = int(rows.taken[0]) - 1
     if failure:
         return float(run.times[max(last, 0)]), f"stopped at t = {rows.reached[0]:g} s: {failure}"
-    return run.rests(last)
+    run.x[last:], run.case[last:] = run.x[last], run.case[last]
+    return float(run.times[last]), ""
 
 
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:

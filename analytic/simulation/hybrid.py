@@ -23,7 +23,7 @@ from analytic.simulation import charts, equations, motion, transitions
 from analytic.simulation.charts import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
 from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, Stretch, first_pace, stretch
-from analytic.simulation.motion import Event, Fluid, Moment, Recorder
+from analytic.simulation.motion import Event, Moment, Recorder
 from analytic.simulation.settings import Settings
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
@@ -179,7 +179,7 @@ def keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
         run.x[these], run.case[these], run.taken[0] = m.x.stacked(), k.case, taken
         if len(run.path):
             theta = np.unwrap(np.append(near, m.theta))[1:] if k.case % 3 == AWAY else m.theta
-            columns = theta, m.alpha, m.beta, m.work, Fluid(*k.line, k.waves)(t)
+            columns = theta, m.alpha, m.beta, m.work, [equations.fluid(time, k) for time in t.tolist()]
             run.path[these] = np.stack(np.broadcast_arrays(*columns), axis=-1)
             near = float(run.path[taken - 1, 0])
     return near
@@ -238,10 +238,10 @@ def compiled() -> Callable[..., Any] | None:
 @lru_cache
 def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[Motion, Array]:
     """What runs of one ball in one flow share: constants of the motion, and pieces of the flow as rows of an array."""
-    k, rows = motion.of_ball(p, Fluid.of(flow, 0.0), settings), []
+    k, rows = motion.of_ball(p, flow, settings), []
     for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
         jump = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
-        rows.append([start, end, *Fluid.of(flow, start).line(), float(jump > _LEAST_JUMP * np.abs(flow.value).max())])
+        rows.append([start, end, *motion.line_of(flow, start), float(jump > _LEAST_JUMP * np.abs(flow.value).max())])
     return k, np.array(rows)
 
 

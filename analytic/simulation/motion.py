@@ -1,11 +1,11 @@
-"""Data of simulations: the fluid, a moment, a path of one case, and the record of a run."""
+"""Data of simulations: the ball in its flow, a moment, an event, and the record of a run."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,40 +16,9 @@ from analytic.simulation import equations
 from analytic.simulation.equations import Line, Motion
 from analytic.simulation.settings import Settings
 from model import Case, Events, Flow, Header, Parameters, State, Trajectory
-from model.arrays import Array, Real
+from model.arrays import Array
 from model.drag import STOKES
 from model.trajectory import samples
-
-
-@dataclass(frozen=True)
-class Fluid:
-    """omega_0 in rad s-1 at a time in s, between two knots of a `model.Flow`: a line and waves."""
-
-    start: float
-    value: float
-    slope: float = 0.0
-    waves: tuple[tuple[float, float, float], ...] = ()
-    """Amplitude in rad s-1, angular frequency in rad s-1, phase in rad."""
-
-    def __call__(self, t: Real) -> Real:
-        """omega_0 at a time, or at times of any shape."""
-        omega_0, sin = self.value + self.slope * (t - self.start), math.sin if isinstance(t, float) else np.sin
-        for amplitude, omega, phase in self.waves:
-            omega_0 = omega_0 + amplitude * sin(omega * t + phase)
-        return omega_0
-
-    def line(self) -> Line:
-        """The flow without its waves."""
-        return Line(float(self.start), float(self.value), float(self.slope))
-
-    @classmethod
-    def of(cls, flow: Flow, start: float) -> Self:
-        """The piece of a flow that begins at one of its knots, or at 0."""
-        k = int(np.searchsorted(flow.start, start, side="right")) - 1
-        waves = tuple((a, 2 * math.pi * f, phase) for a, f, phase in flow.waves.tolist())
-        if k < 0:
-            return cls(start, float(flow.value[0]), 0.0, waves)
-        return cls(float(flow.start[k]), float(flow.value[k]), float(flow.slope[k]), waves)
 
 
 class Moment(NamedTuple):
@@ -66,20 +35,23 @@ class Moment(NamedTuple):
     """Work of drag, friction and impacts so far, J."""
 
 
-def natural_units(p: Parameters) -> tuple[float, float, float, float]:
-    """Units: of time, of velocity, of the spin of the ball, of energy."""
-    time = math.sqrt(p.R / p.g)
-    return time, p.R / time, p.R / (time * p.r), p.m * p.g * p.R
+def line_of(flow: Flow, start: float) -> Line:
+    """What a flow is without its waves from one of its knots, or from 0, on."""
+    k = int(np.searchsorted(flow.start, start, side="right")) - 1
+    if k < 0:
+        return Line(float(start), float(flow.value[0]), 0.0)
+    return Line(float(flow.start[k]), float(flow.value[k]), float(flow.slope[k]))
 
 
-def of_ball(p: Parameters, omega_0: Fluid, settings: Settings) -> Motion:
-    """All that the motion of a ball depends on, as plain numbers, for compiled functions; the case is set later."""
+def of_ball(p: Parameters, flow: Flow, settings: Settings) -> Motion:
+    """What the motion of a ball depends on, as plain numbers; in whatever case, and at first."""
     m, r, R, j, mu, eta, g, c = map(float, (p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, p.c))
-    law, (unit, _, spin, _) = drag.Law(*map(float, drag.law(p))), natural_units(p)
+    law, unit = drag.Law(*map(float, drag.law(p))), math.sqrt(R / g)
     leaves = {"slip-stability": equations.STABILITY, "infeasible": equations.FEASIBILITY}[settings.leave_rolling]
+    waves = tuple((amplitude, 2 * math.pi * f, phase) for amplitude, f, phase in flow.waves.tolist())
     return Motion(
         m, r, R, j, mu, eta, g, c, law, p.drag == STOKES, float(settings.rtol), float(settings.restitution), leaves,
-        unit, spin, omega_0.waves, omega_0.line(), int(Case.NN), 0.0, equations.NO_FALL,
+        unit, R / (unit * r), waves, line_of(flow, 0.0), int(Case.NN), 0.0, equations.NO_FALL,
     )  # fmt: skip
 
 

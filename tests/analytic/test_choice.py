@@ -18,9 +18,9 @@ from analytic.mechanics.contact_problem import Closed, solve
 from analytic.mechanics.rigid_body import Forces, slip_at_A, slip_at_B, velocities
 from analytic.simulation import transitions
 from analytic.simulation.equations import smooth_rates
-from analytic.simulation.motion import Fluid, Moment, of_ball
+from analytic.simulation.motion import Moment, of_ball
 from analytic.simulation.settings import Settings
-from model import Case, Contact, State
+from model import Case, Contact, Flow, State
 from tests.random_motions import UNIT, P, random_start
 
 JAMMING = [
@@ -130,7 +130,7 @@ def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
             continue
         fluid = omega_c + brentq(margin, 0, 3, xtol=1e-14) * lag
         at = Moment(0.0, 0.0, State(omega_c=omega_c))
-        number, onset = transitions.leave(at, of_ball(p, Fluid(0.0, fluid), Settings()))
+        number, onset = transitions.leave(at, of_ball(p, Flow.steady(fluid), Settings()))
         case = Case(number)
         ends.add((case, sense))
         slips = (onset.alpha, case.A), (onset.beta, case.B)
@@ -160,7 +160,7 @@ def test_a_single_rolling_contact_holds_or_gives_way(rolls):
         f = dynamics.forces(case, x, p, p.omega_0)
         if f.A_y <= 0:
             continue
-        free = smooth_rates(velocities(x, p), 0.0, 0.0, of_ball(p, Fluid(0.0, p.omega_0), Settings()))
+        free = smooth_rates(velocities(x, p), 0.0, 0.0, of_ball(p, Flow.steady(p.omega_0), Settings()))
         known = Closed(0.0, 0.0, -sense if rolls == "B" else sense)
         A, B = (Closed(), known) if rolls == "A" else (known, Closed())
         load, friction = (p.mu * f.A_y, (f.A_x, f.A_z)) if rolls == "A" else (p.eta * f.B_x, (f.B_y, f.B_z))

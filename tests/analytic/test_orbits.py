@@ -11,7 +11,6 @@ from analytic.orbits import periodic as orbits
 from analytic.orbits.fates import Kind
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import NoOrbitError
-from analytic.simulation.motion import natural_units
 from model import Case, InputError, Parameters, State
 from model.kinematics import state_units
 from tests.measured import motion
@@ -180,6 +179,6 @@ def test_recurrent_motions_that_do_not_close(exponent, kind, monkeypatch):
         return [motion(p, time, case=Case.SS, **dict(zip(names, each.T, strict=True))) for each in turned]
 
     start = np.append([0.0, 0.0], [0.5, 0.0, 2.0, 0.0] * size)
-    (only,) = attractors(HOPPING, start, lasting=3 * fates.WINDOW * natural_units(HOPPING)[0], run=run)
+    (only,) = attractors(HOPPING, start, lasting=3 * fates.WINDOW * (HOPPING.R / HOPPING.g) ** 0.5, run=run)
     assert only.fate.kind is kind
     assert only.fate.exponent == exponent
