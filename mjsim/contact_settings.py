@@ -80,10 +80,9 @@ class ContactSettings:
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
     order: int = _choice(2, 1)
     """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
-    scene: str = _choice("joints", "facets", "rigid")
-    """``joints``: azimuth, radius and height as joints, the wall a plane that is turned to the ball. ``facets``: a free
-    ball in `scene.FACETS` fixed planes, as MuJoCo comes. ``rigid``: a free ball whose contacts obey `mjsim.Coulomb`,
-    for which no parameter of soft ones decides anything."""
+    rigid: bool = False
+    """Whether the ball is free and its contacts obey `mjsim.Coulomb`, for which no parameter of soft ones decides
+    anything; else azimuth, radius and height are joints, and the wall a plane that is turned to the ball."""
     cone: str = _choice("elliptic", "pyramidal")
     integrator: str = _choice("Euler", "implicit", "implicitfast", "discrete")
     noslip_iterations: int = _number(0, "1", Range(0, whole=True))
@@ -98,10 +97,10 @@ class ContactSettings:
                 check_number(field.name, getattr(self, field.name), field.metadata["unit"], field.metadata["allowed"])
             elif "known" in field.metadata:
                 check_choice(field.name, getattr(self, field.name), field.metadata["known"])
-        if self.scene != "joints" and (self.memory or self.servo or self.order == 2):
-            raise InputError(f"scene = {self.scene!r} needs memory = False, servo = 0, order = 1: it has no joints")
-        if self.rigid and (self.noslip_iterations or self.integrator == "discrete"):
-            raise InputError("scene = 'rigid' needs noslip_iterations = 0 and another integrator than 'discrete'")
+        if self.rigid and (self.memory or self.servo or self.order == 2 or self.noslip_iterations):
+            raise InputError("rigid contacts need memory = False, servo = 0, order = 1, noslip_iterations = 0")
+        if self.rigid and self.integrator == "discrete":
+            raise InputError("rigid contacts need another integrator than 'discrete'")
         if self.memory and self.cone == "pyramidal":
             raise InputError("cone = 'pyramidal' needs memory = False: rows of the pyramid mix normal and friction")
         if self.timestep > self.largest_timestep * (1 + 1e-12):
@@ -110,11 +109,6 @@ class ContactSettings:
                 f"solreffriction {self.solreffriction:g} s and servo {self.servo:g} s allow at most "
                 f"{self.largest_timestep:g} s"
             )
-
-    @property
-    def rigid(self) -> bool:
-        """Whether contacts are rigid."""
-        return self.scene == "rigid"
 
     @property
     def largest_timestep(self) -> float:
@@ -242,7 +236,7 @@ class ContactSettings:
     @classmethod
     def rigid_at(cls, timestep: float) -> Self:
         """Rigid contacts of a free ball, for a step of any length."""
-        own = cls(scene="rigid", solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
+        own = cls(rigid=True, solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
         return dataclasses.replace(own, timestep=timestep)
 
     def suited(self, p: Parameters) -> Self:

@@ -100,8 +100,7 @@ class Run:
             for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
-        corner = (1 / math.cos(math.pi / scene.FACETS) - 1) * (settings.scene == "facets")
-        self._deepest = np.array([(p.r + (p.R + p.r) * corner, p.r) for p in parameters])
+        self._deepest = np.array([p.r for p in parameters])[:, None]
         """How far h and y may be negative: a ball with its centre beyond wall or floor has come through."""
         self._classifier = Classifier(parameters, settings)
         self._steps = (self._count - 1) * self._interval + 1
@@ -186,7 +185,7 @@ def balls(
     given: Iterable[tuple[Any, Parameters, State]], settings: ContactSettings, theta_0: float
 ) -> Sequence[JointedBall | FreeBall]:
     """Of runs with their models, parameters and starts."""
-    if settings.scene != "joints":
+    if settings.rigid:
         from mjsim.free import FreeBall  # here, because the law of its contacts takes long to load
 
         return [FreeBall(*each, settings, theta_0) for each in given]

@@ -1,7 +1,6 @@
 """The ball on a free joint, which may cross the axis; of what is done between the steps it has drag alone.
 
-With ``scene="facets"`` it is MuJoCo as it comes. With ``scene="rigid"`` contacts obey `mjsim.Coulomb`, which serves any
-model and knows nothing of this one.
+Contacts obey `mjsim.Coulomb`, which serves any model and knows nothing of this one.
 Semi-implicit steps are leapfrog: places are half a step ahead of velocities. The wall is a block that is turned to the
 ball before each step and moves during it as a cylinder does past the ball (`against`).
 """
@@ -122,29 +121,28 @@ class FreeBall:
         self.model = model = copy.copy(model)  # its wall moves
         self.data = mujoco.MjData(model)
         self.p, self.theta, self._timestep = p, theta_0, settings.timestep
-        self.law = Coulomb(self.model, rigid=True, share=share) if settings.rigid else None
-        self.lead = settings.timestep / 2 if self.law else 0.0
-        data, wall = self.data, self.model.body("wall") if self.law else None
+        self.law = Coulomb(self.model, rigid=True, share=share)
+        self.lead = settings.timestep / 2
+        data, wall = self.data, self.model.body("wall")
         self.body = Body(
             qpos=data.qpos,
             qvel=data.qvel,
             last=data.qacc_warmstart,
             applied=data.qfrc_applied,
             sensors=data.sensordata,
-            wall=wall.quat if wall else data.mocap_quat[0],
-            at=wall and wall.pos,
+            wall=wall.quat,
+            at=wall.pos,
             heavy=float(model.dof_M0[-1]),
             margins=model.pair_margin,
             ball=Ball(*map(float, Ball.of(p, settings))),
-            served=self.law and compiled.served(self.law, data),
+            served=compiled.served(self.law, data),
         )
         self.place(x, theta_0)
 
     def place(self, x: npt.ArrayLike, theta: float) -> None:
         """Begin anew in a state."""
         mujoco.mj_resetData(self.model, self.data)
-        if self.law:
-            self.law.reset()
+        self.law.reset()
         now, x, self.theta = to_world(x, theta, self.p), State.of(x), theta
         place = now.position
         if self.lead:
@@ -155,20 +153,7 @@ class FreeBall:
 
     def advance(self, fluid: Array, rows: Array) -> None:
         """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
-        if self.law:
-            self.theta = self._steps(self.body, self._timestep, fluid, self.theta, rows)
-            return
-        for row, omega_0 in zip(rows, fluid.tolist(), strict=True):
-            self._soft_step(omega_0, row)
-
-    def _soft_step(self, omega_0: float, row: Array) -> None:
-        data, ball = self.data, self.body.ball
-        place, turned, velocity = data.qpos[:3].tolist(), data.qpos[3:7].tolist(), data.qvel[:6].tolist()
-        note(row, place + turned, velocity, 0.0, ball)
-        data.qfrc_applied[:] = driven(place, turned, velocity, [0.0] * 6, 0.0, omega_0, ball)
-        row[0] = self.theta = unwrapped(math.atan2(place[1], place[0]), self.theta)
-        mujoco.mj_step(self.model, data)
-        row[_SEEN:] = *data.sensordata, row[2], row[1]
+        self.theta = self._steps(self.body, self._timestep, fluid, self.theta, rows)
 
     @property
     def margins(self) -> Array:
@@ -179,11 +164,10 @@ class FreeBall:
         """Copies of all that is carried from one step to the next."""
         kept = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
         mujoco.mj_getState(self.model, self.data, kept, _INTEGRATION)
-        return {"integration": kept, "azimuth": np.array(self.theta)} | (self.law.state() if self.law else {})
+        return {"integration": kept, "azimuth": np.array(self.theta)} | self.law.state()
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from such a state."""
         mujoco.mj_setState(self.model, self.data, state["integration"], _INTEGRATION)
         self.theta = float(state["azimuth"])
-        if self.law:
-            self.law.restore(state)
+        self.law.restore(state)

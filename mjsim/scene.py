@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import copy
 import functools
-import math
 from pathlib import Path
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from mjsim.contact_settings import ContactSettings
 from model import InputError, Parameters
 
 SCENE = Path(__file__).with_name("scene.xml")
-FACETS = 90
-"""Planes that stand for the wall as MuJoCo comes."""
-
 _HEAVY = 1e6
 """Mass of a wall that moves, divided by that of the ball."""
-_MAXFORCE = 2
-"""Code of reduce="maxforce" in a contact sensor."""
 
 
 def spec(p: Parameters, settings: ContactSettings) -> Any:
@@ -41,11 +34,11 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     spec.geom("vessel").pos, spec.geom("vessel").size = (0.0, 0.0, height * 1.005), (p.R + p.r, height, 0.0)
     for name, friction in (("A", p.mu), ("B", p.eta)):
         _set_pair(spec.pair(name), friction, settings)
-    if settings.scene != "joints":
+    if settings.rigid:
         for each in (*map(spec.sensor, ("gap A", "gap B")), *map(spec.joint, ("azimuth", "inward", "upward", "spin"))):
             spec.delete(each)
         body.add_freejoint(name="free")
-    if settings.rigid:  # the wall is the face of a block that goes with the ball, so heavy that it isn't moved
+        # The wall is the face of a block that goes with the ball, so heavy that it isn't moved.
         option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
         half, (box, slide) = 4 * p.R, (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_SLIDE)
         moving = spec.worldbody.add_body(name="wall", explicitinertial=True)
@@ -57,21 +50,6 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         moving.ipos = centre = (p.R + p.r + half, 0, 0)
         part = moving.add_geom(name="wall", type=box, size=[half] * 3, pos=centre, rgba=rgba)
         part.contype, part.conaffinity = 0, 0
-    if settings.scene == "facets":  # fixed planes, tangent to the vessel's cylinder
-        sensor = spec.sensor("B")
-        for facet in range(FACETS):
-            azimuth = 2 * math.pi * facet / FACETS
-            outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-            place, plane = (p.R + p.r) * outwards + [0.0, 0.0, height], mujoco.mjtGeom.mjGEOM_PLANE
-            part = spec.worldbody.add_geom(name=f"facet{facet}", type=plane, pos=place, size=wall.size, rgba=wall.rgba)
-            part.contype, part.conaffinity = 0, 0
-            part.alt.type, part.alt.zaxis = mujoco.mjtOrientation.mjORIENTATION_ZAXIS, -outwards
-            _set_pair(spec.add_pair(name=f"B{facet}", geomname1=part.name, geomname2="ball"), p.eta, settings)
-        # Where two facets meet, the one that carries more is reported.
-        sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, "world"
-        sensor.intprm[1] = _MAXFORCE
-        spec.delete(spec.pair("B"))
-        spec.delete(wall)
     return spec
 
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 import mjsim
-from compare.adapters.free import CORNERS, Free, State
+from compare.adapters.free import CORNERS, Free, State, Touch
 from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector, facing
 from model.arrays import Array
 
@@ -29,6 +29,7 @@ told from what stays where it is."""
 class Bodies(Free):
     """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step."""
 
+    TELLS = True
     FEATURES: tuple[str, ...] = FEATURES
     TIMESTEPS: tuple[float, ...] = TIME_STEPS
 
@@ -61,6 +62,15 @@ class Bodies(Free):
 
     def push(self, force: Vector) -> None:
         self.data.body("body").xfrc_applied[:3] = force
+
+    def touches(self) -> list[Touch]:
+        shown, force = [], np.empty(6)
+        numbers = {surface.name: k for k, surface in enumerate(self.scene.surfaces)}
+        for k, contact in enumerate(self.data.contact):
+            mujoco.mj_contactForce(self.model, self.data, k, force)
+            surface = self.model.geom(contact.geom[0]).name.rstrip("0123456789")
+            shown.append(Touch(numbers[surface], force[:3] @ contact.frame.reshape(3, 3), float(contact.dist)))
+        return shown
 
 
 class Lawful(Bodies):

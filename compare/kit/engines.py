@@ -129,11 +129,6 @@ def newcomer(step: float) -> ContactSettings:
     return replace(contacts, servo=0.0, memory=False, order=1)
 
 
-def as_it_comes(step: float) -> ContactSettings:
-    """MuJoCo's own parameters for a free ball in a vessel of flat facets, with its own friction cone, the pyramid."""
-    return replace(newcomer(step), scene="facets", cone="pyramidal")
-
-
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
     """`mjsim.Run` without its warnings."""
     with warnings.catch_warnings():
@@ -195,19 +190,6 @@ PLAIN = replace(
     refine=(1, 2, 3, 4),
     mark="P",
 )
-NEWCOMER = replace(
-    MUJOCO,
-    name="mujoco-defaults",
-    title="MuJoCo as it comes",
-    about="a free ball in flat facets, MuJoCo's own parameters, 2 ms; confirmed is what is off by no more than 5 %",
-    role=Role.AS_IT_COMES,
-    refine=(2,),
-    allowance=0.05,
-    configure=lambda given, p: as_it_comes(given.get("timestep", 2e-3)),
-    study=None,
-    stream=_unwarned,
-    mark="x",
-)
 COULOMB = replace(
     PLAIN,
     name="mujoco-coulomb",
@@ -238,6 +220,16 @@ MOREAU = replace(
     mark="^",
 )
 _PACKAGES = {name: Library(KNOWN[name].partition(" ")[0], f"compare.adapters.{name}") for name in KNOWN}
+NEWCOMER = replace(
+    _adapted(_PACKAGES["mujoco_free"], "ox")[1],
+    name="mujoco-defaults",
+    title="MuJoCo as it comes",
+    about="a free ball in flat facets, MuJoCo's own parameters, 2 ms; confirmed is what is off by no more than 5 %",
+    role=Role.AS_IT_COMES,
+    refine=(2,),
+    allowance=0.05,
+    configure=lambda given, p: vessel.Settings(**{"timestep": 2e-3, **given}),
+)
 _OTHERS = (
     *_adapted(siconos.LIBRARY, "p"),
     *_adapted(_PACKAGES["pybullet"], "v1"),

@@ -44,8 +44,8 @@ def view(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings
 
 def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> JointedBall:
     """The simulation, with what only serves contact out of sight."""
-    if settings.scene != "joints":
-        raise InputError("the viewer shows scene = 'joints' only")
+    if settings.rigid:
+        raise InputError("the viewer shows no rigid contacts")
     limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
     limits.check_start(x0, p, settings)
     model, _ = scene.build(p, settings, shown=True)

@@ -21,12 +21,11 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-import mjsim
 from compare.kit import drawing, progress, style
 from compare.kit.campaign import BATCH, Campaign
-from compare.kit.engines import ENGINES, EVENT, MOREAU, NEWCOMER, as_it_comes, newcomer, plain
+from compare.kit.engines import ENGINES, EVENT, MOREAU, NEWCOMER, PLAIN, AnySettings, newcomer, plain
 from compare.kit.pages import Rows
-from compare.kit.tasks import Task
+from compare.kit.tasks import Task, carry_out
 from docs.studies import states
 from docs.studies.states import CONTACT, ERRORS, OPEN, Contestant, Entry
 from mjsim import ContactSettings, Run
@@ -38,8 +37,10 @@ HIGHER = (1e-4, 2e-4, 3e-4, 4e-4)
 """By how much higher a landing ball begins, m, to land elsewhere within a step of 1 ms."""
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 """Time steps of error against cost, s."""
-Ways = Mapping[str, ContactSettings]
+Ways = Mapping[str, AnySettings]
 """Ways to set MuJoCo, named after ours or MuJoCo's defaults and what differs from them."""
+LONE = "MuJoCo's defaults"
+FACETS = f"{LONE}, a free ball in facets, cone pyramidal"
 LOOKS: list[dict[str, Any]] = [
     {"marker": mark, "color": colour, "mfc": "white"}
     for mark, colour in zip(
@@ -62,11 +63,10 @@ def main() -> None:
 
 def rungs(step: float) -> Ways:
     """From what a newcomer writes to ours, each with one thing more than the one before."""
-    theirs = "MuJoCo's defaults"
     return {
-        f"{theirs}, scene facets, cone pyramidal": as_it_comes(step),
-        f"{theirs}, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
-        theirs: newcomer(step),
+        FACETS: NEWCOMER.at(step, states.SLIPPING.p),
+        f"{LONE}, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
+        LONE: newcomer(step),
         "ours, memory off, servo 0, order 1": ContactSettings.at(step, memory=False, servo=0.0, order=1),
         "ours, memory off, order 1": ContactSettings.at(step, memory=False, order=1),
         "ours, order 1": ContactSettings.at(step, order=1),
@@ -77,7 +77,7 @@ def rungs(step: float) -> Ways:
 def rivals(step: float) -> Ways:
     """Settings whose error is compared with their cost."""
     named = rungs(step)
-    chosen = ("ours", "ours, order 1", "ours, memory off, servo 0, order 1", "MuJoCo's defaults")
+    chosen = ("ours", "ours, order 1", "ours, memory off, servo 0, order 1", LONE)
     return {name: named[name] for name in chosen}
 
 
@@ -92,7 +92,6 @@ def landings(step: float) -> Rows:
     That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball rebounds within
     0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of `states.HITTING`.
     """
-    lone = "MuJoCo's defaults"
     bare = plain(step)
     ways: Ways = {
         "ours (mujoco)": ContactSettings.at(step),
@@ -105,21 +104,19 @@ def landings(step: float) -> Rows:
         "mujoco-plain, step divided by 10": plain(step / 10),
         "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
         "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
-        lone: newcomer(step),
-        f"{lone}, scene facets, cone pyramidal (mujoco-defaults)": as_it_comes(step),
+        LONE: newcomer(step),
+        f"{FACETS} (mujoco-defaults)": NEWCOMER.at(step, states.LANDING.p),
     }
     rows = [["settings", "ω_c 5 ms after a landing", "rebound", "motion with it", "motion that hits the wall"]]
     for name, way in ways.items():
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of contacts that chatter
-            land, hit = states.LANDING, states.HITTING
-            lands, hits, *others = (
-                mjsim.simulate(each.p, x0, lasts, settings=way, sample_interval=step)
-                for each, x0, lasts in (
-                    *((each, each.x0, each.lasts) for each in (land, hit)),
-                    *((land, land.x0._replace(y=land.x0.y + more), 0.25) for more in HIGHER),
-                )
+        (contestant,), land, hit = _contestants({name: way}), states.LANDING, states.HITTING
+        lands, hits, *others = (
+            carry_out([contestant.task((each.p, x0, lasts, step))])[0]
+            for each, x0, lasts in (
+                *((each, each.x0, each.lasts) for each in (land, hit)),
+                *((land, land.x0._replace(y=land.x0.y + more), 0.25) for more in HIGHER),
             )
+        )
         exact = states.LANDING.exact
         landed = float(exact.time[np.flatnonzero(exact.y <= 0)[0]])
         after = float(np.interp(landed + 5e-3, lands.time, lands.omega_c))
@@ -148,7 +145,8 @@ def _theory(name: str, steps: Sequence[float]) -> list[Contestant]:
 
 def _contestants(ways: Ways) -> list[Contestant]:
     """They run without a warning where contacts chatter: what poor settings do is the question here."""
-    return [Contestant(name, NEWCOMER, each.timestep, each) for name, each in ways.items()]
+    engines = {name: PLAIN if isinstance(each, ContactSettings) else NEWCOMER for name, each in ways.items()}
+    return [Contestant(name, engines[name], each.timestep, each) for name, each in ways.items()]
 
 
 def _cost(task: Task) -> float:
@@ -157,7 +155,7 @@ def _cost(task: Task) -> float:
     What has no batches, as free balls, runs by itself.
     """
     settings = task.settings
-    if not isinstance(settings, ContactSettings) or settings.scene != "joints":
+    if not isinstance(settings, ContactSettings) or settings.rigid:
         return states.cost(task)
     given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings), []
     for _ in range(states.REPEATS):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import analytic
-from compare.kit.engines import ENGINES, NEWCOMER
+from compare.kit.engines import ENGINES
 from compare.kit.tasks import Task, carry_out, store
 from docs.studies.states import LANDING, STATES
 from model import InputError, Parameters, State
@@ -49,8 +49,6 @@ def run(*given, **more):
 def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
     """By the same rule, before anything is written, and whether or not the engine is installed."""
     words = r"timestep = 0\.5 s is out of range: must be <= 0\.0357 s, half of sqrt\(R/g\), the shortest time of"
-    if name == NEWCOMER.name:
-        words = r"timestep = 0\.5 s is too large for the contact settings: .* allow at most 0\.009 s"
     with pytest.raises(InputError, match=words):
         store(task_of(name, REFERENCE, State(), 1.0, 0.5), tmp_path / "run.h5")
     assert not list(tmp_path.iterdir())

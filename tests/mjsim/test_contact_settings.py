@@ -11,7 +11,7 @@ import mjsim
 from mjsim import ContactSettings
 from model import Case, InputError, Parameters
 
-FREE = {"scene": "rigid", "memory": False, "servo": 0.0, "order": 1}
+FREE = {"rigid": True, "memory": False, "servo": 0.0, "order": 1}
 
 
 @pytest.mark.parametrize(
@@ -24,14 +24,12 @@ FREE = {"scene": "rigid", "memory": False, "servo": 0.0, "order": 1}
         ({"solref": (0.1,)}, r"solref = .* must be two numbers"),
         ({"cone": "eliptic"}, r"cone = 'eliptic' must be one of .*did you mean 'elliptic'"),
         ({"cone": "pyramidal"}, "cone = 'pyramidal' needs memory = False"),
-        ({"scene": "joint"}, r"scene = 'joint' must be one of .*did you mean 'joints'"),
         ({"integrator": "RK4"}, r"integrator = 'RK4' must be one of"),
         ({"order": 3}, "order = 3 must be one of 2, 1"),
         ({"servo": float("nan")}, r"servo = nan s must be finite"),
-        ({"scene": "facets"}, "scene = 'facets' needs memory = False, servo = 0, order = 1"),
-        ({"scene": "rigid", "memory": False, "order": 1}, "scene = 'rigid' needs memory = False, servo = 0"),
-        (FREE | {"noslip_iterations": 5}, "scene = 'rigid' needs noslip_iterations = 0"),
-        (FREE | {"integrator": "discrete"}, "and another integrator than 'discrete'"),
+        ({"rigid": True, "memory": False, "order": 1}, "rigid contacts need memory = False, servo = 0, order = 1"),
+        (FREE | {"noslip_iterations": 5}, "rigid contacts need .*noslip_iterations = 0"),
+        (FREE | {"integrator": "discrete"}, "rigid contacts need another integrator than 'discrete'"),
     ],
 )
 def test_refused(changes, words) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 import analytic
 import mjsim
-from compare.kit.engines import COULOMB, as_it_comes
+from compare.kit.engines import COULOMB
 from mjsim import compiled, free
 from mjsim.contact_settings import FORESEEN
 from mjsim.coulomb.law import Law
@@ -84,9 +84,3 @@ def test_a_ball_of_a_moment_of_inertia_just_beyond_the_least() -> None:
     """MuJoCo takes none below 1e-15 kg m²; the wall that goes with a ball of .2 mm must not be what it refuses."""
     p = P.replace(m=8e-8, r=2e-4, R=0.01)
     assert mjsim.simulate(p, State(), 0.01, settings=rigid(1e-3)).omega_c[-1] > 0
-
-
-def test_facets_judder() -> None:
-    """The edges of 90 facets turn the path by 4 degrees each, and take away speed."""
-    run = mjsim.simulate(P.replace(omega_0=12.0), State(omega_c=12.0), 3.0, settings=as_it_comes(1e-3))
-    assert run.omega_c[-100:].mean() / 12.0 < 0.9
