@@ -12,7 +12,6 @@ share of the friction in use reaches one. Where that isn't within the step of th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -26,7 +25,6 @@ PERSISTENCE = 3
 
 _CONTACTS = (Contact.R, Contact.S, Contact.N)
 _R, _S, _N, _AS_BEFORE = range(4)
-_CODES = np.array([[Case.of(A, B) for B in _CONTACTS] for A in _CONTACTS], dtype=np.int8)
 _SATURATED, _FREE = 1e-6, 1e-4
 """How far from its Coulomb value friction may be for slipping, and must be for rolling, relative."""
 _SLIDES = 3.0
@@ -35,8 +33,6 @@ _SHARED = 10.0
 """A contact that creeps no faster than so many times as another one that holds doesn't slip by itself."""
 _BACK = 16
 """Steps that are kept to locate a change: how long a slip that sets in may take to leave the dead band."""
-
-_CARRIED = "_latest", "_shown", "_now", "_begin"
 
 
 class Regularised(Protocol):
@@ -52,7 +48,7 @@ class Regularised(Protocol):
 
 
 class Contacts(NamedTuple):
-    """What the contacts A and B of each run do in successive steps: arrays (steps, runs, 2)."""
+    """What the contacts A and B do in successive steps: arrays (steps, 2)."""
 
     normal: Array
     """Normal force, N; 0 where the contact is open."""
@@ -65,59 +61,41 @@ class Contacts(NamedTuple):
 
 
 class Classifier:
-    """The cases of one or many runs; steps too recent to judge wait for the next ones."""
+    """The cases of a run; steps too recent to judge wait for the next ones."""
 
-    def __init__(self, parameters: Sequence[Parameters], settings: Regularised) -> None:
-        self._settings, runs = settings, len(parameters)
-        self._m, self._g = (np.array([[getattr(p, name)] for p in parameters]) for name in "mg")
-        self._coefficients = np.array([(p.mu, p.eta) for p in parameters])
+    def __init__(self, p: Parameters, settings: Regularised) -> None:
+        self._p, self._settings, self._coefficients = p, settings, np.array([p.mu, p.eta])
         self.decided = 0
         """How many steps are."""
-        self._latest = np.empty((len(Contacts._fields), 0, runs, 2))
-        """The last steps, decided or not,"""
-        self._shown = np.empty((0, runs, 2), dtype=np.intp)
-        """and the state of the contacts in each of them judged alone."""
-        self._now, self._begin = np.full((runs, 2), _AS_BEFORE), np.zeros(runs, dtype=np.intp)
-        """State of the contacts in the last step that is decided, and the case of the first one."""
         self._waiting = 0
-        self._changes: list[list[tuple[int, float, int, int]]] = [[] for _ in parameters]
-        """Of each run: the first step of a new case, when it began in s, the case before and the new one."""
+        """How many are not."""
+        self._latest = np.empty((len(Contacts._fields) + 1, 0, 2))
+        """The last steps, decided or not, and the state of the contacts in each of them judged alone."""
+        self._changes: list[tuple[int, float, int, int]] = []
+        """The first step of a new case, when it began in s, the case before and the new one; from the first case on."""
 
     def add(self, contacts: Contacts, last: bool = False) -> None:
         """Take in the next steps; with `last` all are decided, since no more will come."""
-        first = len(self._shown) - self._waiting
-        steps = np.concatenate([self._latest, contacts], axis=1)
-        shown = self._shown = np.concatenate([self._shown, self._judge(contacts)])
-        if (unclear := shown == _AS_BEFORE).any():  # between the bands a contact is what it was
-            known = np.maximum.accumulate(np.where(unclear, 0, np.arange(len(shown))[:, None, None]), axis=0)
-            shown = self._shown = np.take_along_axis(shown, known, axis=0)
-            shown[shown == _AS_BEFORE] = _R
+        first = self._latest.shape[1] - self._waiting
+        steps = np.concatenate([self._latest, [*contacts, self._judge(contacts)]], axis=1)
+        shown = steps[-1]
+        shown[:] = _carried_on(shown, shown != _AS_BEFORE)  # between the bands a contact is what it was
+        shown[shown == _AS_BEFORE] = _R
         stop = max(first, len(shown) - (0 if last else PERSISTENCE - 1))
-        new, count = shown[first:], stop - first
-        if count and (new != self._now).any():
-            lasts = np.zeros(new.shape, dtype=bool)
-            alike = np.lib.stride_tricks.sliding_window_view(new, min(PERSISTENCE, len(new)), axis=0)
-            lasts[: len(alike)] = (alike == alike[..., :1]).all(axis=-1)
-            if self._now[0, 0] == _AS_BEFORE:  # the first that lasts, or the first of all
-                self._now = np.take_along_axis(new, lasts.argmax(axis=0)[None], axis=0)[0]
-                self._begin = _CODES[tuple(self._now.T)].astype(np.intp)
-            latest = np.maximum.accumulate(np.where(lasts, np.arange(len(new))[:, None, None], -1), axis=0)[:count]
-            decided = np.where(latest < 0, self._now, np.take_along_axis(new, np.maximum(latest, 0), axis=0))
-            before = np.concatenate([self._now[None], decided[:-1]])
-            for k, run in np.argwhere((decided != before).any(axis=2)).tolist():
-                self._note(run, self.decided + k, steps[:, : first + k + 1, run], before[k, run], decided[k, run])
-            self._now = decided[-1]
-        self.decided += count
-        self._waiting, old = len(shown) - stop, max(0, stop - _BACK)
-        self._latest, self._shown = steps[:, old:].copy(), shown[old:].copy()
+        if stop > first:
+            states = self._lasting(shown[first:])[: stop - first + 1]
+            for k in np.flatnonzero((states[1:] != states[:-1]).any(axis=1)).tolist():
+                self._note(self.decided + k, steps[:-1, : first + k + 1], states[k], states[k + 1])
+        self.decided += stop - first
+        self._waiting, self._latest = len(shown) - stop, steps[:, max(0, stop - _BACK) :].copy()
 
-    def _judge(self, contacts: Contacts) -> npt.NDArray[np.intp]:
-        """What each step by itself says of the contacts, (steps, runs, 2)."""
+    def _judge(self, contacts: Contacts) -> npt.NDArray[np.int_]:
+        """What each step by itself says of the contacts, (steps, 2)."""
         settings, (normal, friction, speed, _) = self._settings, contacts
         limit = self._coefficients * normal
         # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
         # below the speed that belongs to all of it.
-        load = self._coefficients * np.maximum(normal / self._m, self._g)
+        load = self._coefficients * np.maximum(normal / self._p.m, self._p.g)
         band = settings.regularisation_speed(load) * settings.rolls
         saturated = friction >= (1 - _SATURATED) * limit
         # A rotation that slips at both contacts alike while one of them holds is creep, too: the load moves from one
@@ -125,12 +103,22 @@ class Classifier:
         held = ((normal > 0) & ~saturated)[..., ::-1] & (speed < _SHARED * speed[..., ::-1])
         slips = saturated & (speed > 3 * band) & ~held
         rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
-        shown: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
-        return shown
+        return np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
 
-    def _note(self, run: int, step: int, steps: Array, *contacts: npt.NDArray[np.intp]) -> None:
+    def _lasting(self, shown: Array) -> Array:
+        """The states of the contacts that last, (steps + 1, 2): before these steps, and in each of them."""
+        lasts = np.zeros(shown.shape, dtype=bool)
+        alike = np.lib.stride_tricks.sliding_window_view(shown, min(PERSISTENCE, len(shown)), axis=0)
+        lasts[: len(alike)] = (alike == alike[..., :1]).all(axis=-1)
+        if not self._changes:  # the first that lasts, or the first of all
+            begin = _code(shown[lasts.argmax(axis=0), [0, 1]])
+            self._changes.append((0, 0.0, begin, begin))
+        now = divmod(self._changes[-1][-1], len(_CONTACTS))
+        return _carried_on(np.vstack([now, shown]), np.vstack([[True, True], lasts]))
+
+    def _note(self, step: int, steps: Array, old: Array, new: Array) -> None:
         """Note that a case begins with a step, the last one of `steps` (4, n, 2), and locate its beginning."""
-        (old, new), mid = contacts, self._settings.midpoint
+        mid = self._settings.midpoint
         closes, other = [], []
         for contact in np.flatnonzero(old != new).tolist():
             normal, friction, speed, gap = steps[..., contact]
@@ -144,45 +132,48 @@ class Classifier:
                     k -= 1
                 other.append(k - len(speed) + 1 + _vanishes(speed[:k], 0.0, (-1.0, len(speed) - k + 2.0)))
             else:
-                limit = self._coefficients[run, contact] * np.maximum(normal, 1e-300)
+                limit = self._coefficients[contact] * np.maximum(normal, 1e-300)
                 free = 1 - _SATURATED - friction / limit
                 k = len(free) - 1
                 while len(free) - k < _BACK and k > 1 and free[k - 1] <= 0:
                     k -= 1
                 other.append(k - len(free) + 1 + _vanishes(free[:k], mid, (mid - 1, mid)))
-        earliest = self._changes[run][-1][1] if self._changes[run] else 0.0
-        time = max(earliest, (step + (min(closes) if closes else max(other))) * self._settings.timestep)
-        self._changes[run].append((step, time, int(_CODES[tuple(old)]), int(_CODES[tuple(new)])))
+        located = (step + (min(closes) if closes else max(other))) * self._settings.timestep
+        self._changes.append((step, max(self._changes[-1][1], located), _code(old), _code(new)))
 
-    def cases(self, run: int, steps: npt.NDArray[np.int_]) -> npt.NDArray[np.int8]:
-        """The case of a run in some steps, those not yet decided as the last one that is."""
-        first = np.array([step for step, *_ in self._changes[run]], dtype=int)
-        codes = np.array([self._begin[run], *(after for *_, after in self._changes[run])], dtype=np.int8)
-        return codes[np.searchsorted(first, steps, side="right")]
+    def cases(self, steps: npt.NDArray[np.int_]) -> npt.NDArray[np.int8]:
+        """The case in some steps, in those not yet decided as in the last one that is."""
+        first, codes = [step for step, *_ in self._changes], [code for *_, code in self._changes]
+        return np.array(codes, dtype=np.int8)[np.searchsorted(first, steps, side="right") - 1]
 
-    def events(self, run: int, until: float = math.inf) -> Events:
-        """Changes of case of a run so far, up to a time in s."""
-        changes = [change for change in self._changes[run] if change[1] <= until]
-        if not changes:
-            return Events()
-        _, time, before, after = (np.array(column) for column in zip(*changes, strict=True))
+    def events(self, until: float = math.inf) -> Events:
+        """Changes of case so far, up to a time in s."""
+        changes = [change for change in self._changes[1:] if change[1] <= until]
+        _, time, before, after = np.array(changes).reshape(-1, 4).T
         none, codes = np.zeros((len(time), 3)), {"from_case": before.astype(np.int8), "to_case": after.astype(np.int8)}
         return Events(time=time, **codes, impulse_A=none, impulse_B=none)
 
     def state(self) -> dict[str, npt.NDArray[Any]]:
         """Copies of all that is carried from one call to the next."""
-        changes = [(run, *change) for run, own in enumerate(self._changes) for change in own]
         counts = np.array([self.decided, self._waiting])
-        kept = {name: getattr(self, name).copy() for name in _CARRIED}
-        return kept | {"counts": counts, "changes": np.array(changes).reshape(-1, 5)}
+        return {"latest": self._latest.copy(), "counts": counts, "changes": np.array(self._changes).reshape(-1, 4)}
 
     def restore(self, state: dict[str, npt.NDArray[Any]]) -> None:
         """Go on from such a state."""
-        for name in _CARRIED:
-            setattr(self, name, state[name])
-        self.decided, self._waiting = state["counts"].tolist()
-        for run, step, time, before, after in state["changes"].tolist():
-            self._changes[int(run)].append((int(step), time, int(before), int(after)))
+        self._latest, (self.decided, self._waiting) = state["latest"], state["counts"].tolist()
+        changes = state["changes"].tolist()
+        self._changes = [(int(step), time, int(before), int(after)) for step, time, before, after in changes]
+
+
+def _code(states: Array) -> int:
+    """Of the case with such states of the contacts A and B."""
+    return Case.of(*(_CONTACTS[int(state)] for state in states)).value
+
+
+def _carried_on(states: Array, known: npt.NDArray[np.bool_]) -> Array:
+    """States (steps, 2), in place of those that aren't known the last one that was."""
+    latest = np.maximum.accumulate(np.where(known, np.arange(len(states))[:, None], 0), axis=0)
+    return np.take_along_axis(states, latest, axis=0)
 
 
 def _vanishes(values: Array, ahead: float, within: tuple[float, float]) -> float:

@@ -1,77 +1,60 @@
-"""The loops over steps and what is done between them: compiled with numba, which the extra `fast` installs, or as they
-stand.
-
-Of balls on joints that of `mjsim.stepping`, of free ones those of `mjsim.free` and `mjsim.landing`.
-"""
+"""Loops over steps: compiled with numba, which the extra `fast` installs, or as they stand."""
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
 from pathlib import Path
 from typing import Any
 
-from mjsim import corrections, free, landing, recorder, stepping, world_axes
+from mjsim import recorder
 from mjsim.coulomb import compiled as kernels
 
 if kernels.COMPILES:
     import numba
-    from numba.extending import overload, register_jitable
+    from numba.extending import register_jitable
+
+    _register = functools.cache(register_jitable)
 
 
-up_to_landing, steps, through = stepping.up_to_landing, free.steps, landing.through
-
-
-def served(law: Any, data: Any) -> Any:
-    """What `free.under_law` takes a step with, here."""
-    return law.addresses(data) if kernels.COMPILES else (law, data)
-
-
-def served_plain(model: Any, data: Any) -> Any:
-    """What `stepping.engine_step` takes a step with, here."""
-    return (model._address, data._address) if kernels.COMPILES else (model, data)
-
-
-def _compiled(function: Any) -> Any:
+def loop(function: Any) -> Any:
     """A loop that is compiled when it is called first, by one process at a time; for arrays of any layout.
+
+    So are the functions of mjsim that it calls, which must be known above it.
 
     Numba keeps what it compiles on disk by name, and compiles it again when the function's own file has changed, but
     not when that of a function has which it calls: the name contains the digest of those.
     """
-    function.__qualname__ += f"_{_digest}"
+    if not kernels.COMPILES:
+        return function
+    called = _called(function)
+    for each in called:
+        _register(each)
+    files = sorted({*map(inspect.getfile, called), str(recorder.__file__), str(kernels.__file__)})
+    digest = hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()
+    function.__qualname__ += f"_{digest[:16]}"
     try:
-        loop = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # no place for a cache
-        loop = numba.njit(nogil=True, error_model="numpy")(function)
+        compiled = numba.njit(nogil=True, error_model="numpy")(function)
 
     def kind(argument: Any) -> Any:
         found = numba.typeof(argument)
         return found.copy(layout="A") if isinstance(found, numba.types.Array) else found
 
+    @functools.wraps(function)
     def call(*given: Any) -> Any:
-        if not loop.overloads:
-            with kernels.alone(loop):
-                loop.compile(tuple(map(kind, given)))
-        return loop(*given)
+        if not compiled.overloads:
+            with kernels.alone(compiled):
+                compiled.compile(tuple(map(kind, given)))
+        return compiled(*given)
 
     return call
 
 
-if kernels.COMPILES:
-    _modules = corrections, stepping, world_axes, free, landing
-    for module in _modules:  # the loops call their functions
-        for each in vars(module).values():
-            if inspect.isfunction(each) and each.__module__ == module.__name__:
-                register_jitable(each)
-    _files = (Path(str(module.__file__)) for module in (*_modules, recorder, kernels))
-    _digest = hashlib.sha256(b"".join(file.read_bytes() for file in _files)).hexdigest()[:16]
-
-    @overload(free.under_law, strict=False)  # type: ignore[untyped-decorator]
-    def _under_law(served: Any, duration: Any, anew: Any) -> Any:
-        return lambda served, duration, anew: kernels.step_of(served[0], served[1], served[2], duration, anew)
-
-    @overload(stepping.engine_step, strict=False)  # type: ignore[untyped-decorator]
-    def _engine_step(served: Any) -> Any:
-        return lambda served: kernels.mj_step(served[0], served[1])
-
-    up_to_landing, steps, through = map(_compiled, (up_to_landing, steps, through))
+def _called(function: Any) -> set[Any]:
+    """The functions of mjsim that a function calls, and those that they call."""
+    names = map(function.__globals__.get, function.__code__.co_names)
+    own = {each for each in names if inspect.isfunction(each) and each.__module__.startswith(f"{__package__}.")}
+    return own.union(*map(_called, own))

@@ -30,6 +30,7 @@ import numpy.typing as npt
 
 from model import InputError, Parameters
 from model.arrays import Array, Real
+from model.errors import check_type
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
 FORESEEN = 0.01
@@ -257,6 +258,7 @@ class ContactSettings:
         to lift off carries little, and shall lift off on its own), and impratio is raised with the softness, so that
         that of the friction rows stays the same. The engine's least impedance, 1e-4, may stop that short.
         """
+        check_type("p", p, Parameters)
         settings = cls.at(timestep, **changes)
         if "solref" not in changes:
             settings = settings.suited(p)

@@ -1,4 +1,4 @@
-"""Stepping one or many simulations, sampling them, and handing out trajectories."""
+"""Stepping simulations, sampling them, and handing out trajectories."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import functools
 import math
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -17,183 +17,134 @@ import numpy.typing as npt
 from mjsim import limits, recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
-from mjsim.stepping import HUGE, Engine, JointedBall
-from model import Events, Flow, Header, Parameters, SimulationError, State, Trajectory
+from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_number
 
 if TYPE_CHECKING:
-    from mjsim.free import FreeBall
     from mjsim.journal import Journal
 
-BLOCK, BLOCK_STEPS = 256, 20_000
-"""A run hands out its samples once it has so many, or has taken so many steps."""
 EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
-NOTED = 16_384
-"""Steps of all runs that are noted before their cases are told."""
+NOTED = 4096
+"""Steps that are noted before their cases are told, and samples handed out."""
 RUNS_A_THREAD = 16
 """Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's Python."""
 MOST_THREADS = 1024
 
-Blocks = list[npt.NDArray[np.void]]
-"""Samples of each run, structured arrays of dtype `model.trajectory.SAMPLE`."""
-
 
 class Run:
-    """Simulations under way: iterating advances them and yields blocks of samples.
-
-    Balls of equal parameters share an engine, one after the other; results don't depend on that, to the bit.
+    """A simulation under way: iterating advances it and yields blocks of samples, of dtype `model.trajectory.SAMPLE`.
 
     Parameters
     ----------
-    parameters, x0s, flows : one of each for every run; states of 6 or 8 entries
+    p : parameters; its omega_0 is used if there is no `flow`
+    x0 : state (19) at the start, 6 entries, or 8 with h and v_h
     t_end : duration, s
-    settings : shared by all runs
+    settings : `ContactSettings.for_problem` if None
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
     journal : keeps what was done, and knows what an earlier process did
-    progress : called with the fraction done, from time to time; an error that it raises ends the runs
+    progress : called with the fraction done, from time to time; an error that it raises ends the run
 
-    Each iteration yields `Blocks`. A run that diverges yields what it has, then empty blocks, and its header says why.
+    A run that diverges yields what it has, and its header says why.
 
     Raises
     ------
     InputError
-        If an argument is out of range, the time step is too large for the problem, or numbers of runs differ.
+        If an argument is of another type or out of range, or the time step is too large for the problem.
     """
 
     def __init__(
         self,
-        parameters: Sequence[Parameters],
-        x0s: Sequence[npt.ArrayLike],
+        p: Parameters,
+        x0: npt.ArrayLike,
         t_end: float,
-        flows: Sequence[Flow],
-        settings: ContactSettings,
+        flow: Flow | None = None,
+        settings: ContactSettings | None = None,
         *,
         sample_interval: float | None = None,
         theta_0: float = 0.0,
         journal: Journal | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
-        limits.check_runs(parameters, x0s, flows, settings)
-        self._parameters, self._flows, self._settings = list(parameters), list(flows), settings
+        check_type("p", p, Parameters)
+        check_type("flow", flow, Flow | None)
+        check_type("settings", settings, ContactSettings | None)
+        self._flow, self._settings = flow or Flow.steady(p.omega_0), settings or ContactSettings.for_problem(p)
+        self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
         self._journal, self._progress = journal, progress or (lambda done: None)
-        self._interval, self._count = limits.sampling(t_end, settings.timestep, sample_interval)
-        theta_0 = check_number("theta_0", theta_0, "rad")
-        states = [State.one(x0) for x0 in x0s]
-        for x, p, flow in zip(states, parameters, flows, strict=True):
-            limits.check_timestep(settings.timestep, p, flow, t_end)
-            limits.check_start(x, p, settings)
-        scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
-        built = {p: scene.build(p, settings) for p in dict.fromkeys(scenes)}
-        models = [built[p][0] for p in scenes]
-        self._balls = balls(zip(models, scenes, states, strict=True), settings, theta_0)
-        shown = dataclasses.asdict(settings) | {
-            "t_end": float(t_end), "sample_interval": self._interval * settings.timestep, "x0": None,
-            "theta_0": theta_0, "event_times": EVENT_TIMES,
+        self._timestep = self._settings.timestep
+        self._interval, self._count = limits.sampling(t_end, self._timestep, sample_interval)
+        limits.check_timestep(self._timestep, p, self._flow, t_end)
+        limits.check_start(self._x0, p, self._settings)
+        self._model, mjcf = scene.build(p, self._settings)
+        shown = dataclasses.asdict(self._settings) | {
+            "t_end": float(t_end), "sample_interval": self._interval * self._timestep, "x0": list(self._x0),
+            "theta_0": self._theta_0, "event_times": EVENT_TIMES,
         }  # fmt: skip
-        self.headers = [
-            Header("mujoco", p, flow, shown | {"x0": list(x)}, built[still][1])
-            for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
-        ]
-        """Where each trajectory comes from; a failure appears here."""
-        self._deepest = np.array([p.r for p in parameters])[:, None]
-        """How far h and y may be negative: a ball with its centre beyond wall or floor has come through."""
-        self._classifier = Classifier(parameters, settings)
-        self._steps = (self._count - 1) * self._interval + 1
-        """All that are taken: nothing is needed of those after the last sample."""
-        self._rows = np.empty((max(64, NOTED // len(parameters)), len(parameters), recorder.COLUMNS))
-        self._ends = [math.inf] * len(parameters)
-        """When each run broke down, s."""
+        self.header = Header("mujoco", p, self._flow, shown, mjcf)
+        """Where the trajectory comes from; a failure appears here."""
+        self._classifier = Classifier(p, self._settings)
+        self._end = math.inf
+        """When it broke down, s."""
 
     @property
-    def events(self) -> list[Events]:
-        """Changes of case of each run so far."""
-        return [self._classifier.events(i, end) for i, end in enumerate(self._ends)]
+    def events(self) -> Events:
+        """Changes of case so far."""
+        return self._classifier.events(self._end)
 
-    @property
-    def margins(self) -> Array:
-        """Present margins of the contacts A and B, shape (runs, 2), m."""
-        return np.array([ball.margins for ball in self._balls])
+    def __iter__(self) -> Iterator[npt.NDArray[np.void]]:
+        from mjsim import free, stepping  # here, because the law takes long to load, compiled
 
-    def __iter__(self) -> Iterator[Blocks]:
+        begin = free.FreeBall if self._settings.rigid else stepping.JointedBall
+        self.ball = ball = begin(self._model, self._p, self._settings, self._x0, self._theta_0)
         blocks, state = self._journal.recall() if self._journal else (iter(()), {})
-        done, step, kept = 0, int(state.get("steps", 0)), [state["waiting"]] if state else []
+        steps, done, step, waiting = (self._count - 1) * self._interval + 1, 0, 0, np.empty((0, recorder.COLUMNS))
         if state:
-            for k, ball in enumerate(self._balls):
-                ball.restore({name: state[f"{name}_{k}"] for name in ball.state()})
+            step, waiting = int(state["step"]), state["waiting"]
+            ball.restore(state)
             self._classifier.restore(state)
         for raw in blocks:
             yield self._finish(done, raw)
             done += len(raw)
-        first = step
-        while step < self._steps and not all(header.failure for header in self.headers):
-            rows = self._rows[: self._steps - step]
-            time = (step + np.arange(len(rows)) + 0.5) * self._settings.timestep
-            for k, (ball, flow) in enumerate(zip(self._balls, self._flows, strict=True)):
-                ball.advance(flow(time), rows[:, k])
-            kept.append(rows[-step % self._interval :: self._interval].copy())
+        noted = np.empty((NOTED, recorder.COLUMNS))
+        while step < steps and not self.header.failure:  # nothing is needed of steps after the last sample
+            rows = noted[: steps - step]
+            ball.advance(self._flow((step + np.arange(len(rows)) + 0.5) * self._timestep), rows)
+            waiting = np.concatenate([waiting, rows[-step % self._interval :: self._interval]])
             step += len(rows)
-            self._classifier.add(recorder.contacts(rows), step == self._steps)
-            self._progress(step / self._steps)
-            if step < self._steps and step - first < BLOCK_STEPS and sum(map(len, kept)) < BLOCK:
-                continue
-            first, ready = step, -(-self._classifier.decided // self._interval) - done
-            raw, waiting = np.split(np.concatenate(kept), [ready])
-            kept = [waiting]  # their cases are not yet decided
+            self._classifier.add(recorder.contacts(rows), step == steps)
+            self._progress(step / steps)
+            raw, waiting = np.split(waiting, [-(-self._classifier.decided // self._interval) - done])
             if self._journal:
-                state = {"steps": np.array(step), "waiting": waiting}
-                states = enumerate(ball.state() for ball in self._balls)
-                state |= {f"{name}_{k}": own[name] for k, own in states for name in own} | self._classifier.state()
-                self._journal.note(raw, state)
+                kept = {"step": np.array(step), "waiting": waiting} | ball.state() | self._classifier.state()
+                self._journal.note(raw, kept)
             yield self._finish(done, raw)
             done += len(raw)
 
-    def trajectories(self) -> list[Trajectory]:
-        """All runs, carried out to their ends."""
-        kept: list[Blocks] = [[] for _ in self.headers]
-        for blocks in self:
-            for own, block in zip(kept, blocks, strict=True):
-                own.append(block)
-        return [Trajectory.from_blocks(*each) for each in zip(self.headers, kept, self.events, strict=True)]
+    def trajectory(self) -> Trajectory:
+        """The whole run, carried out to its end."""
+        blocks = list(self)
+        return Trajectory.from_blocks(self.header, blocks, self.events)
 
-    def _finish(self, first: int, raw: Array) -> Blocks:
-        """Samples of each run from raw ones (samples, runs, columns), cut where a run breaks down."""
-        samples = np.arange(first, first + len(raw))
-        time = samples.astype(float) * (self._interval * self._settings.timestep)
-        inside = (raw[..., 1:3] > -self._deepest).all(axis=2)
-        sound = np.logical_and.accumulate((np.abs(raw) < HUGE).all(axis=2) & inside)
-        blocks: Blocks = []
-        for i, (p, header) in enumerate(zip(self._parameters, self.headers, strict=True)):
-            count = 0 if header.failure else int(sound[:, i].sum())
-            part = recorder.samples(time[:count], raw[:count, i], self._balls[0].lead, p)
-            if not header.failure and count < len(time):
-                self._ends[i] = end = float(time[count])
-                names = zip(VARIABLES, UNITS, strict=True)
-                left = [f"{name} = {part[name][-1]:.6g} {unit}" for name, unit in names] if count else []
-                failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
-                self.headers[i] = header = dataclasses.replace(header, failure=failure)
-            part["case"] = self._classifier.cases(i, samples[:count] * self._interval)
-            blocks.append(part)
-        return blocks
-
-
-def balls(
-    given: Iterable[tuple[Any, Parameters, State]], settings: ContactSettings, theta_0: float
-) -> Sequence[JointedBall | FreeBall]:
-    """Of runs with their models, parameters and starts."""
-    if settings.rigid:
-        from mjsim.free import FreeBall  # here, because the law of its contacts takes long to load
-
-        return [FreeBall(*each, settings, theta_0) for each in given]
-    engines: dict[Parameters, Engine] = {}
-    return [
-        JointedBall(engines.get(p) or engines.setdefault(p, Engine(model, p, settings)), x, theta_0)
-        for model, p, x in given
-    ]
+    def _finish(self, first: int, raw: Array) -> npt.NDArray[np.void]:
+        """Samples from raw ones, (n, columns), up to where the run breaks down: through wall or floor it has come."""
+        p, samples = self._p, np.arange(first, first + len(raw))
+        time = samples.astype(float) * (self._interval * self._timestep)
+        sound = (np.abs(raw) < recorder.HUGE).all(axis=1) & (raw[:, 1:3] > -p.r).all(axis=1)
+        count = len(raw) if sound.all() else int(sound.argmin())
+        block = recorder.samples(time[:count], raw[:count], self.ball.lead, p)
+        block["case"] = self._classifier.cases(samples[:count] * self._interval)
+        if count < len(raw):
+            self._end = end = float(time[count])
+            names = zip(VARIABLES, UNITS, strict=True)
+            left = [f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in names] if count else []
+            failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
+            self.header = dataclasses.replace(self.header, failure=failure)
+        return block
 
 
 def simulate(
@@ -207,28 +158,12 @@ def simulate(
     theta_0: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """Simulate one run with MuJoCo.
+    """Simulate one run with MuJoCo; arguments and errors as of `Run`.
 
-    Parameters
-    ----------
-    p : parameters; its omega_0 is used if there is no `flow`
-    x0 : state (19) at the start, 6 entries, or 8 with h and v_h
-    t_end : duration, s
-    settings : `ContactSettings.for_problem` if None
-    sample_interval, theta_0, progress : as in `Run`
-
-    Raises
-    ------
-    InputError
-        If an argument is of another type or out of range.
-    SimulationError
-        If the run diverges; it carries the samples so far.
+    Raises `SimulationError` if the run diverges; it carries the samples so far.
     """
-    limits.check_runs([p], [x0], [flow], settings)
-    flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
-    asked = [p], [x0], t_end, flows, settings
-    run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, progress=progress)
-    (trajectory,) = run.trajectories()
+    run = p, x0, t_end, flow, settings
+    trajectory = Run(*run, sample_interval=sample_interval, theta_0=theta_0, progress=progress).trajectory()
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
     return trajectory
@@ -246,45 +181,46 @@ def simulate_many(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Trajectory]:
-    """Simulate many runs at once, in this process; arguments as in `simulate`.
+    """Simulate many runs, in this process; arguments as of `Run`, parameters and starts one for each.
 
-    `flow` is one for all, one for each, or None for each one's own omega_0. Each thread steps its share of the runs;
-    None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the same to the
-    bit whatever the number. A run that breaks down has a header that says so; the others go on.
+    `flow` is one for all, one for each, or None for each one's own omega_0; settings, if None, are the softest that any
+    of the runs asks for. `threads` of them go on at once; None is a thread for each processor that has `RUNS_A_THREAD`
+    of them. Results are the same to the bit whatever the number. A run that breaks down has a header that says so; the
+    others go on.
 
     Raises
     ------
     InputError
-        If an argument is out of range, or numbers of runs differ.
+        If an argument is of another type or out of range, or numbers of runs differ.
     """
     check_type("parameters", parameters, Sequence)
-    asked = flow if isinstance(flow, Sequence) else [flow] * len(parameters)
-    limits.check_runs(parameters, x0s, asked, settings)
-    flows = [own or Flow.steady(p.omega_0) for own, p in zip(asked, parameters, strict=True)]
+    flows = flow if isinstance(flow, Sequence) else [flow] * len(parameters)
+    if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
+        raise InputError(
+            f"every run needs parameters, a start and a flow, but there are {len(parameters)} parameter sets, "
+            f"{len(x0s)} starts and {len(flows)} flows"
+        )
     if threads is None:
         threads = max(1, min(os.cpu_count() or 1, len(flows) // RUNS_A_THREAD))
-    parts = min(int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True))), len(flows))
-    # The softest settings that any of the runs asks for.
-    settings = settings or min((ContactSettings.for_problem(p) for p in parameters), key=lambda s: s.solimp)
-    how: dict[str, Any] = {"sample_interval": sample_interval, "theta_0": theta_0}
-    shares, done, over = [slice(k, None, parts) for k in range(parts)], [0.0] * parts, threading.Event()
+    threads = int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True)))
+    if settings is None:
+        settings = min((ContactSettings.for_problem(p) for p in parameters), key=lambda s: s.solimp)
+    done, over = np.zeros(len(flows)), threading.Event()
 
-    def report(part: int, fraction: float) -> None:
-        if over.is_set():  # another thread has raised an error
+    def report(run: int, fraction: float) -> None:
+        if over.is_set():  # another one has raised an error
             raise CancelledError
-        done[part] = fraction
+        done[run] = fraction
         if progress:
-            progress(sum(done) / parts)
+            progress(float(done.mean()))
 
+    how: dict[str, Any] = {"sample_interval": sample_interval, "theta_0": theta_0}
     runs = [
-        Run(parameters[own], x0s[own], t_end, flows[own], settings, progress=functools.partial(report, k), **how)
-        for k, own in enumerate(shares)
+        Run(p, x0, t_end, own, settings, progress=functools.partial(report, k), **how)
+        for k, (p, x0, own) in enumerate(zip(parameters, x0s, flows, strict=True))
     ]
-    found: list[Any] = [None] * len(flows)
-    with ThreadPoolExecutor(parts) as pool:
+    with ThreadPoolExecutor(min(threads, len(runs))) as pool:
         try:
-            for own, trajectories in zip(shares, pool.map(Run.trajectories, runs), strict=True):
-                found[own] = trajectories
+            return list(pool.map(Run.trajectory, runs))
         finally:
             over.set()
-    return found

@@ -7,19 +7,18 @@ ball before each step and moves during it as a cylinder does past the ball (`aga
 
 from __future__ import annotations
 
-import copy
 import math
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from mjsim import recorder
+from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball
 from mjsim.coulomb import Coulomb
-from mjsim.coulomb.law import Law
+from mjsim.coulomb import compiled as kernels
 from mjsim.world_axes import against, driven, joint_velocities, slip, spun, unwrapped
 from model import Parameters, State
 from model.arrays import Array
@@ -48,7 +47,7 @@ class Body(NamedTuple):
     """Gaps below which contacts are seen, A and B, m."""
     ball: Ball
     served: Any
-    """What takes a step, see `under_law`."""
+    """Addresses of the engine's model and data, and of what the law remembers."""
 
 
 def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, seen: Any) -> float:
@@ -70,21 +69,11 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
     applied[6], applied[8] = body.heavy / ahead * inwards, body.heavy / ahead * up
     body.at[2], qpos[7], qpos[8], qpos[9] = qpos[2], 0.0, 0.0, 0.0
     seen[-2], seen[-1] = qpos[2] - ball.r, ball.R - math.hypot(x, y)
-    under_law(body.served, duration, anew)
+    kernels.step_of(body.served[0], body.served[1], body.served[2], duration, anew)
     for i in range(len(body.sensors)):
         seen[i] = body.sensors[i]
     # the engine has them of a wall that is ahead
     seen[_A_x], seen[_A_y], seen[_B_x], seen[_B_y] = A_x, A_y, B_x, B_y
-    return theta
-
-
-def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) -> float:
-    """A `step` for each omega_0, noted in rows (steps, `COLUMNS`)."""
-    for number in range(len(fluid)):
-        row = rows[number]
-        note(row, body.qpos, body.qvel, duration / 2, body.ball)
-        theta = step(body, duration, False, fluid[number], theta, row[_SEEN:])
-        row[0] = theta
     return theta
 
 
@@ -99,31 +88,28 @@ def note(row: Any, qpos: Any, qvel: Any, ahead: float, ball: Ball) -> None:
         row[_PLACE + i] = velocities[i]
 
 
-def under_law(served: tuple[Coulomb, Any], duration: float, anew: bool) -> None:
-    """A step of MuJoCo's under the law, with what it remembers or `anew`; compiled, it is served by addresses."""
-    law, data = served
-    law.model.opt.timestep = duration
-    if anew:
-        law.reset()
-    law.step(data)
+@loop
+def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) -> float:
+    """A `step` for each omega_0, noted in rows (steps, `COLUMNS`)."""
+    for number in range(len(fluid)):
+        row = rows[number]
+        note(row, body.qpos, body.qvel, duration / 2, body.ball)
+        theta = step(body, duration, False, fluid[number], theta, row[_SEEN:])
+        row[0] = theta
+    return theta
 
 
 class FreeBall:
-    """One of them, with an engine of its own; arguments and methods as of `mjsim.stepping.JointedBall`."""
+    """One of them, with an engine of its own; arguments and methods as of `mjsim.stepping.JointedBall`, numbers of the
+    law as of `mjsim.Coulomb`."""
 
     def __init__(
-        self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float,
-        share: float = Law.share,
-    ) -> None:  # fmt: skip
-        from mjsim import compiled  # here, because it has this module compiled
-
-        self._steps = compiled.steps
-        self.model = model = copy.copy(model)  # its wall moves
-        self.data = mujoco.MjData(model)
-        self.p, self.theta, self._timestep = p, theta_0, settings.timestep
-        self.law = Coulomb(self.model, rigid=True, share=share)
-        self.lead = settings.timestep / 2
-        data, wall = self.data, self.model.body("wall")
+        self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float, **law: float
+    ) -> None:
+        self.p, self._timestep, self.lead = p, settings.timestep, settings.timestep / 2
+        self.model, self.data = model, mujoco.MjData(model)
+        self.law = Coulomb(model, rigid=True, **law)
+        data, wall = self.data, model.body("wall")
         self.body = Body(
             qpos=data.qpos,
             qvel=data.qvel,
@@ -135,15 +121,15 @@ class FreeBall:
             heavy=float(model.dof_M0[-1]),
             margins=model.pair_margin,
             ball=Ball(*map(float, Ball.of(p, settings))),
-            served=compiled.served(self.law, data),
+            served=self.law.addresses(data),
         )
         self.place(x, theta_0)
 
-    def place(self, x: npt.ArrayLike, theta: float) -> None:
+    def place(self, x: State, theta: float) -> None:
         """Begin anew in a state."""
         mujoco.mj_resetData(self.model, self.data)
         self.law.reset()
-        now, x, self.theta = to_world(x, theta, self.p), State.of(x), theta
+        now, self.theta = to_world(x, theta, self.p), theta
         place = now.position
         if self.lead:
             there = x._replace(y=x.y + self.lead * x.v_y, h=x.h + self.lead * x.v_h)
@@ -153,12 +139,7 @@ class FreeBall:
 
     def advance(self, fluid: Array, rows: Array) -> None:
         """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
-        self.theta = self._steps(self.body, self._timestep, fluid, self.theta, rows)
-
-    @property
-    def margins(self) -> Array:
-        """Of both contacts, m: there are none."""
-        return np.zeros(2)
+        self.theta = steps(self.body, self._timestep, fluid, self.theta, rows)
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""

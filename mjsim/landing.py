@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mjsim import recorder, scene
+from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
 from mjsim.free import Body, FreeBall, step
 from mjsim.world_axes import joint_velocities, unwrapped
@@ -55,13 +56,10 @@ class Fine:
     """One ball that takes steps of some settings in shorter ones."""
 
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
-        from mjsim import compiled  # here, because it has this module compiled
-
         self._p, self._whole, self._fall = p, settings.timestep, settings.slowest_fall(p.g)
         rigid = ContactSettings.rigid_at(settings.timestep / _FIRST)
-        self._ball = FreeBall(scene.build(p, rigid)[0], p, State(), rigid, 0.0, _SHARE)
+        self._ball = FreeBall(scene.build(p, rigid)[0], p, rigid, State(), 0.0, share=_SHARE)
         self._ball.lead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
-        self._through = compiled.through
 
     def step(self, x: State, theta: float, rates: Array, omega_0: float, finely: bool = False) -> Landed:
         """A whole step from a state, with velocities of the joints that change at such rates; `finely` if there was a
@@ -75,7 +73,7 @@ class Fine:
             ball.body.last[:3] = away * cos - along * sin, away * sin + along * cos, rates[2]
         longest = self._whole / (COARSE if finely else _FIRST)
         given = ball.body, self._whole, longest, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
-        place, velocity, before, duration, since = self._through(*given)
+        place, velocity, before, duration, since = through(*given)
         v = np.array(velocity)
         first, last = recorder.forces(seen[1:3], np.array([place[0] - v[0] * since, place[0]]))
         (A_x, A_y, A_z), (B_x, B_y, B_z) = last
@@ -102,6 +100,7 @@ def average(means: Any, sensors: Any, count: int) -> None:
             means[i] = sensors[i]
 
 
+@loop
 def through(
     body: Body, whole: float, longest: float, fall: float, reach: float, omega_0: float, theta: float,
     rates: tuple[float, float], seen: Any,

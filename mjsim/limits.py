@@ -4,41 +4,18 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
-
-import numpy.typing as npt
 
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
-from model import Flow, InputError, Parameters, State, time_scales
-from model.errors import check_type
+from model import Flow, Parameters, State, time_scales
 from model.parameters import Range, check_number
 
 
-def check_runs(
-    parameters: Sequence[Parameters],
-    x0s: Sequence[npt.ArrayLike],
-    flows: Sequence[Flow | None],
-    settings: ContactSettings | None,
-) -> None:
-    """Refuse runs that lack parameters, a start or a flow, none at all, and what is of another type."""
-    if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
-        raise InputError(
-            f"every run needs parameters, a start and a flow, but there are {len(parameters)} parameter sets, "
-            f"{len(x0s)} starts and {len(flows)} flows"
-        )
-    for p, flow in zip(parameters, flows, strict=True):
-        check_type("p", p, Parameters)
-        check_type("flow", flow, Flow | None)
-    check_type("settings", settings, ContactSettings | None)
-
-
-def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> None:
+def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
     """Refuse a state on or beyond the axis, where polar coordinates end.
 
     Warn if friction at both contacts makes them chatter.
     """
-    x = State.one(x0)
     if settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
             f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters with these settings; "

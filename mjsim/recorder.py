@@ -20,6 +20,8 @@ SLIPS = 12, 13, 26, 27
 """Where they hold the slip velocities of A and B."""
 NORMALS = slice(1, 28, 14)
 """Where they hold the normal forces."""
+HUGE = 1e10
+"""Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 _COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
 
 
@@ -45,8 +47,8 @@ def state(place: Array, qvel: Array, p: Parameters) -> State:
 
 
 def contacts(rows: Array) -> Contacts:
-    """What the contacts do in successive steps, of rows (steps, runs, `COLUMNS`)."""
-    each, gaps = rows[..., SENSORS:-2].reshape(*rows.shape[:2], 2, NSENSOR // 2 - 1), rows[..., -2:]
+    """What the contacts do in successive steps, of rows (steps, `COLUMNS`)."""
+    each, gaps = rows[:, SENSORS:-2].reshape(len(rows), 2, NSENSOR // 2 - 1), rows[:, -2:]
     normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
     slips = np.moveaxis(each[..., _SLIP], -1, 0)
     return Contacts(normal, np.hypot(first, second), np.hypot(slips[0], slips[1]), gaps)

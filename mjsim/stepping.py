@@ -13,27 +13,23 @@ The same text runs in plain Python, or compiled (`mjsim.compiled`). Contacts are
 
 from __future__ import annotations
 
-import copy
 import functools
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from mjsim import recorder
+from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, Velocity, corrections, eventful, followed, near_axis
-from mjsim.recorder import COORDINATES, NORMALS, NSENSOR, SENSORS
+from mjsim.coulomb import compiled as kernels
+from mjsim.landing import Fine
+from mjsim.recorder import COORDINATES, HUGE, NORMALS, NSENSOR, SENSORS
 from model import Parameters, State
 from model.arrays import Array
 
-if TYPE_CHECKING:
-    from mjsim.landing import Fine
-
-HUGE = 1e10
-"""Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 _CHANGE = 0.5
 """Most that contact forces may change in a step before the ball goes on upon its joints, in units of what the
 largest force, at least that of gravity and the wall's friction, does as the ball goes round."""
@@ -73,7 +69,7 @@ class Joints(NamedTuple):
     """Whether the next step is due to be taken in fine ones, and whether the last one was, with its forces held."""
     ball: Ball
     served: Any
-    """What takes a step, see `engine_step`."""
+    """Addresses of the engine's model and data."""
 
 
 def seen_forces(body: Joints) -> None:
@@ -120,24 +116,6 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
     applied[2] -= lift_A
 
 
-def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
-    """A step for each omega_0, of which some are done, noted in rows (steps, `COLUMNS`), up to one that the ball takes
-    in fine ones: its number; one that has diverged takes none."""
-    while done < len(fluid):
-        row = rows[done]
-        drive(float(fluid[done]), row, body)
-        if body.marks[_DUE] != NOT and sound(body):
-            return done
-        for i in range(6):
-            body.last[i] = body.qvel[i]
-        body.marks[_DUE] = body.marks[_HELD] = 0
-        engine_step(body.served)
-        for i in range(NSENSOR):
-            row[SENSORS + i] += body.sensors[i]
-        done += 1
-    return done
-
-
 def sound(body: Joints) -> bool:
     """Whether place and velocities are numbers of a motion."""
     found = True
@@ -151,87 +129,94 @@ def velocity_of(v: Any) -> Velocity:
     return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
 
 
-def engine_step(served: Any) -> None:
-    """A step of MuJoCo's; compiled, model and data are known by their addresses."""
-    mujoco.mj_step(*served)
-
-
-class Engine:
-    """What balls of equal parameters share, one after the other: MuJoCo, and what takes fine steps."""
-
-    def __init__(self, model: Any, p: Parameters, settings: ContactSettings) -> None:
-        from mjsim import compiled  # here, because numba takes long to load, and it has this module compiled
-
-        self.model = model = copy.copy(model)  # its wall moves
-        self.data = data = mujoco.MjData(model)
-        self.up_to_landing, self.p, self.settings = compiled.up_to_landing, p, settings
-        floor, wall = (model.geom_surfacevel[model.geom(name).id, :2] for name in ("floor", "wall"))
-        self.body = Joints(
-            *(data.qpos, data.qvel, data.qacc_warmstart, model.pair_margin[:2], data.qfrc_constraint),
-            *(data.sensordata, data.qfrc_applied, model.pair_adhesion[:2], data.mocap_quat[0], floor, wall),
-            *(np.zeros(6), np.zeros(8), np.zeros(2, np.int8)),
-            Ball(*map(float, Ball.of(p, settings))),
-            compiled.served_plain(model, data),
-        )
-
-    @functools.cached_property
-    def fine(self) -> Fine:
-        from mjsim.landing import Fine  # here, because the law takes long to load
-
-        return Fine(self.p, self.settings)
+@loop
+def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
+    """A step for each omega_0, of which some are done, noted in rows (steps, `COLUMNS`), up to one that the ball takes
+    in fine ones: its number; one that has diverged takes none."""
+    while done < len(fluid):
+        row = rows[done]
+        drive(float(fluid[done]), row, body)
+        if body.marks[_DUE] != NOT and sound(body):
+            return done
+        for i in range(6):
+            body.last[i] = body.qvel[i]
+        body.marks[_DUE] = body.marks[_HELD] = 0
+        kernels.mj_step(body.served[0], body.served[1])
+        for i in range(NSENSOR):
+            row[SENSORS + i] += body.sensors[i]
+        done += 1
+    return done
 
 
 class JointedBall:
-    """One of them.
+    """One of them, with an engine of its own.
 
     Parameters
     ----------
-    engine : its own, or shared with others of the same parameters
-    x : full state (8,) at the start; omega_0 is that of the steps
+    model : of its own, since its wall moves
+    x : state at the start; omega_0 is that of the steps
     theta_0 : azimuth at the start, rad
     """
 
-    def __init__(self, engine: Engine, x: npt.ArrayLike, theta_0: float) -> None:
-        self.engine, self._p, self._settings, self._body = engine, engine.p, engine.settings, engine.body
-        self._h, self.lead = self._settings.timestep, self._settings.timestep * self._settings.midpoint
-        """The step, and how far places are ahead of velocities, s."""
-        x, body = State.of(x), self._body
-        place, v = recorder.joint_state(x, theta_0, self._p)
-        fall = self._settings.slowest_fall(self._p.g)
+    def __init__(self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float) -> None:
+        self.model, self.data = model, mujoco.MjData(model)
+        self._p, self._settings, self._h = p, settings, settings.timestep
+        self.lead = self._h * settings.midpoint
+        """How far places are ahead of velocities, s."""
+        data, (floor, wall) = self.data, (model.geom(name).id for name in ("floor", "wall"))
+        self.body = Joints(
+            qpos=data.qpos,
+            qvel=data.qvel,
+            start=data.qacc_warmstart,
+            margins=model.pair_margin,
+            contact=data.qfrc_constraint,
+            sensors=data.sensordata,
+            applied=data.qfrc_applied,
+            adhesion=model.pair_adhesion,
+            turn=data.mocap_quat[0],
+            floor=model.geom_surfacevel[floor],
+            wall=model.geom_surfacevel[wall],
+            last=np.zeros(6),
+            forces=np.zeros(8),
+            marks=np.zeros(2, np.int8),
+            ball=Ball(*map(float, Ball.of(p, settings))),
+            served=(model._address, data._address),
+        )
+        place, v = recorder.joint_state(x, theta_0, p)
+        fall = settings.slowest_fall(p.g)
         calm = all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h)))
-        body.forces[:] = body.margins[:] = 0.0
-        body.marks[_DUE] = (BEGINS if calm else LANDS) if self._settings.servo else NOT
+        self.body.marks[_DUE] = (BEGINS if calm else LANDS) if settings.servo else NOT
         self._set(place, v, np.zeros(6))
-        self._keep()
+
+    @functools.cached_property
+    def _fine(self) -> Fine:
+        """The ball in steps that are taken in fine ones."""
+        return Fine(self._p, self._settings)
 
     def _set(self, place: Array, v: Array, rates: Array) -> None:
         """Go on from a place and velocities at one time, with such accelerations and the forces it has."""
-        body = self._body
+        body = self.body
         body.qvel[:], body.last[:], body.start[:] = v, v - self._h * rates, rates
         body.qpos[:3] = place + self.lead * (v + rates * self.lead / 2)[:3]
         body.marks[_HELD] = 1
 
     def advance(self, fluid: Array, rows: Array) -> None:
         """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
-        for name, values in self._kept.items():
-            getattr(self._body, name)[:] = values
         done = 0
-        while (done := self.engine.up_to_landing(self._body, fluid, rows, done)) < len(fluid):
+        while (done := up_to_landing(self.body, fluid, rows, done)) < len(fluid):
             self._land(float(fluid[done]), rows[done])
             done += 1
-        self._keep()
 
     def _land(self, omega_0: float, row: Array) -> None:
         """Take a step in fine ones, and go on upon the joints, if forces change slowly and the axis is far.
 
         The contacts get margins with which they bear their forces.
         """
-        p, body, how = self._p, self._body, int(self._body.marks[_DUE])
+        p, body, how = self._p, self.body, int(self.body.marks[_DUE])
         ahead, v = body.qpos[:3].copy(), body.qvel.copy()
         rates = (v - body.last) / self._h
         place = ahead - self.lead * (v + rates * self.lead / 2)[:3]
-        x = recorder.state(place, v, p)
-        landed = self.engine.fine.step(x, float(place[0]), rates, omega_0, how != LANDS)
+        landed = self._fine.step(recorder.state(place, v, p), float(place[0]), rates, omega_0, how != LANDS)
         row[SENSORS:], row[-2:] = landed.seen, ahead[:0:-1]
         v = landed.velocity
         near = near_axis(p.R - landed.place[1], Velocity(*v), body.ball) and landed.forces[7] == 0
@@ -245,25 +230,16 @@ class JointedBall:
             loads = landed.forces[6:] / p.m
             body.margins[:] = np.maximum(landed.place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
 
-    def _keep(self) -> None:
-        """Keep all that is carried from one step to the next, in an engine that others use."""
-        seen_forces(self._body)
-        self._body.marks[_HELD] = 1
-        self._kept = {name: getattr(self._body, name).copy() for name in _KEPT}
-
-    @property
-    def margins(self) -> Array:
-        """Of both contacts, m."""
-        kept: Array = self._kept["margins"]
-        return kept
-
     def state(self) -> dict[str, Array]:
-        """All that is carried from one step to the next."""
-        return self._kept
+        """Copies of all that is carried from one step to the next."""
+        seen_forces(self.body)
+        self.body.marks[_HELD] = 1
+        return {name: getattr(self.body, name).copy() for name in _KEPT}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from such a state."""
-        self._kept = state
+        for name in _KEPT:
+            getattr(self.body, name)[:] = state[name]
 
 
 _KEPT = ("forces", "qvel", "last", "qpos", "margins", "start", "marks")

@@ -45,6 +45,9 @@ class Bodies(Free):
             self.tune(spec, self.scene, self.timestep)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
+        named = {surface.name: k for k, surface in enumerate(self.scene.surfaces)}
+        names = (self.model.geom(k).name.rstrip("0123456789") for k in range(self.model.ngeom))
+        self.surfaces = [named.get(name, -1) for name in names]
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
 
     def advance(self) -> None:
@@ -64,12 +67,10 @@ class Bodies(Free):
         self.data.body("body").xfrc_applied[:3] = force
 
     def touches(self) -> list[Touch]:
-        shown, force = [], np.empty(6)
-        numbers = {surface.name: k for k, surface in enumerate(self.scene.surfaces)}
-        for k, contact in enumerate(self.data.contact):
+        shown, force, contact = [], np.empty(6), self.data.contact
+        for k, (geom, frame, gap) in enumerate(zip(contact.geom1, contact.frame, contact.dist.tolist(), strict=True)):
             mujoco.mj_contactForce(self.model, self.data, k, force)
-            surface = self.model.geom(contact.geom[0]).name.rstrip("0123456789")
-            shown.append(Touch(numbers[surface], force[:3] @ contact.frame.reshape(3, 3), float(contact.dist)))
+            shown.append(Touch(self.surfaces[geom], force[:3] @ frame.reshape(3, 3), gap))
         return shown
 
 

@@ -147,8 +147,8 @@ def simulate(library: Library, member: str, task: Any, progress: Callable[[float
     versions = {**current_versions(), library.name: library.version}
     header = Header(task.engine, p, flow, given, failure=failure, versions=versions)
     block = np.concatenate(steps.kept)
-    block["case"] = steps.classifier.cases(0, np.arange(len(block)) * every)
-    return Trajectory.from_blocks(header, [block], steps.classifier.events(0))
+    block["case"] = steps.classifier.cases(np.arange(len(block)) * every)
+    return Trajectory.from_blocks(header, [block], steps.classifier.events())
 
 
 class _Steps:
@@ -158,7 +158,7 @@ class _Steps:
         """One of `every` steps is a sample; `along` is how fast the plane that stands for the wall slips, m s-1."""
         self.engine, self.timestep, self.p, self.every, self.done = engine, timestep, p, every, 0
         self.band = _RollingBand(timestep, engine.ahead / timestep, engine.RESOLUTION + along)
-        self.classifier = Classifier([p], self.band)
+        self.classifier = Classifier(p, self.band)
         self.kept = list[npt.NDArray[np.void]]()
         self._rows, self._told, self._theta = np.empty((NOTED, 9 + 2 * _CARRIED)), 0, 0.0
 
@@ -222,4 +222,4 @@ def _contacts(block: npt.NDArray[np.void], band: _RollingBand, p: Parameters) ->
         (block["slip_speed_A"], block["slip_speed_B"]),
         (block["gap_A"], block["gap_B"]),
     )
-    return Contacts(*(np.stack(pair, axis=-1)[:, None] for pair in each))
+    return Contacts(*(np.stack(pair, axis=-1) for pair in each))

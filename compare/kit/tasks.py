@@ -125,7 +125,7 @@ def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -
     """
     if simulate := tasks[0].simulator.simulate:
         return [simulate(task, lambda done: check()) for task in tasks]
-    return _start_stream(tasks, progress=lambda done: check()).trajectories()
+    return [_start_stream(task, progress=lambda done: check()).trajectory() for task in tasks]
 
 
 def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:
@@ -156,21 +156,21 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
     else:
         journal = Journal(journal_path(task, path)) if task.long else None
         try:
-            under_way = _start_stream([task], journal)
+            under_way = _start_stream(task, journal)
         except InputError:  # there is nothing to go on with
             if journal:
                 journal.discard()
             raise
         stopped = ""
-        with storage.TrajectoryWriter(path, under_way.headers[0]) as writer:
-            for (block,) in under_way:
+        with storage.TrajectoryWriter(path, under_way.header) as writer:
+            for block in under_way:
                 check()
                 writer.append(block)
                 if stop():
                     stopped = f"was stopped at t = {block['time'].max(initial=0.0):g} s"
                     break
-            failure = under_way.headers[0].failure or stopped
-            writer.end(under_way.events[0], failure, failed_path(path) if failure else path)
+            failure = under_way.header.failure or stopped
+            writer.end(under_way.events, failure, failed_path(path) if failure else path)
         if journal and not stopped:
             journal.discard()
     if not failure:
@@ -188,13 +188,11 @@ def journal_path(task: Task, path: Path) -> Path:
     return path.with_name(f"{task.key}.journal")
 
 
-def _start_stream(tasks: Sequence[Task], journal: Journal | None = None, **more: Any) -> mjsim.Run:
-    """Begin a run of one or several tasks that hands out its samples as it goes."""
-    first = tasks[0]
-    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
-    run = parameters, x0s, first.t_end, flows, first.settings
-    assert first.simulator.stream
-    return first.simulator.stream(*run, sample_interval=first.sample_interval, journal=journal, **more)
+def _start_stream(task: Task, journal: Journal | None = None, **more: Any) -> mjsim.Run:
+    """Begin a run that hands out its samples as it goes."""
+    assert task.simulator.stream
+    run = task.parameters, task.x0, task.t_end, task.fluid, task.settings
+    return task.simulator.stream(*run, sample_interval=task.sample_interval, journal=journal, **more)
 
 
 @functools.cache

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjsim import ContactSettings, limits, recorder, scene
-from mjsim.stepping import Engine, JointedBall
+from mjsim.stepping import JointedBall
 from model import Flow, InputError, Parameters, State
 from model.parameters import POSITIVE, check_number
 
@@ -35,7 +35,7 @@ def view(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings
 
     ball = start(p, x0, flow, settings)
     try:
-        handle = viewer.launch_passive(ball.engine.model, ball.engine.data, show_left_ui=False, show_right_ui=False)
+        handle = viewer.launch_passive(ball.model, ball.data, show_left_ui=False, show_right_ui=False)
     except RuntimeError as error:  # macOS needs to be asked in another way
         raise InputError(f"the viewer does not open: {' '.join(str(error).split())}") from error
     with handle:
@@ -47,10 +47,11 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     if settings.rigid:
         raise InputError("the viewer shows no rigid contacts")
     limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
-    limits.check_start(x0, p, settings)
+    x = State.one(x0)
+    limits.check_start(x, p, settings)
     model, _ = scene.build(p, settings, shown=True)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
-    return JointedBall(Engine(model, p, settings), State.one(x0), 0.0)
+    return JointedBall(model, p, settings, x, 0.0)
 
 
 def run(handle: Any, ball: JointedBall, flow: Flow, timestep: float, speed: float) -> int:

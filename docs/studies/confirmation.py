@@ -11,7 +11,7 @@ import numpy as np
 from docs.studies import states
 from docs.studies.states import EPS
 from mjsim import ContactSettings, Run, simulate
-from model import Flow, State
+from model import State
 from model.arrays import Array
 
 ROLLING = states.SMOOTH.replace(omega_0=10.0)
@@ -101,9 +101,9 @@ def _margins() -> Iterator[Row]:
 
 def _steady_slipping(settings: ContactSettings) -> tuple[np.void, Array]:
     """Last sample of a run that settles in slipping at both points, and the margins (2,) there."""
-    run = Run([SLIPPING], [SLIPPING_START], 10.0, [Flow.steady(SLIPPING.omega_0)], settings)
-    *_, (block,) = run
-    return block[-1], run.margins[0]
+    run = Run(SLIPPING, SLIPPING_START, 10.0, settings=settings)
+    *_, block = run
+    return block[-1], run.ball.body.margins
 
 
 def _creep() -> Iterator[Row]:

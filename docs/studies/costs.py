@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import math
 import os
 import statistics
@@ -35,8 +36,8 @@ from mjsim import scene
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
 from mjsim.recorder import COLUMNS
-from mjsim.stepping import Engine, JointedBall
-from model import Flow, Parameters, State, storage
+from mjsim.stepping import JointedBall
+from model import Parameters, State, storage
 
 REPEATS = 5
 BATCH = 64
@@ -164,20 +165,20 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     settings, p = ContactSettings(), SLIPPING
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
-    settled = Engine(model, p, settings)
-    JointedBall(settled, state.x, 0.0).advance(np.full(500, p.omega_0), np.empty((500, COLUMNS)))
-    starts = [p] * runs, [state.x] * runs, steps * settings.timestep, [Flow.steady(p.omega_0)] * runs, settings
+    settled = JointedBall(model, p, settings, State.one(state.x), 0.0)
+    settled.advance(np.full(500, p.omega_0), np.empty((500, COLUMNS)))
+    start = p, state.x, steps * settings.timestep, None, settings
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(REPEATS):
-        loop = Run(*starts, sample_interval=100 * settings.timestep)
-        whole.append(seconds(partial(list, loop), time.process_time))
+        loops = itertools.chain(*(Run(*start, sample_interval=100 * settings.timestep) for _ in range(runs)))
+        whole.append(seconds(partial(list, loops), time.process_time))
         bare.append(_bare(settled, runs, steps))
     ratios = [2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)]
     each = steps * runs
     return [statistics.median(bare) / each, statistics.median(whole) / each, statistics.median(ratios)]
 
 
-def _bare(settled: Engine, runs: int, steps: int) -> float:
+def _bare(settled: JointedBall, runs: int, steps: int) -> float:
     """Time in s of the given steps with no more around them than a loop."""
     model, data = settled.model, settled.data
     if runs == 1:

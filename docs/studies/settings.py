@@ -9,9 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 import os
-import statistics
-import time
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,13 +19,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from compare.kit import drawing, progress, style
-from compare.kit.campaign import BATCH, Campaign
+from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, EVENT, MOREAU, NEWCOMER, PLAIN, AnySettings, newcomer, plain
 from compare.kit.pages import Rows
-from compare.kit.tasks import Task, carry_out
+from compare.kit.tasks import carry_out
 from docs.studies import states
 from docs.studies.states import CONTACT, ERRORS, OPEN, Contestant, Entry
-from mjsim import ContactSettings, Run
+from mjsim import ContactSettings
 from model.files import make_directory
 
 STEP = 1e-3
@@ -133,7 +130,7 @@ def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:
     """Entries, with their cost, of MuJoCo under several settings and of theory's two simulators, at several steps."""
     ways = [each for alike in zip(*(_contestants(rivals(step)) for step in steps), strict=True) for each in alike]
     theory = [each for name in (MOREAU.name, EVENT.name) for each in _theory(name, steps)]
-    return states.scored(campaign, [*ways, *theory], ERRORS, _cost)
+    return states.scored(campaign, [*ways, *theory], ERRORS, states.cost)
 
 
 def _theory(name: str, steps: Sequence[float]) -> list[Contestant]:
@@ -147,26 +144,6 @@ def _contestants(ways: Ways) -> list[Contestant]:
     """They run without a warning where contacts chatter: what poor settings do is the question here."""
     engines = {name: PLAIN if isinstance(each, ContactSettings) else NEWCOMER for name, each in ways.items()}
     return [Contestant(name, engines[name], each.timestep, each) for name, each in ways.items()]
-
-
-def _cost(task: Task) -> float:
-    """Processor time divided by simulated time of a run, without what it takes to begin: its share of a full batch.
-
-    What has no batches, as free balls, runs by itself.
-    """
-    settings = task.settings
-    if not isinstance(settings, ContactSettings) or settings.rigid:
-        return states.cost(task)
-    given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings), []
-    for _ in range(states.REPEATS):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of contacts that chatter
-            run = Run(*given, sample_interval=task.sample_interval)
-        begin = time.process_time()
-        for _ in run:
-            pass
-        spent.append(time.process_time() - begin)
-    return statistics.median(spent) / BATCH / task.t_end
 
 
 def draw_ladder(entries: Sequence[Entry]) -> Figure:

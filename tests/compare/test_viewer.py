@@ -42,7 +42,7 @@ def test_the_loop_is_that_of_a_simulation(reference, monkeypatch):
     steps = viewer.run(window, stepper, flow, settings.timestep, 1.0)
     assert steps == 500  # half a second: the first of the 33 pictures shows the start
     run = mjsim.simulate(p, x0, 0.5, flow, settings, sample_interval=0.5)
-    qpos, qvel = np.array(stepper.engine.data.qpos), np.array(stepper.engine.data.qvel)
+    qpos, qvel = np.array(stepper.data.qpos), np.array(stepper.data.qvel)
     place = qpos[:3] - settings.midpoint * settings.timestep * qvel[:3]  # positions are ahead of velocities
     qvel[3:] = rotated(qpos[3:], qvel[3:])
     # Equal but for the round-off of turning one state into the paper's variables, or many at once.

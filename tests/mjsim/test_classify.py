@@ -18,7 +18,7 @@ WEIGHT = P.m * P.g
 
 def made(cases):
     """Steps that show the given cases plainly: loads of the weight, slip of 0.1 m/s, half the friction in rolling."""
-    letters = np.array([list(case.name) for case in cases])[:, None]
+    letters = np.array([list(case.name) for case in cases])
     closed, slips = letters != "N", letters == "S"
     normal = WEIGHT * closed
     friction = np.array([P.mu, P.eta]) * normal * np.where(slips, 1.0, 0.5)
@@ -26,12 +26,12 @@ def made(cases):
 
 
 def classified(steps, sizes):
-    classifier, start, count = Classifier([P], SETTINGS), 0, len(steps.normal)
+    classifier, start, count = Classifier(P, SETTINGS), 0, len(steps.normal)
     for size in sizes:
         stop = min(start + size, count)
         classifier.add(Contacts(*(each[start:stop] for each in steps)), stop == count)
         start = stop
-    return classifier.cases(0, np.arange(count)), classifier.events(0)
+    return classifier.cases(np.arange(count)), classifier.events()
 
 
 @pytest.mark.parametrize("sizes", [[1000], [1] * 1000, [2, 5] * 200])
@@ -58,7 +58,7 @@ def test_between_the_bands_a_contact_is_what_it_was() -> None:
     band = SETTINGS.regularisation_speed(P.mu * P.g) * 1e-3
     steps.speed[10:] = 2 * band
     assert [Case(c).name for c in classified(steps, [100])[0][[0, 7, 14]]] == ["RR", "SS", "SS"]
-    steps.speed[10:, 0, 0] = 0.5 * band
+    steps.speed[10:, 0] = 0.5 * band
     assert Case(classified(steps, [100])[0][14]).name == "RS"
     # Creep that a rolling contact shares is no slip.
     steps = made([Case.SR] * 5)

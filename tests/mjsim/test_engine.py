@@ -1,5 +1,6 @@
 """The engine has the motions of exact forms, the same alone, in batches, on threads, compiled or not."""
 
+import ctypes
 import math
 
 import mujoco
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, compiled, scene, stepping
+from mjsim import ContactSettings, scene, stepping
 from model import Case, Flow, InputError, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
 from model.trajectory import columns
@@ -171,7 +172,8 @@ def test_compiled_gives_the_same_run(monkeypatch: pytest.MonkeyPatch, changes: d
         return [run.x for run in (*together, *alone)]
 
     fast = runs()
-    monkeypatch.setattr(compiled, "up_to_landing", stepping.up_to_landing)
-    monkeypatch.setattr(compiled, "served_plain", lambda *served: served)
+    monkeypatch.setattr(stepping, "up_to_landing", stepping.up_to_landing.__wrapped__)
+    monkeypatch.setattr(stepping.kernels, "mj_step", stepping.kernels._engine.mj_step)
+    stepping.kernels._engine.mj_step.argtypes = [ctypes.c_void_p] * 2
     for x, exact in zip(fast, runs(), strict=True):
         np.testing.assert_allclose(x, exact, rtol=0, atol=1e-9)

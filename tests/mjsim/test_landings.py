@@ -7,8 +7,8 @@ import analytic
 import mjsim
 from mjsim import ContactSettings, recorder, scene
 from mjsim.landing import COARSE
-from mjsim.stepping import NOT, Engine, JointedBall
-from model import Case, Parameters
+from mjsim.stepping import NOT, JointedBall
+from model import Case, Parameters, State
 
 HOPS = Parameters.named("hopping")
 """A hop lasts 0.22 s, and the floor is touched for half a millisecond of it."""
@@ -77,8 +77,7 @@ def test_a_ball_that_slips_fast_lands_at_any_step(step: float) -> None:
 
 def test_a_state_amid_a_landing_is_taken_up_to_the_bit() -> None:
     settings = ContactSettings.for_problem(HOPS, 5e-4)
-    model, _ = scene.build(HOPS, settings)
-    one, other = (JointedBall(Engine(model, HOPS, settings), START, 0.0) for _ in range(2))
+    one, other = (JointedBall(scene.build(HOPS, settings)[0], HOPS, settings, State(*START), 0.0) for _ in range(2))
     fluid, rows = np.full(10, HOPS.omega_0), np.empty((10, recorder.COLUMNS))
     one.advance(fluid, rows)  # the first step is a free ball's, too
     while one.state()["marks"][0] == NOT:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -40,14 +40,11 @@ def _wrong(
     fault: Stretch = nullcontext,
     **changes: Any,
 ) -> Engine:
-    def stream(
-        parameters: Sequence[Parameters], x0s: Any, t_end: float, flows: Any, settings: ContactSettings, **more: Any
-    ) -> mjsim.Run:
+    def stream(p: Parameters, x0: Any, t_end: float, flow: Any, settings: ContactSettings, **more: Any) -> mjsim.Run:
         with fault():
-            wrong = [ball(p) for p in parameters]
-            run = _Disguised(wrong, x0s, t_end, flows, replace(settings, **changes), **more)
+            run = _Disguised(ball(p), x0, t_end, flow, replace(settings, **changes), **more)
         run.fault = fault
-        run.headers = [replace(header, parameters=p) for header, p in zip(run.headers, parameters, strict=True)]
+        run.header = replace(run.header, parameters=p)
         return run
 
     return replace(MUJOCO, name=name, stream=stream)
