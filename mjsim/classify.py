@@ -12,7 +12,8 @@ share of the friction in use reaches one. Where that isn't within the step of th
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -35,18 +36,6 @@ _BACK = 16
 """Steps that are kept to locate a change: how long a slip that sets in may take to leave the dead band."""
 
 
-class Regularised(Protocol):
-    """What the classifier needs of an engine's settings, see `ContactSettings`."""
-
-    @property
-    def timestep(self) -> float: ...
-    @property
-    def rolls(self) -> float: ...
-    @property
-    def midpoint(self) -> float: ...
-    def regularisation_speed(self, load: npt.ArrayLike) -> Array: ...
-
-
 class Contacts(NamedTuple):
     """What the contacts A and B do in successive steps: arrays (steps, 2)."""
 
@@ -61,10 +50,20 @@ class Contacts(NamedTuple):
 
 
 class Classifier:
-    """The cases of a run; steps too recent to judge wait for the next ones."""
+    """The cases of a run; steps too recent to judge wait for the next ones.
 
-    def __init__(self, p: Parameters, settings: Regularised) -> None:
-        self._p, self._settings, self._coefficients = p, settings, np.array([p.mu, p.eta])
+    Parameters
+    ----------
+    timestep : s
+    midpoint : where in a step forces are found, in steps after its beginning
+    dead_band : slip speeds, m s-1, below which contacts roll, of their friction forces divided by the mass, m s-2
+    """
+
+    def __init__(
+        self, p: Parameters, timestep: float, midpoint: float, dead_band: Callable[[npt.ArrayLike], Array]
+    ) -> None:
+        self._p, self._timestep, self._midpoint, self._dead_band = p, timestep, midpoint, dead_band
+        self._coefficients = np.array([p.mu, p.eta])
         self.decided = 0
         """How many steps are."""
         self._waiting = 0
@@ -91,12 +90,12 @@ class Classifier:
 
     def _judge(self, contacts: Contacts) -> npt.NDArray[np.int_]:
         """What each step by itself says of the contacts, (steps, 2)."""
-        settings, (normal, friction, speed, _) = self._settings, contacts
+        normal, friction, speed, _ = contacts
         limit = self._coefficients * normal
         # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
         # below the speed that belongs to all of it.
         load = self._coefficients * np.maximum(normal / self._p.m, self._p.g)
-        band = settings.regularisation_speed(load) * settings.rolls
+        band = self._dead_band(load)
         saturated = friction >= (1 - _SATURATED) * limit
         # A rotation that slips at both contacts alike while one of them holds is creep, too: the load moves from one
         # to the other, as it may where both roll, and slip would be stopped by the one that holds.
@@ -118,7 +117,7 @@ class Classifier:
 
     def _note(self, step: int, steps: Array, old: Array, new: Array) -> None:
         """Note that a case begins with a step, the last one of `steps` (4, n, 2), and locate its beginning."""
-        mid = self._settings.midpoint
+        mid = self._midpoint
         closes, other = [], []
         for contact in np.flatnonzero(old != new).tolist():
             normal, friction, speed, gap = steps[..., contact]
@@ -138,7 +137,7 @@ class Classifier:
                 while len(free) - k < _BACK and k > 1 and free[k - 1] <= 0:
                     k -= 1
                 other.append(k - len(free) + 1 + _vanishes(free[:k], mid, (mid - 1, mid)))
-        located = (step + (min(closes) if closes else max(other))) * self._settings.timestep
+        located = (step + (min(closes) if closes else max(other))) * self._timestep
         self._changes.append((step, max(self._changes[-1][1], located), _code(old), _code(new)))
 
     def cases(self, steps: npt.NDArray[np.int_]) -> npt.NDArray[np.int8]:

@@ -19,7 +19,7 @@ if kernels.COMPILES:
 
 
 def loop(function: Any) -> Any:
-    """A loop that is compiled when it is called first, by one process at a time; for arrays of any layout.
+    """A loop that is compiled when it is called first, by one process at a time.
 
     So are the functions of mjsim that it calls, which must be known above it.
 
@@ -39,15 +39,11 @@ def loop(function: Any) -> Any:
     except RuntimeError:  # no place for a cache
         compiled = numba.njit(nogil=True, error_model="numpy")(function)
 
-    def kind(argument: Any) -> Any:
-        found = numba.typeof(argument)
-        return found.copy(layout="A") if isinstance(found, numba.types.Array) else found
-
     @functools.wraps(function)
     def call(*given: Any) -> Any:
         if not compiled.overloads:
             with kernels.alone(compiled):
-                compiled.compile(tuple(map(kind, given)))
+                compiled.compile(tuple(map(numba.typeof, given)))
         return compiled(*given)
 
     return call

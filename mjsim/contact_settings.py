@@ -1,20 +1,17 @@
 """Settings of MuJoCo's contact model, and the theory of what they do to a ball that slides and rolls.
 
-A row of a contact between ball and vessel sees the inverse mass ``A`` (1/m for a normal row). MuJoCo makes its force f
-and acceleration a obey ``a + R f = a_ref`` as long as f is inside the friction cone. Here ``R = (1 - d)/d A`` is the
-softness and d the impedance (`solimp`), ``R_t = R / impratio`` that of the friction rows; and
+Force f and acceleration a of a row obey ``a + R f = a_ref`` inside the friction cone, with ``R = (1 - d)/d A`` of the
+inverse mass A and the impedance d (`solimp`), ``R_t = R / impratio`` in friction rows, and
 
     normal row:    a_ref = -b v - k (gap - margin),   b = 2/(d tc),   k = 1/(d tc^2 dr^2),   solref = (tc, dr)
     friction rows: a_ref = -b_f v,                    b_f = 2/(d tc_f),                      solreffriction = tc_f
 
-On the cone the complementarity of the convex problem couples slip into the normal row. With ``w = a - a_ref + R f`` of
-the friction rows, the normal row becomes ``a + R f = a_ref + mu |w|``, and in steady motion
+On the cone, slip lifts the contact: with ``w = a - a_ref + R_t f`` of the friction rows, in steady motion
 
     k (margin - gap) = R f - mu |w|,   |w| = b_f v_slip (with memory),   b_f v_slip - mu R_t f (without).
 
-The left side must be positive, or there is no contact: sliding is continuous only while ``mu |w| < R f``. Beyond, the
-contact switches on and off from step to step, hovering over the wall. Everything below follows from these lines. With
-memory ``mu |w|``, as far as it is foreseen, is taken away (`corrections`), and contacts don't hover.
+Without memory, which takes ``mu |w|`` away (`corrections`), sliding is continuous only while ``mu |w| < R f``: beyond,
+the contact switches on and off from step to step.
 """
 
 from __future__ import annotations
@@ -124,15 +121,6 @@ class ContactSettings:
         return min(limits + ([self.servo] if self.servo else []))
 
     @property
-    def spring(self) -> tuple[float, float]:
-        """`solref` as stiffness and damping, negative as the engine wants them, s-2 and s-1.
-
-        Of times it would cut the square of d times a time constant off at 1e-15 s2.
-        """
-        time, ratio = self.solref
-        return -1 / (time * ratio) ** 2, -2 / time
-
-    @property
     def b_f(self) -> float:
         """Damping of the friction rows, s-1."""
         return 2 / (self.solimp * self.solreffriction)
@@ -165,10 +153,9 @@ class ContactSettings:
         time = FORESEEN * self.timestep if self.rigid else self.softness / self.impratio / self.b_f
         return np.asarray(time * np.asarray(load, dtype=float))
 
-    @property
-    def rolls(self) -> float:
-        """Share of `regularisation_speed` below which a contact rolls: without memory one that does creeps so fast."""
-        return 1.0 if self.rigid else 1e-3 if self.memory else 0.4
+    def dead_band(self, load: npt.ArrayLike) -> Array:
+        """Slip speed (m s-1) below which a contact under the friction force m `load` rolls, and may creep."""
+        return self.regularisation_speed(load) * (1.0 if self.rigid else 1e-3 if self.memory else 0.4)
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory.
@@ -187,11 +174,6 @@ class ContactSettings:
         """How far in steps past the middle of a step friction takes its direction by itself, 1/(b_f h) - 1/2."""
         corrected = self.order == 2 and self.cone == "elliptic"
         return 1 / (self.b_f * self.timestep) - 0.5 if corrected else 0.0
-
-    @property
-    def shifts_surfaces(self) -> bool:
-        """Whether floor and wall get surface velocities."""
-        return self.memory or self.friction_lag != 0
 
     def contact_decay(self, mu: float, eta: float) -> float:
         """Largest factor by which a small displacement changes in a step, where a ball slips at both contacts.

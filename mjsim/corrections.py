@@ -217,12 +217,3 @@ def lands(gap: float, speed: float, last: float, ball: Ball) -> bool:
     gap = gap - ball.step * ball.ahead * (speed + ball.ahead / 2 * change)  # at the beginning
     end, closing = gap + ball.step * (speed + change / 2), speed * speed - 2 * change * gap / ball.step
     return end < 0 and speed + change < 0 and closing > ball.fall * ball.fall
-
-
-def followed(margin: float, gap: float, gain: float) -> float:
-    """Servo of a margin: it takes a share `gain` of the gap, not below 0, until the gap is zero.
-
-    The contact point lies midway in the overlap, so that a ball that sinks in rolls on a shorter lever.
-    """
-    left = margin - gain * gap
-    return left if left > 0 else 0.0

@@ -87,7 +87,7 @@ class Run:
         }  # fmt: skip
         self.header = Header("mujoco", p, self._flow, shown, mjcf)
         """Where the trajectory comes from; a failure appears here."""
-        self._classifier = Classifier(p, self._settings)
+        self._classifier = Classifier(p, self._timestep, self._settings.midpoint, self._settings.dead_band)
         self._end = math.inf
         """When it broke down, s."""
 

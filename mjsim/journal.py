@@ -32,20 +32,21 @@ class Journal:
     def __init__(self, directory: Path, interval: float = 30.0) -> None:
         self._directory, self._interval = directory, interval
         remove_leftovers(directory)
-        self._count = len(list(directory.glob("*.h5")))
+        self._segments = sorted(directory.glob("*.h5"))
         self._waiting: list[Array] = []
         self._last = time.monotonic()
 
     def recall(self) -> tuple[Iterator[Array], dict[str, Array]]:
-        """Blocks of raw samples (samples, runs, columns) so far, one at a time, and the state after them, if any.
+        """Blocks of raw samples (samples, columns) so far, one at a time, and the state after them, if any.
 
         Raises `StorageError`, the blocks when they are read, if a segment is damaged.
         """
-        return (self._read(k)[0] for k in range(self._count)), self._read(self._count - 1)[1] if self._count else {}
+        blocks = (self._read(path)[0] for path in self._segments)
+        return blocks, self._read(self._segments[-1])[1] if self._segments else {}
 
-    def _read(self, k: int) -> tuple[Array, dict[str, Array]]:
+    def _read(self, path: Path) -> tuple[Array, dict[str, Array]]:
         """The samples of a segment, and the state after them."""
-        with reading(self._path(k), f"remove {self._directory} to start anew") as file:
+        with reading(path, f"remove {self._directory} to start anew") as file:
             return file["samples"][...], {name: part[...] for name, part in file["state"].items()}
 
     def note(self, samples: Array, state: dict[str, Array]) -> None:
@@ -54,19 +55,16 @@ class Journal:
         if time.monotonic() - self._last < self._interval:
             return
         make_directory(self._directory)
-        with WholeFile(self._path(self._count)) as whole:
+        path = self._directory / f"{len(self._segments):06d}.h5"
+        with WholeFile(path) as whole:
             whole.file["samples"] = np.concatenate(self._waiting)
             for name, values in state.items():
                 whole.file[f"state/{name}"] = values
             whole.finish()
-        self._count += 1
-        self._waiting = []
-        self._last = time.monotonic()
+        self._segments.append(path)
+        self._waiting, self._last = [], time.monotonic()
 
     def discard(self) -> None:
         """Remove all segments, when the run itself is stored."""
-        if self._count:
+        if self._segments:
             shutil.rmtree(self._directory)
-
-    def _path(self, k: int) -> Path:
-        return self._directory / f"{k:06d}.h5"

@@ -8,7 +8,7 @@ which the margins follow.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -36,22 +36,6 @@ _LEAST = 16
 """A blow just after the beginning or before the end of a whole step has a step shorter by up to that."""
 
 
-class Landed(NamedTuple):
-    """How a ball goes on upon its joints."""
-
-    place: Array
-    """Azimuth, h and y, (3,)."""
-    velocity: Array
-    rates: Array
-    """Velocities of the joints and what a second changes of them, (6,)."""
-    forces: Array
-    """Generalised forces of the contacts (6) and their normal forces (2), as the engine has them, N and N m."""
-    change: float
-    """What a component of the contact forces would change in a whole step at the pace of the end, at most, N."""
-    seen: Array
-    """Sensors at the beginning, (`NSENSOR`,)."""
-
-
 class Fine:
     """One ball that takes steps of some settings in shorter ones."""
 
@@ -61,9 +45,18 @@ class Fine:
         self._ball = FreeBall(scene.build(p, rigid)[0], p, rigid, State(), 0.0, share=_SHARE)
         self._ball.lead, self._reach = 0.0, float(self._ball.model.pair_margin.max())
 
-    def step(self, x: State, theta: float, rates: Array, omega_0: float, finely: bool = False) -> Landed:
+    def step(
+        self, x: State, theta: float, rates: Array, omega_0: float, finely: bool
+    ) -> tuple[Array, Array, Array, Array, float, Array]:
         """A whole step from a state, with velocities of the joints that change at such rates; `finely` if there was a
-        blow a short time ago, or there isn't one in a first step, whose forces are the start of all that follow."""
+        blow a short time ago, or there isn't one in a first step, whose forces are the start of all that follow.
+
+        Returns
+        -------
+        azimuth, h and y; velocities of the joints, and what a second changes of them; generalised forces of the
+        contacts (6) and normal ones (2), as the engine has them, N and N m; what a component of the contact forces
+        would change in a whole step at the pace of the end, at most, N; sensors at the beginning
+        """
         ball, seen = self._ball, np.zeros((4, recorder.NSENSOR))
         ball.place(x, theta)
         rho = self._p.R - float(x.h)
@@ -79,7 +72,7 @@ class Fine:
         (A_x, A_y, A_z), (B_x, B_y, B_z) = last
         forces = np.array([0, A_x + B_x, A_y + B_y, -self._p.r * A_z, self._p.r * B_z, 0, A_y, B_x])
         change = float(np.abs(last - first).max()) / since * self._whole if since > 0 else math.inf
-        return Landed(np.array(place), v, (v - before) / duration, forces, change, seen[0])
+        return np.array(place), v, (v - before) / duration, forces, change, seen[0]
 
 
 def closes(gap: float, speed: float, rate: float, fall: float) -> float:

@@ -8,14 +8,12 @@ import warnings
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
 from model import Flow, Parameters, State, time_scales
+from model.kinematics import check_place
 from model.parameters import Range, check_number
 
 
 def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
-    """Refuse a state on or beyond the axis, where polar coordinates end.
-
-    Warn if friction at both contacts makes them chatter.
-    """
+    """`check_place`, and a warning if friction at both contacts makes them chatter."""
     if settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
             f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters with these settings; "
@@ -23,12 +21,6 @@ def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
             stacklevel=4,
         )
     check_place(x, p, settings.touching(p.g))
-
-
-def check_place(x: State, p: Parameters, depth: float) -> None:
-    """Refuse a ball deeper in floor or wall than `depth`, m, or on the axis, where its orbit has no direction."""
-    check_number("y", x.y, "m", Range(-depth), "to be above the floor it")
-    check_number("h", x.h, "m", Range(-depth, p.R, below=True), "to be between wall and axis it")
 
 
 def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> None:

@@ -78,7 +78,7 @@ def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[An
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile the scene: {' '.join(str(error).split())}") from error
     # Without any in the scene, the engine looks at surface velocities and adhesion only if these flags say so.
-    model.flg_surfacevel, model.flg_adhesion = settings.shifts_surfaces, settings.memory
+    model.flg_surfacevel, model.flg_adhesion = settings.memory or settings.friction_lag != 0, settings.memory
     return model, text
 
 
@@ -86,7 +86,8 @@ def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:
     # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one row.
     pair.condim = 3 if friction > 0 else 1
     pair.friction = (friction, friction, 0.0, 0.0, 0.0)
-    pair.solref = settings.spring
+    time, ratio = settings.solref  # as stiffness and damping: of times the engine would cut (d tc)^2 off at 1e-15 s2
+    pair.solref = -1 / (time * ratio) ** 2, -2 / time
     pair.solreffriction = (settings.solreffriction, 1.0)
     pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
     pair.margin = pair.gap = 0.0

@@ -23,7 +23,7 @@ import numpy as np
 from mjsim import recorder
 from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Velocity, corrections, eventful, followed, near_axis
+from mjsim.corrections import Ball, Velocity, corrections, eventful, near_axis
 from mjsim.coulomb import compiled as kernels
 from mjsim.landing import Fine
 from mjsim.recorder import COORDINATES, HUGE, NORMALS, NSENSOR, SENSORS
@@ -95,8 +95,8 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
     loads = float(forces[6]), float(forces[7])
     if body.marks[_DUE] == NOT and loads[0] * loads[1] == 0 and eventful(h, y, v, before, loads, ball):
         body.marks[_DUE] = LANDS
-    if ball.gain > 0:
-        margins[0], margins[1] = followed(float(margins[0]), y, ball.gain), followed(float(margins[1]), h, ball.gain)
+    if ball.gain > 0:  # a ball that sinks in rolls on a shorter lever: its contact point lies midway in the overlap
+        margins[0], margins[1] = max(0.0, margins[0] - ball.gain * y), max(0.0, margins[1] - ball.gain * h)
     body.turn[0], body.turn[3] = math.cos(theta / 2), math.sin(theta / 2)
     qpos[3], qpos[4], qpos[5], qpos[6] = 1.0, 0.0, 0.0, 0.0
     driving, surfaces, (lift_A, lift_B) = corrections(v, before, ball.R - h, omega_0, given, loads, ball)
@@ -216,19 +216,18 @@ class JointedBall:
         ahead, v = body.qpos[:3].copy(), body.qvel.copy()
         rates = (v - body.last) / self._h
         place = ahead - self.lead * (v + rates * self.lead / 2)[:3]
-        landed = self._fine.step(recorder.state(place, v, p), float(place[0]), rates, omega_0, how != LANDS)
-        row[SENSORS:], row[-2:] = landed.seen, ahead[:0:-1]
-        v = landed.velocity
-        near = near_axis(p.R - landed.place[1], Velocity(*v), body.ball) and landed.forces[7] == 0
+        x, theta = recorder.state(place, v, p), float(place[0])
+        place, v, rates, body.forces[:], change, row[SENSORS:] = self._fine.step(x, theta, rates, omega_0, how != LANDS)
+        row[-2:] = ahead[:0:-1]
+        near = near_axis(p.R - place[1], Velocity(*v), body.ball) and body.forces[7] == 0
         pace = max(abs(v[0]), math.sqrt(p.g / p.R))
-        most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(landed.forces[[1, 2]]).max())
-        fast = landed.change > _CHANGE * self._h * pace * most and how != BEGINS
+        most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(body.forces[[1, 2]]).max())
+        fast = change > _CHANGE * self._h * pace * most and how != BEGINS
         body.marks[_DUE] = GOES_ON if near or fast else NOT
-        body.forces[:] = landed.forces
-        self._set(landed.place, v, landed.rates * (not near))
+        self._set(place, v, rates * (not near))
         if self._settings.servo:
-            loads = landed.forces[6:] / p.m
-            body.margins[:] = np.maximum(landed.place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
+            loads = body.forces[6:] / p.m
+            body.margins[:] = np.maximum(place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from model.arrays import Array, Real
 from model.errors import InputError
-from model.parameters import Parameters
+from model.parameters import Parameters, Range, check_number
 
 
 class State(NamedTuple):
@@ -78,6 +78,12 @@ def state_units(p: Parameters) -> Array:
     """Natural sizes of the state (8,): R, sqrt(g R), sqrt(g/R), and sqrt(g R)/r for slip."""
     speed = math.sqrt(p.g * p.R)
     return np.array([p.R, speed, speed / p.R, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
+
+
+def check_place(x: State, p: Parameters, depth: float = 0.0) -> None:
+    """`InputError` for a ball deeper in floor or wall than `depth`, m, or on the axis, where polar coordinates end."""
+    check_number("y", x.y, "m", Range(0.0 - depth), "to be above the floor it")
+    check_number("h", x.h, "m", Range(0.0 - depth, p.R, below=True), "to be between wall and axis it")
 
 
 class Motion(NamedTuple):

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from analytic.mechanics import drag
 from model import Flow, InputError, Parameters, State, time_scales
 from model.arrays import Array
+from model.kinematics import check_place
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
 
 MAX_SAMPLES = 5e7
@@ -84,8 +85,7 @@ def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
             "method = 'time-stepping' takes it"
         )
     x = State.one(x0)
-    check_number("y", x.y, "m", NOT_NEGATIVE, "to be above the floor it")
-    check_number("h", x.h, "m", Range(0.0, p.R, below=True), "to be between wall and axis it")
+    check_place(x, p)
     if not settings.initial_impact:
         for place, gap, name, speed in (("floor", x.y, "v_y", x.v_y), ("wall", x.h, "v_h", x.v_h)):
             if gap == 0:

@@ -24,7 +24,7 @@ from mjsim.corrections import Ball, resistance
 from mjsim.engine import EVENT_TIMES
 from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
-from model.kinematics import Motion, frame, from_world, to_world
+from model.kinematics import Motion, check_place, frame, from_world, to_world
 from model.parameters import POSITIVE, check_number
 from model.trajectory import samples
 from model.versions import current_versions
@@ -33,6 +33,9 @@ _HUGE = 1e8
 """A coordinate, velocity or force beyond this, in SI units, has diverged."""
 _REACH = 1e-3
 """Gap, in radii, up to which a contact is closed by what is seen of the motion alone."""
+_ROLLS = 3.0
+"""Slip speed, in units of the least that an engine tells from rolling, up to which a contact rolls: how exact that is
+isn't known."""
 NOTED = 1024
 """Steps of which the cases are told at once."""
 _CARRIED = 5
@@ -83,21 +86,6 @@ class Vessel(Scene):
         return float(-mc * w_x), float(-mc * w_y), float(-mc * v_z)
 
 
-@dataclass(frozen=True)
-class _RollingBand:
-    """Up to which slip speed an engine's contact is called rolling, for the classifier (`mjsim.classify`)."""
-
-    timestep: float
-    midpoint: float
-    """Where in a step forces are found, in steps."""
-    resolution: float
-    rolls: float = 3.0
-    """Share of `resolution` up to which a contact rolls: how exact that speed is isn't known."""
-
-    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        return np.full(np.shape(load), self.resolution)
-
-
 def simulate(library: Library, member: str, task: Any, progress: Callable[[float], None]) -> Trajectory:
     """One run, a `compare.kit.tasks.Task`, with one of the adapters of an engine's library.
 
@@ -119,7 +107,7 @@ def simulate(library: Library, member: str, task: Any, progress: Callable[[float
             f"fluid_torque = {p.fluid_torque:g} s-1: {task.engine} leaves it out; mujoco, time-stepping don't"
         )
     x = State.one(task.x0)
-    limits.check_place(x, p, p.r / 10)
+    check_place(x, p, p.r / 10)
     total, failure = (count - 1) * every + 1, ""  # of the last sample only forces are needed
     with closing(library.load(member)) as engine:
         try:
@@ -157,8 +145,8 @@ class _Steps:
     def __init__(self, engine: Free, timestep: float, p: Parameters, every: int, along: float) -> None:
         """One of `every` steps is a sample; `along` is how fast the plane that stands for the wall slips, m s-1."""
         self.engine, self.timestep, self.p, self.every, self.done = engine, timestep, p, every, 0
-        self.band = _RollingBand(timestep, engine.ahead / timestep, engine.RESOLUTION + along)
-        self.classifier = Classifier(p, self.band)
+        self.band = band = _ROLLS * (engine.RESOLUTION + along)
+        self.classifier = Classifier(p, timestep, engine.ahead / timestep, lambda load: np.full(np.shape(load), band))
         self.kept = list[npt.NDArray[np.void]]()
         self._rows, self._told, self._theta = np.empty((NOTED, 9 + 2 * _CARRIED)), 0, 0.0
 
@@ -204,7 +192,7 @@ def _samples(time: Array, rows: Array, theta: float, ahead: float, p: Parameters
     return block
 
 
-def _contacts(block: npt.NDArray[np.void], band: _RollingBand, p: Parameters) -> Contacts:
+def _contacts(block: npt.NDArray[np.void], band: float, p: Parameters) -> Contacts:
     """Loads, friction, slip speeds and gaps of both contacts at samples (n,), for the classifier.
 
     Where forces aren't known a closed contact bears 1 N, and uses all of its friction if it slips.
@@ -213,7 +201,7 @@ def _contacts(block: npt.NDArray[np.void], band: _RollingBand, p: Parameters) ->
     if np.isnan(A).any():
         A[:], B[:] = 0.0, 0.0
         A[:, 1], B[:, 0] = block["gap_A"] < _REACH * p.r, block["gap_B"] < _REACH * p.r
-        fast = 3 * band.rolls * band.resolution
+        fast = 3 * band
         A[:, 2] = p.mu * A[:, 1] * (block["slip_speed_A"] > fast)
         B[:, 2] = p.eta * B[:, 0] * (block["slip_speed_B"] > fast)
     each = (

@@ -26,7 +26,11 @@ def made(cases):
 
 
 def classified(steps, sizes):
-    classifier, start, count = Classifier(P, SETTINGS), 0, len(steps.normal)
+    classifier, start, count = (
+        Classifier(P, SETTINGS.timestep, SETTINGS.midpoint, SETTINGS.dead_band),
+        0,
+        len(steps.normal),
+    )
     for size in sizes:
         stop = min(start + size, count)
         classifier.add(Contacts(*(each[start:stop] for each in steps)), stop == count)
