@@ -96,6 +96,8 @@ def drawn(command: str) -> Iterator[list[str]]:
             bad = [[text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in numbers]
         if action.dest == "start":
             bad += [[f"omega_c={text}"] for text in ("x", "nan", "1e300", "")]
+        if isinstance(action.type, options.Output):  # a name that promises something else
+            bad += [[name] for name in ("mine", "mine.py", *MINE) if Path(name).suffix not in action.type.suffixes]
         if action.option_strings:
             yield from ([*given, action.option_strings[-1], *text] for text in [[], *bad])
         else:
