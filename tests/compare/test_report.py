@@ -137,6 +137,13 @@ def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page):
         assert said in re.sub("</?b>", " ", text)
 
 
+@pytest.mark.parametrize(("predicted", "said"), [(12.0, "none: all equal"), (1.0, "not equal: case, reference")])
+def test_counts_are_equal_or_not(predicted, said):
+    m = dataclasses.replace(checks(1)[0].measurement, quantity="case")
+    check = Check(measurement=m, predicted=predicted, tolerance=0.0, scale=1.0)
+    assert wording.findings(dataclasses.replace(RAN[0], checks=(check,))) == {"Largest deviation": said}
+
+
 def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypatch):
     def refuse(_):
         raise GapError("the run <is> lost")
