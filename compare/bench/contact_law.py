@@ -74,6 +74,7 @@ class Contacts:
 
     @property
     def _frictional(self) -> Array:
+        """Whether a contact has each of the five frictions, (n, 5)."""
         return np.arange(1, 6) < self.dim[:, None]
 
     @property

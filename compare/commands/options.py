@@ -231,8 +231,7 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
 
 
 def terminal(**look: Any) -> Console:
-    """A console that leaves it to the program what to do where nobody reads on; wide enough for any table off a
-    terminal."""
+    """A console of rich that is wide enough for any table off a terminal, and lets a broken pipe be an error."""
     from rich.console import Console  # here, because help needs none
 
     class Terminal(Console):

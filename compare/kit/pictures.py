@@ -72,11 +72,11 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
     made = {}
     for k, (name, picture) in enumerate(pictures.items()):
 
-        def letter(found: re.Match[str]) -> str:
+        def collect_letter(found: re.Match[str]) -> str:
             letters[found[1]] = found[0]
             return ""
 
-        text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', letter, picture).replace("<defs></defs>", "")
+        text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', collect_letter, picture).replace("<defs></defs>", "")
         text = re.sub(r"<style.*?</style>", "", text)  # for all lines of a picture: pages have it, too
         text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace("xlink:href", "href")
         made[name] = re.sub(r'^<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', _svg_start, text)
@@ -163,13 +163,13 @@ def _renumber(root: ElementTree.Element) -> None:
     """Name what is referred to, but letters, in order, and nothing else: matplotlib's names are drawn by lot."""
     names: dict[str, str] = {}
 
-    def named(found: re.Match[str]) -> str:
+    def new_name(found: re.Match[str]) -> str:
         return found[1] + (found[2] if "-" in found[2] else names.setdefault(found[2], f"n{len(names)}"))
 
     for each in root.iter():
         for attribute in (f"{_XLINK}href", "clip-path", "style", "marker-start", "marker-mid", "marker-end"):
             if "#" in (text := each.get(attribute, "")):
-                each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", named, text))
+                each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", new_name, text))
     for each in root.iter():
         if "id" in each.attrib and "-" not in each.attrib["id"]:
             name = each.attrib.pop("id")

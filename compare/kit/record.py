@@ -144,8 +144,7 @@ class Check:
 
     @property
     def share(self) -> float:
-        """Size of the deviation divided by the tolerance; inf where theory knows no such state, or without
-        tolerance."""
+        """Size of the deviation divided by the tolerance; inf without tolerance, or where theory has no such state."""
         if self.deviation == 0:
             return 0.0
         share = abs(self.deviation / self.tolerance) if self.tolerance else math.inf

@@ -76,9 +76,9 @@ class Patience:
 
 
 def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -> list[Settled]:
-    """Run the ball from each start until it is settled: the states, in order. Of an engine as it comes every state
-    counts, for what it is when time is up.
+    """Run the ball from each start until it is settled; the states, in order.
 
+    Of an engine as it comes every state counts, for what it is when time is up.
     What isn't settled goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land.
     """

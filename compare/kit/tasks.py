@@ -145,12 +145,12 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
     check = deadline(limit)
     if task.simulator.simulate:
 
-        def interrupted() -> None:
+        def check_stop() -> None:
             check()
             if stop():
                 raise InterruptedError("interrupted")
 
-        (run,) = carry_out([task], interrupted)
+        (run,) = carry_out([task], check_stop)
         failure = run.header.failure
         storage.save(run, failed_path(path) if failure else path)
     else:

@@ -45,7 +45,7 @@ def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
 def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
     """Two columns, one a parameter set: the curve above, deviations from the nearest attracting solution below."""
 
-    def nearest(m: Measurement) -> float:
+    def nearest_prediction(m: Measurement) -> float:
         omega_c = [float(s.state.omega_c) for s in analytic.stable_solutions(m.parameters)]
         return min(omega_c, key=lambda w: abs(m.value / w - 1), default=np.nan)
 
@@ -60,7 +60,7 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         style.legend(above, loc="upper left", frameon=False)
         style.dimensionless(above, p, style.FREE_0)
         above.grid(alpha=0.25)
-        style.deviations(below, curve.states, nearest)
+        style.deviations(below, curve.states, nearest_prediction)
         below.set(xlabel=style.OMEGA_0)
     sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
     states = [m for curve in curves for m in curve.states]

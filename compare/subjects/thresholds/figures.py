@@ -205,7 +205,7 @@ def _draw_round_with_fluid(
 
 
 def draw_diagram(of: Diagram) -> tuple[Figure, str]:
-    """One diagram, with both scales."""
+    """A bifurcation diagram, the spin on the wall over the flow, with both scales; and its caption."""
     figure, p = style.figure(5.8, 4.1), of.p
     axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
     draw = partial(_draw_round_with_fluid, axes, p)

@@ -174,9 +174,7 @@ class Round(NamedTuple):
 def _settled_rounds(
     lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
 ) -> list[list[Round] | str]:
-    """Runs in pulsations of these amplitudes until they are settled: the last two of each, the last with half the step,
-    or why one broke down.
-
+    """Runs in pulsations until they are settled: the last two of each, the last with half the step, or its error.
     A ball that slips goes on with the rest of its last state.
     """
     states, seen = [each.start(a) for each, a in driven], list[list[Round] | str]([[]] * len(driven))

@@ -152,9 +152,7 @@ class Push:
     def following_case(
         self, lab: Lab, protocol: str, size: float, tasks: Sequence[Task], runs: Sequence[Trajectory]
     ) -> Measurement | None:
-        """The case that follows where a slip doesn't last, if runs with both steps agree; None if it lasts, or they
-        don't, since a change is detected some steps late.
-        """
+        """The case that follows where a slip doesn't last; None if it lasts, or runs with both steps disagree."""
         coarse, fine = runs
         ended = int(fine.case[-1])
         if ended == self.outer or np.any(coarse.case[-SETTLED:] != ended) or np.any(fine.case[-SETTLED:] != ended):

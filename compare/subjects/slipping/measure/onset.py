@@ -258,7 +258,7 @@ class Arrow:
         return self.p.replace(omega_0=leads * omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
 
     def task(self, omega_c: float, times: int = 1) -> Task:
-        """The run from there, with steps half as long as those of `REFINED`, divided by `times`."""
+        """A short run from the orbit at omega_c, with steps half as long as those of `REFINED`, divided by `times`."""
         step = coarse_step(self.p) / (2 * REFINED * times)
         return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
 
@@ -269,9 +269,7 @@ class Arrow:
         return runs[first : [*strays, True].index(True, first)]
 
     def tasks_near_onset(self, kept: Sequence[Trajectory]) -> list[Task]:
-        """Tasks just below the orbit at which the ball lifts off, if it does: where the line over omega_c^2 through the
-        floor's forces at the last two orbits before vanishes.
-        """
+        """Tasks just below the orbit at which the ball lifts off by a line through the last two forces of the floor."""
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
         if not 2 <= len(pressed) < len(kept):
             return []

@@ -56,9 +56,7 @@ From = Callable[[Parameters], Array]
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Begin between flows whose settled cases differ; bisect; settle states beside each change; bisect again from
-    these, and extrapolate them.
-    """
+    """The thresholds of each set: bisected between flows whose settled cases differ, and extrapolated from states."""
     sure = not lab.effort.granted
     found = [_changes(lab, name, p, records) for name, p in sets.items()]
     found = _narrowed(lab, found, _end_of_rolling, careful=sure)
@@ -77,8 +75,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What was found on one set so far, by kind: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or
-    where slip of a "riding" ball ends.
+    """What was found on one set so far, by kind of change of the motion.
+
+    Kinds: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or where slip of a "riding" ball ends.
     """
 
     lab: Lab
@@ -150,8 +149,7 @@ Questions = Callable[[Findings], Iterator[tuple[str, Search]]]
 
 
 def _changes(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
-    """Where to look on a set: between the fastest flow at which a ball was seen to settle so, and the next at which it
-    settled otherwise.
+    """For each kind of change the bracket of flows between which settled cases differ, so where to look for it.
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one on trial looks where
     that one found something.
@@ -279,9 +277,7 @@ def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
 
 
 def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
-    """The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
-    the branch.
-
+    """A search for the largest flow at which a ball on the floor settles, about the maximum of omega_0 on the branch.
     At a fold all slows down, like the root of the distance.
     """
     top, _ = _end_of_slipping(each)
