@@ -175,7 +175,7 @@ def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missin
 
 
 def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
-    """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them."""
+    """Sizes of deviations divided by their scales, of checks that are certain enough to show them."""
     numbers = (c for c in checks if quantity(c.measurement.quantity).resolves and c.relation is Relation.EQUAL)
     off = (abs(c.deviation / c.scale) for c in numbers if c.scale > 10 * c.tolerance)
     return tuple(each for each in off if math.isfinite(each))

@@ -81,7 +81,7 @@ def _grooves() -> list[Case]:
         return Surface("left", mu, normal=left), Surface("right", mu, normal=right)
 
     def descends(t: Array, angle: float, size: float, lever: float = 2 * 0.4, mu: float = 9.0) -> Any:
-        """At g sin/(1 + j/sin^2 45) if it rolls, where friction allows; a block can't."""
+        """A body goes down at g sin/(1 + j/sin^2 45) if it rolls, where friction allows; a block can't."""
         way, normal = slope(angle)
         a = max(G * math.sin(angle) / (1 + lever), G * (math.sin(angle) - mu * math.cos(angle) / half))
         spin = a * t / (half * size) if lever < 9 else 0 * t

@@ -190,7 +190,7 @@ def _median(values: Iterator[float]) -> float:
 
 
 def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
-    """A panel for each kind of case: the median of an engine's errors over that of its costs, its steps joined."""
+    """A figure with a panel for each kind of case: an engine's median error over its median cost, its steps joined."""
     from matplotlib.ticker import NullFormatter  # here, because drawing takes a second to load
 
     from compare.kit import style

@@ -102,7 +102,7 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
 
 
 def _table(data: dict[str, Any]) -> pages.Rows:
-    """A row for each attractor of each set."""
+    """A table with a row for each attractor of each set."""
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
     head = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
     rows = [[*varied, *head]]

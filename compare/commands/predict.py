@@ -44,7 +44,7 @@ def show_parameters(args: argparse.Namespace) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Predict and show."""
+    """Show what theory predicts of a parameter set."""
     data = described(p := options.parameters(args))
     options.show(data, args.json, *tables(p, data))
     return 0
@@ -83,7 +83,7 @@ def described(p: Parameters) -> dict[str, Any]:
 
 
 def reading(p: Parameters) -> str:
-    """What a flowmeter would show, in words."""
+    """In words what the ball's orbit says of the flow: its stable cases and lag."""
     attractors = analytic.stable_solutions(p)
     cases = list(dict.fromkeys(solution.case for solution in attractors))
     if not cases:

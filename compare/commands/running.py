@@ -54,7 +54,7 @@ def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
 
 
 def workers(args: argparse.Namespace) -> Workers:
-    """What the options of `add_workers` name."""
+    """The workers that the options of `add_workers` name."""
     return dask(args.scheduler) if args.scheduler else processes(args.workers)
 
 

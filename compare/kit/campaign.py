@@ -142,7 +142,7 @@ class Campaign:
 
     @property
     def at_once(self) -> int:
-        """How many parts keep the workers busy: two more than there are workers, as some wait for a single long run."""
+        """How many parts to carry out at once: two more than workers, as some parts wait for a single long run."""
         count = self._workers.count
         return count + 2 if count > 1 else 1
 

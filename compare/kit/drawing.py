@@ -65,7 +65,7 @@ class GapError(Exception):
 
 
 def only_where(p: Parameters, folds: bool) -> None:
-    """Raise `GapError` unless the wall of a set has less friction than j (`folds`), or more."""
+    """Raise `GapError` unless eta < j in a set, if a figure shows folds, or else eta > j."""
     if (p.eta < p.j) != folds:
         raise GapError(f"it is for η {'<' if folds else '>'} j, here η = {p.eta:g} and j = {p.j:g}")
 

@@ -92,20 +92,20 @@ class ValidationProgress:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def measuring(self, protocol: str, done: int, total: int, failed: int) -> None:
-        """So many runs of a protocol are done, of so many that are known so far, and so many failed."""
+        """Note how many runs of a protocol are done, how many are known so far, and how many failed."""
         with self._lock:
             self._under_way[protocol] = done, total, failed
             self._tell()
 
     def measured(self, protocol: str) -> None:
-        """A protocol is done."""
+        """Note that a protocol is done."""
         with self._lock:
             self._under_way.pop(protocol, None)
             self._measured += self.costs[protocol]
             self._tell()
 
     def judged(self) -> None:
-        """One more claim is judged."""
+        """Note that one more claim is judged."""
         with self._lock:
             self._judged += 1
             self._tell()

@@ -52,7 +52,7 @@ def plain(value: Any) -> Any:
 
 
 def taper(length: int) -> Array:
-    """The tapered window (n,)."""
+    """Weights (n,) of a tapered window, which fall to zero at both ends."""
     return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
 
 
@@ -72,7 +72,7 @@ def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
 
 
 def tail(run: Trajectory, share: float = 0.1) -> slice:
-    """The samples of the last part of a run."""
+    """The slice of samples of the last part of a run."""
     return slice(int((1 - share) * len(run.time)), None)
 
 

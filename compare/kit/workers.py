@@ -222,7 +222,7 @@ def dask(address: str) -> Workers:
 
 @contextmanager
 def threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads that an error doesn't wait for: they end by themselves, and what they still do is of no use."""
+    """A context with a pool of threads for which an error doesn't wait: they end by themselves."""
     pool = ThreadPoolExecutor(count)
     try:
         yield pool

@@ -43,7 +43,7 @@ def view(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings
 
 
 def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> JointedBall:
-    """The simulation, with what only serves contact out of sight."""
+    """A simulation for the viewer, with what only serves contact hidden."""
     if settings.scene != "joints":
         raise InputError("the viewer shows scene = 'joints' only")
     limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))

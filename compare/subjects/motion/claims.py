@@ -37,7 +37,7 @@ def _sinking(m: Measurement) -> float:
 
 
 def _end_of_motion(m: Measurement) -> float:
-    """A column of theory's motion where the measured one ends."""
+    """A state variable of theory's motion at the time at which the measured one ends."""
     flow = late_ramp(m.parameters, m.at("rate"), m.at("time")) if "rate" in m.conditions else None
     motion = simulated(m.parameters, state(m), m.at("time"), flow=flow)
     return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])

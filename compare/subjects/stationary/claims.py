@@ -263,7 +263,7 @@ DIAGRAMS = (
     claim(
         "double-points",
         "Figs. 7 and 8, black dots",
-        "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j all thresholds are ω₀₃ = √(g/(jR)), where rolling ends.",
+        "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j all thresholds are √(g/(jR)), and rolling ends.",
         Bearing("birth", "critical_drag", _drag_at_birth, by=_DOUBLE),
         Bearing("thresholds", "omega_03", lambda m: bifurcation.double_points(m.parameters)[-1].omega_0, by=_DOUBLE),
     ),

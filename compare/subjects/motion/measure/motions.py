@@ -223,7 +223,7 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
-    """Where pieces begin, about evenly spread: their ends are away from changes of case.
+    """Samples at which pieces of a run begin, about evenly spread, whose ends are away from changes of case.
 
     There the gap of an open contact exceeds 1e-4 R, for an unloaded one may hover; a slipping one slips by more than
     weight causes in the two steps by which landings may be late; a rolling one needs 1 % less friction than it may, for
@@ -294,7 +294,7 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _landing(name: str, p: Parameters, how: str) -> Trial:
-    """A motion in which a ball lands."""
+    """The trial of a motion in which a ball lands."""
     start = _start(name, p, 0.8, LANDINGS[how], how)
     step = coarse_step(start.p) / REFINED
     conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}

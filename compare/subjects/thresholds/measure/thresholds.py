@@ -93,7 +93,7 @@ class Findings:
     ones near its beginning, and "turning" ones near its end."""
 
     def search(self, kind: str, around: Bracket, start: From, width: float, time: float = 1.0) -> tuple[str, Search]:
-        """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
+        """A search that narrows a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
 
         For the end of slipping, a run starts from the state that the ball reached at the largest flow so far.
         """
@@ -180,14 +180,14 @@ def _narrowed(lab: Lab, found: Sequence[Findings], questions: Questions, careful
 
 
 def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
-    """The largest flow at which a ball that rolls on both goes on so."""
+    """A search for the largest flow at which a ball that rolls at both points goes on so."""
     if change := each.changes.get("rolling"):
         width = each.lab.effort.thresholds_width * change.high
         yield each.search("rolling", change, _start_state("with the fluid"), width)
 
 
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
-    """Roughly, up to which flow the wall doesn't hold a ball, and a slipping one settles on the floor."""
+    """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles on the floor."""
     if change := each.changes.get("sinking"):
         yield each.search("sinking", change, _start_state("on the wall"), COARSE * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
@@ -241,7 +241,7 @@ def _flows_beside(each: Findings) -> dict[str, tuple[Array, str]]:
 
 
 def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
-    """Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again.
+    """Searches for where a ball on the wall begins to slip, and up to where one pressed to the floor rolls again.
 
     They begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
     """
@@ -292,7 +292,7 @@ NONE = "no flow that was tried, up to twice the fastest of the settled states,"
 
 
 def _rolling_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """The end of rolling on both: by lifting off, or by slip."""
+    """Measurements of the end of rolling at both points: by lifting off, or by slip."""
     if not (rolling := each.bracket_seen("rolling")):
         yield each.missing(f"{NONE} ends two-point rolling")
     elif lifts(rolling):
@@ -310,7 +310,7 @@ def _rolling_rows(each: Findings) -> Iterator[Measurement | Missing]:
 
 
 def _riding_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """The least flow that holds a ball on the wall."""
+    """Measurements of the least flow that holds a ball on the wall, omega_02."""
     if riding := each.bracket_seen("riding"):
         yield each.row_of_bracket("omega_02", riding, "from above", "onset of sliding on the wall")
     else:
@@ -319,7 +319,7 @@ def _riding_rows(each: Findings) -> Iterator[Measurement | Missing]:
 
 
 def _slipping_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """The end of slipping on both: at a fold, or where the wall begins to carry the ball; and at how many folds."""
+    """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the number of folds."""
     if "turning" not in each.states:
         if (rolling := each.bracket_seen("rolling")) and not lifts(rolling):
             yield each.missing("no end of slipping at both points was found", 3)
@@ -344,7 +344,7 @@ def _slipping_rows(each: Findings) -> Iterator[Measurement | Missing]:
 
 
 def _count_ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
-    """How often, the flow rising over all that were tried, a ball from rest ceases to settle slipping at both."""
+    """At how many of the rising flows that were tried a ball from rest ceases to settle in SS."""
     said = {flow: case is Case.SS for flow, case in cases.items()} | dict(bracket.said if bracket else ())
     settles = [said[flow] for flow in sorted(said)]
     return sum(bool(before) and after is False for before, after in pairwise(settles))
