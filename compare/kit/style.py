@@ -240,7 +240,7 @@ def points(
     way: str = "",
     **look: Any,
 ) -> None:
-    """Draw measured values times `unit`, by engine: capped bars are three standard uncertainties, pale marks have none."""
+    """Draw measured values times `unit`, by engine, with bars of three standard uncertainties; pale where too long."""
     rows = list(rows)
     for m in rows:
         axes.update_datalim([(x(m), unit * y(m))])
