@@ -40,7 +40,7 @@ _CARRIED = "_latest", "_shown", "_now", "_begin"
 
 
 class Regularised(Protocol):
-    """What the classifier needs of an engine's settings, see `ContactSettings`."""
+    """The numbers of an engine's settings that the classifier needs, see `ContactSettings`."""
 
     @property
     def timestep(self) -> float: ...
@@ -112,7 +112,7 @@ class Classifier:
         self._latest, self._shown = steps[:, old:].copy(), shown[old:].copy()
 
     def _judge(self, contacts: Contacts) -> npt.NDArray[np.intp]:
-        """What each step by itself says of the contacts, (steps, runs, 2)."""
+        """States of the contacts (rolling, slipping, open) by each step alone, (steps, runs, 2)."""
         settings, (normal, friction, speed, _) = self._settings, contacts
         limit = self._coefficients * normal
         # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far

@@ -23,12 +23,12 @@ up_to_landing, steps, through = stepping.up_to_landing, free.steps, landing.thro
 
 
 def served(law: Any, data: Any) -> Any:
-    """What `free.under_law` takes a step with, here."""
+    """The first argument of `free.under_law`: addresses for compiled loops, else the law and the data."""
     return law.addresses(data) if kernels.COMPILES else (law, data)
 
 
 def served_plain(model: Any, data: Any) -> Any:
-    """What `stepping.engine_step` takes a step with, here."""
+    """The argument of `stepping.engine_step`: addresses for compiled loops, else the model and the data."""
     return (model._address, data._address) if kernels.COMPILES else (model, data)
 
 

@@ -185,7 +185,7 @@ class Run:
 def balls(
     given: Iterable[tuple[Any, Parameters, State]], settings: ContactSettings, theta_0: float
 ) -> Sequence[JointedBall | FreeBall]:
-    """Of runs with their models, parameters and starts."""
+    """Balls that advance, one for each run with its model, parameters and start."""
     if settings.scene != "joints":
         from mjsim.free import FreeBall  # here, because the law of its contacts takes long to load
 

@@ -80,7 +80,7 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
 
 
 def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) -> float:
-    """A `step` for each omega_0, noted in rows (steps, `COLUMNS`)."""
+    """Take a `step` for each omega_0, noted in rows (steps, `COLUMNS`)."""
     for number in range(len(fluid)):
         row = rows[number]
         note(row, body.qpos, body.qvel, duration / 2, body.ball)
@@ -172,7 +172,7 @@ class FreeBall:
 
     @property
     def margins(self) -> Array:
-        """Of both contacts, m: there are none."""
+        """Margins of both contacts, m: zero, since there are none."""
         return np.zeros(2)
 
     def state(self) -> dict[str, Array]:

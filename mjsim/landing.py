@@ -64,8 +64,9 @@ class Fine:
         self._through = compiled.through
 
     def step(self, x: State, theta: float, rates: Array, omega_0: float, finely: bool = False) -> Landed:
-        """A whole step from a state, with velocities of the joints that change at such rates; `finely` if there was a
-        blow a short time ago, or there isn't one in a first step, whose forces are the start of all that follow."""
+        """Take a whole step in short ones from a state, with velocities of the joints that change at such rates.
+
+        `finely` if there was a blow a short time ago, or none in a first step, whose forces are the start of all."""
         ball, seen = self._ball, np.zeros((4, recorder.NSENSOR))
         ball.place(x, theta)
         rho = self._p.R - float(x.h)

@@ -45,7 +45,7 @@ def state(place: Array, qvel: Array, p: Parameters) -> State:
 
 
 def contacts(rows: Array) -> Contacts:
-    """What the contacts do in successive steps, of rows (steps, runs, `COLUMNS`)."""
+    """Loads, friction, slip speeds and gaps of contacts in successive steps, from rows (steps, runs, `COLUMNS`)."""
     each, gaps = rows[..., SENSORS:-2].reshape(*rows.shape[:2], 2, NSENSOR // 2 - 1), rows[..., -2:]
     normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
     slips = np.moveaxis(each[..., _SLIP], -1, 0)

@@ -121,8 +121,9 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
 
 
 def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
-    """A step for each omega_0, of which some are done, noted in rows (steps, `COLUMNS`), up to one that the ball takes
-    in fine ones: its number; one that has diverged takes none."""
+    """Take a step for each omega_0 from number `done` on, up to one with a landing: the number of that.
+
+    Steps are noted in rows (steps, `COLUMNS`); a ball that has diverged takes none."""
     while done < len(fluid):
         row = rows[done]
         drive(float(fluid[done]), row, body)
@@ -147,7 +148,7 @@ def sound(body: Joints) -> bool:
 
 
 def velocity_of(v: Any) -> Velocity:
-    """Six numbers as velocities."""
+    """Six numbers of the joints as named velocities."""
     return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
 
 
@@ -253,7 +254,7 @@ class JointedBall:
 
     @property
     def margins(self) -> Array:
-        """Of both contacts, m."""
+        """Margins of both contacts, m."""
         kept: Array = self._kept["margins"]
         return kept
 
