@@ -364,8 +364,9 @@ def control(m: int, d: int, head: int) -> None:
     if over or not known:
         numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _value(m, STEP), resets
     numbers[CALLED] = time
-    start = _array(d, START)
+    start, last = _array(d, START), _array(d, QACC)
     for i in range(_number(m, DOFS)):
+        last[i] = start[i] if counts[COUNT_FOUND] < 0 else last[i]  # of restored states MuJoCo keeps but that
         start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
     if known and over:
         _go_along(m, d, head)
