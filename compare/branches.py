@@ -55,7 +55,7 @@ def check_thresholds(p: Parameters) -> None:
 
 
 def slipping_curve(p: Parameters, count: int) -> tuple[State, Array, npt.NDArray[np.bool_]]:
-    """So many states of the branch of SS, as columns, their flows, rad s-1, and whether they are unstable."""
+    """`count` states of the branch of SS, as columns, their flows, rad s-1, and whether they are unstable."""
     s = np.linspace(-16.0, 16.0, count)
     x, omega_0 = slipping_branch.states(s, p)
     return State.of(x), omega_0, slipping_branch.eigenvalues_at(s, p).real.max(axis=-1) > 0

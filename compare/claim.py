@@ -112,7 +112,7 @@ class Claim:
 
     @property
     def protocols(self) -> frozenset[str]:
-        """The protocols that it needs."""
+        """Names of the protocols whose measurements bear on it."""
         return frozenset(bearing.protocol for bearing in self.bearings)
 
 
@@ -188,7 +188,7 @@ class Verdict:
 
     @property
     def left_out(self) -> int:
-        """Measurements that its protocols left out."""
+        """How many measurements its protocols left out."""
         return sum(each.rows for each in self.missing)
 
     @property

@@ -43,7 +43,7 @@ FIGURES: Figures = {name: each for part in subjects.parts("figures") for name, e
 
 
 def figures_of(claim: str) -> Figures:
-    """The figures that stand beside a claim; unless one bears its name, also the deviations of its numbers."""
+    """The figures shown with a claim; unless one bears its name, also that of the deviations of its numbers."""
     own = {name: each for name, each in FIGURES.items() if claim in each.claims}
     chosen = partial(measured, claim=claim)
     deviations = Drawing(f"Deviations of {claim}", chosen, draw_deviations, (claim,))
@@ -63,7 +63,7 @@ def _has_tolerance(check: Check) -> bool:
 
 
 def draw_deviations(checks: Checks) -> tuple[Figure, str]:
-    """As high as there are quantities."""
+    """A figure of the deviations of a claim's numbers from theory, a row for each quantity; and its caption."""
     every, checks = checks, tuple(filter(_has_tolerance, checks))
     names = list(dict.fromkeys(c.measurement.quantity for c in checks))
     engines = list(dict.fromkeys(c.measurement.engine for c in checks))

@@ -35,7 +35,7 @@ _computed = functools.cache(lambda function, *args, **options: function(*args, *
 
 
 def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
-    """A function of `analytic` at arguments that can be hashed, computed once: `judge` empties the cache.
+    """The value of a function of `analytic` at hashable arguments, from a cache that `judge` empties.
 
     Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p, f)``: then a theory
     that was exchanged is the one that is asked.
@@ -63,7 +63,7 @@ def forget() -> None:
 
 
 def verdict(claim: Claim, records: Records) -> Verdict:
-    """Predict, compare, and say what the numbers say.
+    """The verdict on a claim: each measurement beside its prediction, and the outcome.
 
     Refuted if one check deviates beyond its tolerance; else inconclusive if of a bearing fewer than half of the checks
     are fine enough to tell; else not run if the claim predicts numbers and has none, since counts confirm no number;
@@ -86,7 +86,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
 
 
 def outcome(claim: Claim, checks: Sequence[Check], wanted: Counter[int]) -> Outcome:
-    """What checks come to, see `verdict`, of so many as are wanted of each bearing."""
+    """The outcome that checks come to, if so many are wanted of each bearing; see `verdict`."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
     if undecided_bearings(checks, wanted):

@@ -46,7 +46,7 @@ def characteristic(p: Parameters, axes: Axes | None = None, *, fastest: float | 
 
 
 def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> Axes:
-    """Which cases have a stationary solution over the friction of the wall, or of both if `equal`, and the flow.
+    """A map of which cases have a stationary solution, over the friction of the wall, or of both, and the flow.
 
     As Figs. 7 and 8 of the paper, with the other parameters of the set.
     """
@@ -97,7 +97,7 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
 
 
 def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
-    """Where balls end that start on a plane of states: what `dualball basins -o` keeps, or that file.
+    """A map of where balls end that start on a plane of states, from the file of `dualball basins`, or what it holds.
 
     Raises `StorageError` for a file that isn't one.
     """

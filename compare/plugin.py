@@ -20,7 +20,7 @@ _ROW = "dualball"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options of the plugin."""
+    """Add the options of the plugin to pytest."""
     group = parser.getgroup("dualball", "exact contact cases")
     engine = "test an engine on the exact cases: a module with build, step and state, or MODULE:OBJECT"
     group.addoption("--dualball-engine", metavar="MODULE", help=engine)
@@ -59,7 +59,7 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
 
 def _known(path: Path | None, cases: Any) -> dict[str, str]:
-    """Reasons by the name of a case."""
+    """Cases that are known to fail, from a file: the reason of each by its name."""
     try:
         lines = path.read_text("utf-8").splitlines() if path else []
     except (OSError, UnicodeDecodeError) as error:

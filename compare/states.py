@@ -18,7 +18,7 @@ def solutions(p: Parameters) -> list[StationarySolution]:
 
 
 def lasting_cases(p: Parameters) -> set[Case]:
-    """Cases of the states that last; SR, the state of NR on an unloaded floor, is none of its own."""
+    """Cases of the solutions that a ball may settle to; SR is none of its own, but NR on an unloaded floor."""
     return {s.case for s in solutions(p)} - {Case.SR}
 
 
@@ -32,7 +32,7 @@ def case_of(m: Measurement) -> Case:
 
 
 def solution_of(m: Measurement) -> StationarySolution:
-    """The lasting state of the case that was detected; LookupError if theory has none."""
+    """The solution of the detected case to which a ball may settle; LookupError if theory has none."""
     for state in solutions(m.parameters):
         if state.case is case_of(m):
             return state

@@ -125,7 +125,7 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
 
 
 def _numbers(stored: h5py.Dataset) -> Array:
-    """A column of another program; `StorageError` for what is no column of numbers, or too long."""
+    """A column of another program's file; `StorageError` for what is no column of numbers, or too long."""
     name = stored.name.removeprefix("/")
     if stored.dtype.kind not in "fiu" or len(stored.shape or ()) != 1:
         raise StorageError(f"{name!r} is no column of numbers")

@@ -101,7 +101,7 @@ class Asked:
 
     @classmethod
     def of(cls, claim: Claim, steps: Mapping[int, Records]) -> Self:
-        """Of records by the number that divides the step those that bear on a claim, the coarsest first."""
+        """The rows of records that bear on a claim, with the numbers by which steps were divided, least first."""
         wanted = claim.protocols
         return cls(tuple((n, row) for n, own in sorted(steps.items()) for row in own.rows if row.protocol in wanted))
 
@@ -132,7 +132,7 @@ def _testify(
     or one for each set that was asked of both.
 
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves the claim undecided
-    where too few of its numbers can tell, those without a limit among them: see `_limit`.
+    where too few of its numbers can tell, those without a limit among them: see `_limit_of_no_step`.
     """
     asked = Asked.of(claim, steps)
     try:
@@ -175,7 +175,7 @@ def _too_few(claim: Claim, checks: Sequence[Check], wanted: Counter[int], missin
 
 
 def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
-    """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them."""
+    """Sizes of deviations divided by their scales, of checks that are certain enough to show them."""
     numbers = (c for c in checks if quantity(c.measurement.quantity).resolves and c.relation is Relation.EQUAL)
     off = (abs(c.deviation / c.scale) for c in numbers if c.scale > 10 * c.tolerance)
     return tuple(each for each in off if math.isfinite(each))
@@ -301,8 +301,7 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
         return float(weights @ errors[-terms - 1 :]), float(np.linalg.norm(weights * own[-terms - 1 :]))
 
     def limit(q: int) -> Measured:
-        """With the number of terms that gives the least uncertainty: more terms leave less out, but amplify the
-        noise."""
+        """The limit with as many terms as give the least uncertainty: more leave less out, but amplify the noise."""
         found, (before, _) = [], fit(q, 0)
         for terms in range(1, len(steps)):
             value, noise = fit(q, terms)

@@ -136,8 +136,9 @@ class ContactSettings:
         return (1 - self.solimp) / self.solimp
 
     def margin(self, load: Real) -> Real:
-        """Margin less gap (m) of a contact that bears a steady load (force over the mass, m s-2), if slip doesn't lift
-        it: the margin that leaves no gap, or else how deep the ball sinks."""
+        """Margin that leaves no gap at a contact under a steady load (force divided by mass, m s-2), m.
+
+        Without a margin it is how deep the ball sinks; slip that lifts the contact is left out."""
         return self.softness * load / self.k
 
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:

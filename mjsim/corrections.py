@@ -24,7 +24,7 @@ _NEAR = 32.0
 
 
 class Ball(NamedTuple):
-    """What the corrections need of a ball and of the settings."""
+    """The numbers of a ball and of the settings that the corrections need."""
 
     R: float
     r: float
@@ -98,7 +98,7 @@ def slip(v: Velocity, rho: float, r: float) -> tuple[float, ...]:
 
 
 def resistance(w_z: float, w_h: float, w_y: float, ball: Ball) -> float:
-    """Drag over the speed of a centre that moves with w relative to the fluid, m c C_D Re/24, kg s-1."""
+    """Drag divided by the speed of a centre that moves with w relative to the fluid, m c C_D Re/24, kg s-1."""
     Re = ball.Re * (w_z * w_z + w_h * w_h + w_y * w_y) ** 0.5
     flowing, blunt = ball.creeping + ball.wake * Re**0.687, ball.blunt * Re
     found: float = ball.drag * (flowing + (blunt - flowing) * (blunt > flowing))  # of arrays, too
@@ -109,7 +109,7 @@ def corrections(
     v: Velocity, last: Velocity, rho: float, omega_0: float,
     contact: Sequence[float], normals: Sequence[float], ball: Ball,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:  # fmt: skip
-    """What drives a step that begins with the velocities v, a step after `last`.
+    """Joint forces and surface velocities that correct a step which begins with velocities v, a step after `last`.
 
     Positions are half a step ahead, so that rho is already that at mid step.
 
@@ -187,7 +187,7 @@ def corrections(
 
 
 def surface(v: tuple[float, float], change: tuple[float, float], ball: Ball) -> tuple[float, float]:
-    """How a surface moves, m s-1, on which the ball slips at v, by so much more than a step ago.
+    """The surface velocity, m s-1, that corrects a contact which slips at v, by `change` more than a step ago.
 
     Direction of sliding friction at mid step: the engine opposes friction to the slip that there would be 1/b_f after
     the beginning of the step. A surface velocity equal to the change of slip between the middle and then removes the

@@ -125,7 +125,7 @@ def sound(body: Joints) -> bool:
 
 
 def velocity_of(v: Any) -> Velocity:
-    """Six numbers as velocities."""
+    """Six numbers of the joints as named velocities."""
     return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
 
 

@@ -70,9 +70,9 @@ def joint_velocities(place: Any, turned: Any, velocity: Any, ahead: float) -> tu
 
 
 def against(place: Any, velocity: Any, spin: Any, ahead: float, R: float, r: float) -> tuple[float, float, float]:
-    """Velocity of a plane inwards, onwards and upwards, m/s, at which what is at rest against it is so against the
-    cylinder `ahead` s later, when velocities are where the place is now.
+    """Velocity inwards, onwards, upwards, m/s, that a plane needs to stand for a cylinder in a step.
 
+    What is at rest against it is so against the cylinder `ahead` s later, when velocities are where the place is now.
     By then the normal has turned by ahead Omega: of the velocity Omega R along the wall the share ahead Omega will
     point into the plane, and (ahead Omega)^2/2 will be missing along it; and where ball and wall touch the turning
     about the normal will show as ahead Omega r o_n of slip. Without the first the ball would lose h Omega^2/2 of its

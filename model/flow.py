@@ -67,7 +67,7 @@ class Flow:
     @classmethod
     def steady(cls, omega_0: float) -> Self:
         """Constant omega_0."""
-        return cls._pieces("steady", [0.0], [omega_0], [0.0])
+        return cls._from_pieces("steady", [0.0], [omega_0], [0.0])
 
     @classmethod
     def ramp(cls, omega_start: float, omega_end: float, duration: float, t_start: float = 0.0) -> Self:
@@ -80,14 +80,14 @@ class Flow:
     def staircase(cls, levels: Sequence[float], hold: float) -> Self:
         """Each level in turn held for `hold` seconds, the last one from then on."""
         check_number("hold", hold, "s", POSITIVE)
-        return cls._pieces("staircase", [hold * k for k in range(len(levels))], levels, [0.0] * len(levels))
+        return cls._from_pieces("staircase", [hold * k for k in range(len(levels))], levels, [0.0] * len(levels))
 
     @classmethod
     def sampled(cls, times: Sequence[float], omega_0: Sequence[float], kind: str = "sampled") -> Self:
         """Linear interpolation between samples, held at both ends; times must increase."""
         if len(times) != len(omega_0):
             raise InputError(f"a sampled flow has {len(times)} times but {len(omega_0)} values of omega_0")
-        level = cls._pieces(kind, times, omega_0, [0.0] * len(times))
+        level = cls._from_pieces(kind, times, omega_0, [0.0] * len(times))
         return replace(level, slope=np.append(np.diff(level.value) / np.diff(level.start), 0.0))
 
     @classmethod
@@ -98,7 +98,7 @@ class Flow:
     @classmethod
     def sines(cls, mean: float, waves: Iterable[tuple[float, float, float]]) -> Self:
         """The sum of a mean and waves (amplitude, frequency, phase) as in `sine`."""
-        flow = cls._pieces("sines", [0.0], [mean], [0.0])
+        flow = cls._from_pieces("sines", [0.0], [mean], [0.0])
         frequencies = Range(0.0, REACH.high, open=True)
         kinds = ("amplitude", "rad s-1", REACH), ("frequency", "Hz", frequencies), ("phase", "rad", ANY)
         rows = [
@@ -160,7 +160,7 @@ class Flow:
         return cls.sampled(times, values, kind="measured")
 
     @classmethod
-    def _pieces(cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]) -> Self:
+    def _from_pieces(cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]) -> Self:
         t = [check_number(f"time of flow sample {k}", time, "s", REACH) for k, time in enumerate(start)]
         v = [check_number(f"omega_0 of flow sample {k}", omega, "rad s-1", REACH) for k, omega in enumerate(value)]
         if not v:
@@ -179,7 +179,7 @@ class Flow:
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
         """Inverse of `to_mapping`; raises `InputError` if it isn't one."""
         try:
-            flow = cls._pieces(str(values["kind"]), values["start"], values["value"], values["slope"])
+            flow = cls._from_pieces(str(values["kind"]), values["start"], values["value"], values["slope"])
             flow = replace(flow, waves=cls.sines(0.0, values.get("waves", ())).waves)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"not a flow: {error}") from error

@@ -59,7 +59,7 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
     closed forms (docs/design.md), with which tests compare; the differences serve any law of drag, and the fold.
     """
 
-    def logarithms(name: str, step: float) -> Array:
+    def log_thresholds(name: str, step: float) -> Array:
         try:
             t = bifurcation.thresholds(make(**{**at, name: at[name] * math.exp(step)}))
         except InputError:  # beyond what the value may be: no derivative there
@@ -70,7 +70,9 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
     by_name = {}
     with np.errstate(invalid="ignore"):
         for name in at:
-            wide, narrow = ((logarithms(name, h) - logarithms(name, -h)) / (2 * h) for h in (_LOG_STEP, _LOG_STEP / 2))
+            wide, narrow = (
+                (log_thresholds(name, h) - log_thresholds(name, -h)) / (2 * h) for h in (_LOG_STEP, _LOG_STEP / 2)
+            )
             by_name[name] = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
     return {
         key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}

@@ -55,8 +55,7 @@ def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex
 def lag_harmonics(
     p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS
 ) -> npt.NDArray[np.complex128]:
-    """Complex amplitudes at the first odd harmonics of D = omega_c - omega_0 in rad s-1, in the periodic solution of
-    (23).
+    """Complex amplitudes of the first odd harmonics of the lag D = omega_c - omega_0 in a periodic RR (23), rad s-1.
 
     D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With Stokes' law there is
     one, and the first step of Newton's method has nothing left to do. Raises ArithmeticError if it doesn't converge.
@@ -98,7 +97,7 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
     if p.c == 0:
         return math.inf
 
-    def slack(amplitude: float) -> float:
+    def least_margin(amplitude: float) -> float:
         lag, at, cells = lag_harmonics(p, amplitude, frequency), 0.0, math.pi
         for count in (PHASES, CLOSER, CLOSER):
             phases = at + np.linspace(-cells, cells, count + 1)
@@ -108,11 +107,11 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
         return float(margins.min())
 
     low, high = 0.0, 1e-3 * math.sqrt(p.g / p.R)
-    if slack(low) <= 0:
+    if least_margin(low) <= 0:
         return 0.0
-    while slack(high) > 0:
+    while least_margin(high) > 0:
         low, high = high, 1.5 * high
-    return float(brentq(slack, low, high, rtol=1e-12))
+    return float(brentq(least_margin, low, high, rtol=1e-12))
 
 
 def slow_onset(p: Parameters) -> float:

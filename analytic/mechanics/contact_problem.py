@@ -136,8 +136,7 @@ def solve(
 
 
 def project(need: Impulse, friction: Friction) -> Impulse:
-    """The impulse nearest to the one a contact needs that Coulomb's law allows: friction within its disk, or against a
-    known slip."""
+    """The impulse nearest to the needed one that Coulomb's law allows: friction in its disk, or against known slip."""
     n, s, t = need
     if n <= 0:
         return Impulse(0.0, 0.0, 0.0)
@@ -151,8 +150,7 @@ def project(need: Impulse, friction: Friction) -> Impulse:
 
 
 def _share_met(need: Impulse, friction: Friction) -> Impulse:
-    """Share of the friction a contact needs that it gets from `project`, and its direction if it slides; 1 if it
-    sticks, 0 if it is open, without a direction."""
+    """Share of the needed friction that `project` grants: 1 sticking, 0 open, else less, with its direction (s, t)."""
     if need.n <= 0:
         return Impulse(0.0, 0.0, 0.0)
     if friction.s != 0 or friction.t != 0:

@@ -118,8 +118,7 @@ class Attractor:
 def event_driven(
     p: Parameters, x0s: Array, duration: float, interval: float, threads: int | None = None
 ) -> list[Trajectory]:
-    """Event-driven simulations from states x0s (n, 8), on all cores unless `threads` says how many; one that breaks
-    down as far as it came."""
+    """Event-driven simulations from states x0s (n, 8), in as many threads as are asked for, or cores; see `Runs`."""
 
     def motion(x0: Array) -> Trajectory:
         try:

@@ -195,11 +195,11 @@ def _places_between(here: Orbit, there: Orbit, step: Array, name: str, matrix: A
         if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
             continue
 
-        def test(share: float, sign: Callable[[Any], float] = sign) -> float:
+        def sign_at(share: float, sign: Callable[[Any], float] = sign) -> float:
             return sign(_next_orbit(here, share * step, name, matrix).multipliers)
 
         try:
-            orbit = _next_orbit(here, brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
+            orbit = _next_orbit(here, brentq(sign_at, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
         except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
             orbit = there
         yield Place(kind, orbit.loop.value(name), orbit)

@@ -114,8 +114,8 @@ def _begin_on_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tupl
 
 
 def _begin_off_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
-    """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point in the frame at rest; in NN y, v_y;
-    work).
+    """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point at rest; in NN y, v_y; work).
+
     In RN the spin follows; in NN all of it rests, and with Stokes' drag the fall is known (`drag.fall`). With another
     law c depends on all components of the velocity.
     """

@@ -110,8 +110,7 @@ def _finish_straight(t: float, of: Stretch, taken: int) -> bool:
 
 
 def _steps(method: Any, start: float, of: Stretch, taken: int, first: float) -> Iterator[tuple[float, int, int]]:
-    """Steps of one of scipy's solvers: time, guard that fired, samples taken. Its time runs from zero, since directions
-    settle in less than the round-off of `start`."""
+    """Steps of one of scipy's solvers: time, guard that fired or -1, samples taken. Its own time begins at 0."""
     k, until, z, scale, times, samples, arm, level = of
     least, armed, levels = np.array(scale), arm.tolist(), level.tolist()
     least[slice(*TURNING[k.case], 2)] *= k.rtol

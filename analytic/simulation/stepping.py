@@ -205,9 +205,10 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
 
 
 def _old_slip(at: BallState, dt: float, p: Constants) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Old slip at floor and wall, m s-1, that is added to the new, since friction opposes the mean of both where a
-    contact slides on. None where it may stop within the step: friction then opposes the final slip, so that it can't
-    reverse.
+    """Slip at floor and wall as a step begins, m s-1; none where it may stop within the step.
+
+    It is added to the new one, since friction opposes the mean of both where a contact slides on; where it may stop,
+    friction opposes the final slip, so that it can't reverse.
     """
     v_h, v_y, v_k, o_x, o_y, o_z = at.u
     r, rest = p.r, p.j / (1 + p.j)
@@ -327,8 +328,7 @@ def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> S
 
 
 def _case_of(s: StepSolution, touching: Touching, p: Constants) -> int:
-    """The case from velocities and impulses: a contact that leaves with a velocity is open, one that doesn't slide
-    rolls."""
+    """The case from velocities and impulses: a contact that leaves is open, one that doesn't slide rolls."""
     (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, AWAY, AWAY
     still = ZERO_SLIP * math.sqrt(p.g * p.R)
     if touching.A and (s.P.A_y > 0 or v_y <= 0):

@@ -66,11 +66,11 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
             if sampled:
                 samples.append((start + count * dt, now, dt))
             if len(samples) >= BLOCK:
-                _record(samples, p, recorder)
+                _record_samples(samples, p, recorder)
                 samples = []
     finally:
         if samples:
-            _record(samples, p, recorder)
+            _record_samples(samples, p, recorder)
 
 
 def prepared(
@@ -96,7 +96,7 @@ def prepared(
     )
 
 
-def _record(samples: list[tuple[float, stepping.Ball, float]], p: Parameters, recorder: Recorder) -> None:
+def _record_samples(samples: list[tuple[float, stepping.Ball, float]], p: Parameters, recorder: Recorder) -> None:
     times, balls, steps = zip(*samples, strict=True)
     theta, case, work = (np.array(each) for each in zip(*((b.at.theta, b.case, b.work) for b in balls), strict=True))
     states = np.array([rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p) for ball in balls])

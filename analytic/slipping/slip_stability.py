@@ -94,12 +94,12 @@ def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> flo
     """
     state = dynamics.check_state(inner, x, p)
 
-    def rise(omega_c: float) -> float:
+    def lift_at(omega_c: float) -> float:
         slip_x = state.slip_x * omega_c / state.omega_c if inner is Case.SR else state.slip_x
         there = state._replace(omega_c=omega_c, slip_x=slip_x)
         return lift_acceleration(inner, outer, there, p.replace(omega_0=p.omega_0 * omega_c / state.omega_c))
 
-    return float(roots.sign_change(np.vectorize(rise), 0.1 * state.omega_c, 10 * state.omega_c))
+    return float(roots.sign_change(np.vectorize(lift_at), 0.1 * state.omega_c, 10 * state.omega_c))
 
 
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
@@ -136,10 +136,10 @@ def neutral_flow(case: Case, p: Parameters) -> float:
     """
     unit, order = float(np.sqrt(p.g / p.R)), list(SlipStability)
 
-    def side(flow: Real) -> int:
+    def stability_at(flow: Real) -> int:
         return order.index(stability(case, p.replace(omega_0=float(flow)))) - 1
 
-    return float(roots.sign_change(side, 1e-3 * unit, 1e3 * unit))
+    return float(roots.sign_change(stability_at, 1e-3 * unit, 1e3 * unit))
 
 
 def _by_sign(drive: float, hold: float) -> SlipStability:

@@ -124,7 +124,7 @@ class Lawful(Bodies):
 
 
 def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
-    """A pair of each surface with what touches it, made with the friction of the surface, and that surface's name."""
+    """Add a contact pair for each surface and what touches it, with the surface's friction; its name and the pair."""
     lowest = "under" if scene.under else "body"
     for surface in scene.surfaces:
         of = [[g.name for g in spec.geoms if g.name.rstrip("0123456789") == name] for name in (surface.name, lowest)]

@@ -108,7 +108,7 @@ class AtRest:
 
     @np.errstate(over="ignore")
     def harm(self, c: Contacts) -> dict[str, Array]:
-        """For each fault that a contact may have, see `FAULTS`: how many times what passes for good, (n,)."""
+        """How bad each contact is, (n,), by each of `FAULTS`: its value divided by the largest that passes for good."""
         law = c.law()
         speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
         return {
@@ -176,7 +176,7 @@ def _two_digits(value: float) -> float:
 
 
 def _worst(c: Contacts, part: Array, quantity: str) -> float:
-    """The worst creep or depth, or the largest stable step, of some contacts."""
+    """The worst creep, m/s, or depth, m, or the largest stable step, s, of some contacts."""
     return (
         c.subset(part).largest_step() if quantity == "largest_step" else float(getattr(c.law(), quantity)[part].max())
     )

@@ -91,7 +91,7 @@ class Case(Scene):
         position, velocity, spin = np.split(states[:, -9:], 3, axis=1)
         gaps, slips = [np.zeros((0, len(states)))], [np.zeros((0, len(states)))]
 
-        def meet(gap: Array, slip: Array, normal: Array) -> None:
+        def add_contact(gap: Array, slip: Array, normal: Array) -> None:
             gaps.append(gap[None])
             slips.append(np.linalg.norm(slip - np.sum(slip * normal, axis=1)[:, None] * normal, axis=1)[None])
 
@@ -107,13 +107,13 @@ class Case(Scene):
             gap = height - reach(body, normal)
             arm = -(reach(body, normal) + np.minimum(gap, 0.0) / 2)[:, None] * normal
             moves = surface.velocity + surface.turning * np.cross([0.0, 0.0, 1.0], away + arm)
-            meet(gap, velocity + (np.cross(spin, arm) if body.shape == "sphere" else 0) - moves, normal)
+            add_contact(gap, velocity + (np.cross(spin, arm) if body.shape == "sphere" else 0) - moves, normal)
         if self.under:
             apart = states[:, :3] - position
             height = np.sum(apart * normal, axis=1)
-            meet(height - reach(self.body, normal) - reach(body, normal), states[:, 3:6] - velocity, normal)
+            add_contact(height - reach(self.body, normal) - reach(body, normal), states[:, 3:6] - velocity, normal)
         if self.joint:
-            meet(np.zeros(len(states)), velocity, np.zeros(3))
+            add_contact(np.zeros(len(states)), velocity, np.zeros(3))
         return np.concatenate(gaps).T, np.concatenate(slips).T
 
     def in_contact(self, letters: str) -> Array:

@@ -74,6 +74,7 @@ class Contacts:
 
     @property
     def _frictional(self) -> Array:
+        """Whether a contact has each of the five frictions, (n, 5)."""
         return np.arange(1, 6) < self.dim[:, None]
 
     @property
@@ -301,7 +302,7 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
 
 
 def weights(model: Any) -> Array:
-    """The weight of each body with all that is welded to it, N; inf if no joint of its own moves it, 0 without g."""
+    """The weight of each body with all that is welded to it, N; inf if no joint moves it, 0 without gravity."""
     mass = np.bincount(model.body_weldid, model.body_mass, model.nbody)[model.body_weldid]
     moved = model.body_dofnum[model.body_weldid] > 0
     weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY

@@ -75,13 +75,13 @@ def _grooves() -> list[Case]:
     """A sphere and a cube in a right-angled groove down a slope, each plane of which carries m g cos/sqrt(2)."""
     half = math.sqrt(0.5)
 
-    def planes(angle: float, mu: float) -> tuple[Surface, Surface]:
+    def groove_planes(angle: float, mu: float) -> tuple[Surface, Surface]:
         up = half * np.array(slope(angle)[1])
         left, right = (tuple((up + side * np.array([0.0, half, 0.0])).tolist()) for side in (-1.0, 1.0))
         return Surface("left", mu, normal=left), Surface("right", mu, normal=right)
 
     def descends(t: Array, angle: float, size: float, lever: float = 2 * 0.4, mu: float = 9.0) -> Any:
-        """At g sin/(1 + j/sin^2 45) if it rolls, where friction allows; a block can't."""
+        """A body goes down at g sin/(1 + j/sin^2 45) if it rolls, where friction allows; a block can't."""
         way, normal = slope(angle)
         a = max(G * math.sin(angle) / (1 + lever), G * (math.sin(angle) - mu * math.cos(angle) / half))
         spin = a * t / (half * size) if lever < 9 else 0 * t
@@ -96,13 +96,13 @@ def _grooves() -> list[Case]:
     return [
         closed_form(
             "groove-rolls", "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
-            sphere(), planes(gentle, 0.5), partial(descends, angle=gentle, size=0.1),
+            sphere(), groove_planes(gentle, 0.5), partial(descends, angle=gentle, size=0.1),
             wrong={"on one point, 5/7 g sin": {"lever": 0.4}, "a hollow sphere": {"lever": 4 / 3}},
             until=1.0, scales=(1.0, 2.0, 30.0), contacts=("RR",), source=source),
         closed_form(
             "groove-rests",
             "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
-            cube | {"orientation": orientation}, planes(steep, 0.5),
+            cube | {"orientation": orientation}, groove_planes(steep, 0.5),
             partial(descends, angle=steep, size=0.1, lever=math.inf),
             wrong={"a threshold as on a plane": {"mu": 0.5 * half}, "at 0.85 of Coulomb's": {"mu": 0.425}},
             until=2.0, scales=SPEED_ALONE, contacts=("RR",), source=source),
@@ -110,6 +110,7 @@ def _grooves() -> list[Case]:
 
 
 def _vessel() -> list[Case]:
+    """The cases of the paper's ball in its vessel."""
     weak, hollow, thin = {"mu": 0.95, "eta": 0.95}, {"j": 1.5}, {"c": 0.0}
     weaker, bouncing = {"mu": 0.8, "eta": 0.8}, {"restitution": 0.3}
     slipping = {"friction 5 % too weak": weak, "no drag": thin}

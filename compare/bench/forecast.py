@@ -137,9 +137,9 @@ def forecast(
 def follow_advice(
     model: Any, data: Any, before: Forecast, limit: float, control: Control | None = None, **good: Any
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
-    """Follow the advice and settle the model anew, for at most `limit` s: the forecast with what was found then, that
-    after the change, and that with the remedy, too.
+    """Follow the advice and settle anew, for at most `limit` s: the forecast with what was found, after it, and beyond.
 
+    The second forecast is that after the change, the third that with the remedy on top.
     What isn't advised isn't tried: None. The change is made in `model`. Raises as `forecast` does.
     """
     after = held = None

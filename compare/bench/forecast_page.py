@@ -19,7 +19,7 @@ Table = tuple[str, list[list[str]]]
 
 
 def sentences(f: Forecast) -> Iterator[str]:
-    """What to do, what was found when it was tried, and what else should be known, in words."""
+    """A forecast in sentences: what to do, what was found when it was tried, and what else one should know."""
     sliding, rattling = [p.name for p in f.pairs if p.slides], [p.name for p in f.pairs if p.moves]
     moving = [*f.settled.moving.values()]
     if f.change:
@@ -78,7 +78,7 @@ def _number(value: float, factor: float = 1, endless: str = "any") -> str:
 
 
 def tables(f: Forecast) -> list[Table]:
-    """The worst pairs: at rest and in motion; what was measured is called found, what nobody has is left out."""
+    """Two tables of the worst pairs in contact: at rest and in motion; what was measured is called found."""
     rest = [["pair", "creep\nµm/s", "found\nµm/s", "turning\nµrad/s", "found\nµrad/s", "depth\nµm", "found\nµm"]]
     rest[0] += ["load\nN", "cone\n%"]
     motion = [["pair", "hover\nmm/s", "step\nms"]]

@@ -68,7 +68,7 @@ def measure(
     asked, done = cases(), 0
     total, over = len(engines) * len(asked), threading.Event()
 
-    def results(name: str) -> list[Result]:
+    def results_of(name: str) -> list[Result]:
         nonlocal done
         found = []
         for result in run_all(itertools.takewhile(lambda _: not over.is_set(), asked), engines[name], steps):
@@ -79,7 +79,7 @@ def measure(
 
     with threads(max(workers, 1)) as pool:
         try:
-            return dict(zip(engines, pool.map(results, engines), strict=True))
+            return dict(zip(engines, pool.map(results_of, engines), strict=True))
         finally:
             over.set()
 
@@ -118,12 +118,12 @@ def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
 def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
     """Engines that were tried in some case; those that pass the largest share first, as they come behind all others."""
 
-    def place(name: str) -> tuple[bool, float]:
+    def rank(name: str) -> tuple[bool, float]:
         own = [result.passed for result in league[name] if not result.skipped]
         return name.endswith("-defaults"), -statistics.mean(own)
 
     there = [name for name, results in league.items() if not all(result.skipped for result in results)]
-    return {name: league[name] for name in sorted(there, key=place)}
+    return {name: league[name] for name in sorted(there, key=rank)}
 
 
 def cell(result: Result) -> str:
@@ -190,7 +190,7 @@ def _median(values: Iterator[float]) -> float:
 
 
 def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
-    """A panel for each kind of case: the median of an engine's errors over that of its costs, its steps joined."""
+    """A figure with a panel for each kind of case: an engine's median error over its median cost, its steps joined."""
     from matplotlib.ticker import NullFormatter  # here, because drawing takes a second to load
 
     from compare.kit import style

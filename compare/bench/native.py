@@ -59,7 +59,7 @@ class Native:
     """What the file that they were read from lacks, and what stands for it."""
 
     def tune(self, spec: Any, scene: Scene, timestep: float) -> None:
-        """Set a scene of free bodies: a wall as the wall, all else as the floor."""
+        """Give a scene of free bodies these settings: to a wall those of the wall, to all else those of the floor."""
         for name, value in {**self.option, "timestep": timestep}.items():
             setattr(spec.option, name, value)
         for surface, pair in pairs(spec, scene):

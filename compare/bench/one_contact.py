@@ -57,7 +57,7 @@ def closed_form(
     times: Array = np.arange(1.0, 26.0) * (until / 25)
     letters, changes = contacts[::2], contacts[1::2]
 
-    def states(**constants: Any) -> Array:
+    def states_with(**constants: Any) -> Array:
         return np.concatenate([np.broadcast_to(part, (25, 3)) for part in course(times, **constants)], axis=1)
 
     start: Any = [tuple(np.broadcast_to(part, (1, 3))[0].tolist()) for part in course(np.zeros(1))]
@@ -68,12 +68,12 @@ def closed_form(
         under=Body(*start[3:], **under) if under else None,
         surfaces=surfaces,
         times=times,
-        exact=states(),
+        exact=states_with(),
         contacts=tuple(str(letters[bisect(changes, t)]) for t in times.tolist()),
         bound=CLOSED,
         source=source,
         scales=scales,
-        wrong={text: states(**constants) for text, constants in wrong.items()},
+        wrong={text: states_with(**constants) for text, constants in wrong.items()},
         g=G,
         **forces,
     )

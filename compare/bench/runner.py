@@ -115,7 +115,7 @@ class Result:
 
 
 def run(case: Case, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT) -> Result:
-    """One engine on one case: ``engine`` is the name of a module, ``module:object``, a module or a picklable object.
+    """Run an engine on one case: ``engine`` is a module or its name, ``module:object``, or a picklable object.
 
     ``limit`` is the longest time for one step's run, s. Raises `InputError` if the engine can't be used, or for a step
     that is none.
@@ -131,7 +131,7 @@ def run(case: Case, engine: Any, steps: Sequence[float] | None = None, limit: fl
 def run_all(
     cases: Iterable[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
 ) -> Iterator[Result]:
-    """One engine on many cases, one after the other in one process, that is begun anew where it hangs or dies."""
+    """Run an engine on many cases, one after the other in one process, that is begun anew where it hangs or dies."""
     with closing(EngineProcess(engine, limit)) as trial:
         for case in cases:
             yield trial.result(case, steps)
@@ -178,7 +178,7 @@ class EngineProcess:
         self._pipe.close()
 
     def result(self, case: Case, steps: Sequence[float] | None = None) -> Result:
-        """The engine on a case at all steps; shorter ones are not tried where one hangs."""
+        """The result of the engine on a case, at all steps; shorter ones are not tried where one hangs."""
         about, found = self.about, Result(case.name, self.about)
         if about.missing:
             return replace(found, skipped=about.missing)

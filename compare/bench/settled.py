@@ -216,12 +216,12 @@ def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
 def recording_loads(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
     """A law of stepping that appends what pairs of geoms bear in each step to `history`."""
 
-    def one_by_one(model: Any, data: Any, nstep: int) -> None:
+    def step_and_record(model: Any, data: Any, nstep: int) -> None:
         for _ in range(nstep):
             step(model, data, 1)
             history.append(loads_by_pair(model, data))
 
-    return one_by_one
+    return step_and_record
 
 
 def measured_slip(model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float) -> dict[str, Array]:

@@ -86,7 +86,7 @@ def attractor_data(of: Attractor) -> dict[str, Any]:
 def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
     """A branch of orbits as JSON-able data, SI; each bifurcation with the orbit there or nearest to it."""
 
-    def data(orbit: Orbit) -> dict[str, Any]:
+    def orbit_data(orbit: Orbit) -> dict[str, Any]:
         return {
             branch.name: getattr(orbit.p, branch.name),
             "period": orbit.period,
@@ -97,12 +97,12 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
             "x": orbit.loop.x,
         }
 
-    places = [vars(place) | {"kind": place.kind.value, "orbit": data(place.orbit)} for place in branch.places]
-    return {"parameter": branch.name, "places": places, "orbits": list(map(data, branch.orbits))}
+    places = [vars(place) | {"kind": place.kind.value, "orbit": orbit_data(place.orbit)} for place in branch.places]
+    return {"parameter": branch.name, "places": places, "orbits": list(map(orbit_data, branch.orbits))}
 
 
 def _table(data: dict[str, Any]) -> pages.Rows:
-    """A row for each attractor of each set."""
+    """A table with a row for each attractor of each set."""
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
     head = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
     rows = [[*varied, *head]]

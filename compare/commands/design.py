@@ -25,7 +25,7 @@ _USUAL = {"gravity": 9.81, "j": (0.4, 0.4)}
 
 
 def run(args: argparse.Namespace) -> int:
-    """Design and show; 1 if no meter covers the flows."""
+    """Design a flowmeter and show it; the exit code is 1 if no meter covers the flows."""
     from compare.report import meter  # here, because nothing else needs it
 
     asked = parameters.read_toml(args.file)
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def request(asked: Mapping[str, Any]) -> Request:
-    """What a file asks for; `InputError` names table, field, value, unit and range of what is wrong."""
+    """The request for a meter that a TOML file makes; `InputError` names table, field, value, unit and range."""
     check_names(asked, ["fluid", "flow", "bounds", "material", "tolerances"], "table")
     fluid = _table(asked, "fluid", _FLUID, ["nu_f", "rho_f"], texts=("drag", "C_D"))
     flow = _table(asked, "flow", _FLOW, ["slowest", "fastest"])
@@ -70,7 +70,7 @@ def request(asked: Mapping[str, Any]) -> Request:
 
 
 def _interval(name: str, value: Any, unit: str, allowed: Range) -> Interval:
-    """A number, or [lowest, highest]."""
+    """The interval that a number, or a list [lowest, highest], means, checked."""
     ends = value if isinstance(value, list | tuple) else (value, value)
     if len(ends) != 2:
         raise InputError(f"{name} = {value!r} must be a number in {unit}, or the two between which it may be")

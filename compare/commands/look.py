@@ -29,7 +29,7 @@ def figures(args: argparse.Namespace) -> int:
 
 
 def inspect(args: argparse.Namespace) -> int:
-    """Describe a run or a collection."""
+    """Describe what a file of a run or a collection holds."""
     if gathered := collection.describe(args.file):
         if args.plot:
             raise InputError(f"{args.file} is a collection: only a run can be drawn")
@@ -63,7 +63,7 @@ def render(args: argparse.Namespace) -> int:
 
 
 def explore(args: argparse.Namespace) -> int:
-    """Serve the page to play with."""
+    """Serve the page of theory and motion to play with."""
     from compare.view import explore as served  # here, because nothing else needs it
 
     served.serve(options.parameters(args), args.port, not args.no_browser)

@@ -107,7 +107,7 @@ class Number:
 
     @property
     def metavar(self) -> str:
-        """What stands for it in help: its unit, or that it is a number."""
+        """What help shows in its place: its unit, or that it is a number."""
         return "N" if self.allowed.whole else readable(self.unit) or "NUMBER"
 
 
@@ -192,7 +192,7 @@ class Help(argparse.HelpFormatter):
     _get_default_metavar_for_positional = _get_default_metavar_for_optional
 
     def add_argument(self, action: argparse.Action) -> None:
-        """`dualball parameters` tells of them once, for all commands."""
+        """As argparse, but for parameters of the ball, which `dualball parameters` lists for all commands."""
         if not action.dest.startswith(PREFIX):
             super().add_argument(action)
 
@@ -217,7 +217,7 @@ def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
 
 @contextmanager
 def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
-    """Where a command fails, the directories that it made go again as far as there is nothing in them."""
+    """A context after which empty directories that a command made for its output are removed if it failed."""
     output: Path | None = getattr(args, "output", None)
     new = [each for each in (output, *output.parents) if not each.exists()] if output else []
     try:
@@ -231,8 +231,7 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
 
 
 def terminal(**look: Any) -> Console:
-    """A console that leaves it to the program what to do where nobody reads on; wide enough for any table off a
-    terminal."""
+    """A console of rich that is wide enough for any table off a terminal, and lets a broken pipe be an error."""
     from rich.console import Console  # here, because help needs none
 
     class Terminal(Console):
@@ -261,19 +260,19 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
 
 
 def add_own_set(parser: Parser) -> None:
-    """A set of the study by its name, or one's own."""
+    """Options for a parameter set: one of the study by its name, or a file of one's own."""
     own = parser.add_mutually_exclusive_group()
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
     own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
 
 
 def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
-    """An option, to be given once or more often, for `compare.kit.sweep.Axis`."""
+    """An option for ranges or lists of values (`compare.kit.sweep.Axis`), to be given once or more often."""
     parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
 
 
 def add_directory(parser: Parser, directory: str, *names: str) -> None:
-    """What all commands have that fill a directory: its name, workers' progress or none."""
+    """Options of all commands that fill a directory: its name, and whether to show progress."""
     where = "directory of the results; what it holds already is not computed again"
     names = names or ("-o", "--output")
     parser.add_argument(*names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where)
@@ -281,7 +280,7 @@ def add_directory(parser: Parser, directory: str, *names: str) -> None:
 
 
 def add_json(parser: Parser, shown: str = "print JSON") -> None:
-    """The option to print what there is for programs."""
+    """The option --json, to print results for programs."""
     parser.add_argument("--json", action="store_true", help=shown)
 
 
@@ -352,12 +351,12 @@ def add_start(parser: Parser) -> None:
 
 
 def add_plot(parser: Parser, what: str) -> None:
-    """The option to draw what is printed."""
+    """The option --plot, to draw what is printed."""
     parser.add_argument("--plot", type=FIGURE, help=f"draw {what}: png, svg or pdf (default: don't)")
 
 
 def add_verdicts(parser: Parser) -> None:
-    """Options of what is said of claims."""
+    """Options for which claims are judged, and how verdicts are shown."""
     one = "only this claim; may be repeated (default: all)"
     parser.add_argument("--claim", action="append", metavar="ID", help=one)
     parser.add_argument("--verbose", action="store_true", help="list every number of each claim")

@@ -27,7 +27,7 @@ class Command(NamedTuple):
 
     @property
     def about(self) -> str:
-        """What it is for, in words that follow a name."""
+        """What the command is for, in words that follow its name in help."""
         text = self.declare.__doc__ or ""
         return text[:1].lower() + text[1:].rstrip(".")
 
@@ -354,7 +354,7 @@ def parser(words: Sequence[str]) -> Parser:
 
 
 def _complete(parser: Parser, commands: options.Commands, shell: Sequence[str]) -> NoReturn:
-    """Print what a shell completes commands, options and files by, and end."""
+    """Print the completions of commands, options and files that a shell asks for, and end."""
     try:
         import shtab  # here, because it is optional
     except ImportError as error:

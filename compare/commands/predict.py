@@ -44,7 +44,7 @@ def show_parameters(args: argparse.Namespace) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Predict and show."""
+    """Show what theory predicts of a parameter set."""
     data = described(p := options.parameters(args))
     options.show(data, args.json, *tables(p, data))
     return 0
@@ -83,7 +83,7 @@ def described(p: Parameters) -> dict[str, Any]:
 
 
 def reading(p: Parameters) -> str:
-    """What a flowmeter would show, in words."""
+    """In words what the ball's orbit says of the flow: its stable cases and lag."""
     attractors = analytic.stable_solutions(p)
     cases = list(dict.fromkeys(solution.case for solution in attractors))
     if not cases:
@@ -103,7 +103,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     """
     off = data["model_error"]
 
-    def shown_to(value: float, most: int) -> str:
+    def to_digits(value: float, most: int) -> str:
         return meter.rounded(value, off, most)
 
     first = [Text(doubt, "bold yellow") for doubt in meter.model_warning(off)]
@@ -119,12 +119,12 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
         limits.append(
-            [symbol, "does not exist" if math.isnan(value) else f"{shown_to(value, 12)}{unit}", meter.MEANING[name]]
+            [symbol, "does not exist" if math.isnan(value) else f"{to_digits(value, 12)}{unit}", meter.MEANING[name]]
         )
 
     solutions = data["solutions"]
     rows = [
-        [label, *(show(s, shown_to) for s in solutions)] for label, show in _ROWS.items() if label != "Re" or p.nu_f
+        [label, *(show(s, to_digits) for s in solutions)] for label, show in _ROWS.items() if label != "Re" or p.nu_f
     ]
     shown = pages.table("Stationary solutions", [["", *(s["case"] for s in solutions)], *rows])
     attracting = {s.case.name for s in analytic.stable_solutions(p)}
@@ -134,7 +134,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     reach = f"it has no operating range: {data['operating_range_ends']['because']}"
     if limit := data["operating_range"]:
         end = data["operating_range_ends"]["because"]
-        reach = f"rolling is its only lasting motion up to ω₀ = {shown_to(limit, 8)} rad/s: there {end}"
+        reach = f"rolling is its only lasting motion up to ω₀ = {to_digits(limit, 8)} rad/s: there {end}"
         if math.isinf(data["reading_range"]):
             reach += "; ω_c = ω₀ holds in every motion, however fast the flow"
     remarks: list[Text | str] = [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {data['reading']}; {reach}."]

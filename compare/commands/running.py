@@ -54,16 +54,16 @@ def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
 
 
 def workers(args: argparse.Namespace) -> Workers:
-    """What the options of `add_workers` name."""
+    """The workers that the options of `add_workers` name."""
     return dask(args.scheduler) if args.scheduler else processes(args.workers)
 
 
 @contextmanager
-def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: Any) -> Iterator[Campaign]:
+def campaign(args: argparse.Namespace, doing: str, **more: Any) -> Iterator[Campaign]:
     """A campaign in a directory of ``--output`` by the workers that are named, whose progress is shown."""
     with (
         progress.reporter(args.quiet or args.json, counted=True) as show,
-        Campaign(args.output / directory, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
+        Campaign(args.output, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
     ):
         yield made
 

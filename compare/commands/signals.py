@@ -42,13 +42,13 @@ def on_first_signal(answer: Callable[[int, FrameType | None], object]) -> Iterat
         for each, handler in before.items():
             signal.signal(each, handler)
 
-    def press(number: int, frame: FrameType | None) -> None:
+    def on_signal(number: int, frame: FrameType | None) -> None:
         restore()
         answer(number, frame)
 
     def listen() -> None:
         for each in before:
-            signal.signal(each, press)
+            signal.signal(each, on_signal)
 
     listen()
     try:
@@ -91,27 +91,27 @@ def raised() -> Iterator[None]:
     """
     heard, waits, usual = list[int](), list[int](), sys.unraisablehook
 
-    def later(number: int) -> None:
+    def send_again(number: int) -> None:
         listen()
         _send_later(number, 0.01)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        if _imports(frame) and len(waits) < _WAITS:
+        if _is_importing(frame) and len(waits) < _WAITS:
             waits.append(number)
-            later(number)
+            send_again(number)
         else:
             heard.append(number)
             raise Interrupted(number)
 
-    def lost(what: sys.UnraisableHookArgs) -> None:
+    def on_unraisable(what: sys.UnraisableHookArgs) -> None:
         if isinstance(what.exc_value, Interrupted):
-            later(heard[-1])
+            send_again(heard[-1])
         else:
             usual(what)
 
     try:
         with on_first_signal(interrupt) as listen:
-            sys.unraisablehook = lost
+            sys.unraisablehook = on_unraisable
             yield
     except Exception as error:
         if heard:
@@ -121,7 +121,7 @@ def raised() -> Iterator[None]:
         sys.unraisablehook = usual
 
 
-def _imports(frame: FrameType | None) -> bool:
+def _is_importing(frame: FrameType | None) -> bool:
     """Whether a frame runs within an import."""
     while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
         frame = frame.f_back

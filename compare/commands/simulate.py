@@ -23,7 +23,7 @@ DURATION = 10.0
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate, keep what there is, and show it."""
+    """Simulate one run, store it as far as it came, and describe it."""
     if args.view:
         return open_viewer(args)
     args.time = args.time or DURATION
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def open_viewer(args: argparse.Namespace) -> int:
-    """Open the viewer."""
+    """Open MuJoCo's viewer and simulate in it."""
     from compare.view import viewer  # here, because nothing else needs it
 
     p = options.parameters(args)
@@ -100,7 +100,7 @@ def _check_no_other_sweep(args: argparse.Namespace, p: Parameters) -> None:
 
 
 def collect(args: argparse.Namespace) -> int:
-    """Gather the runs."""
+    """Gather the runs of a directory into one file."""
     count = collection.collect(args.directory, args.output, args.workers)
     print(f"{count} runs gathered into {args.output}")
     return 0

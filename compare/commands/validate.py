@@ -22,7 +22,7 @@ _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and judge."""
+    """Measure and judge claims, or list them; return the exit code."""
     from compare import validation  # here, because it loads everything there is
 
     console, chosen = options.terminal(quiet=args.json), options.own_set(args) or None
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def judge(args: argparse.Namespace) -> int:
-    """Judge what is stored."""
+    """Judge the stored measurements of a validation again; return the exit code."""
     from compare import validation  # here, because it loads everything there is
 
     console = options.terminal(quiet=args.json)
@@ -94,7 +94,7 @@ def line(verdict: Verdict) -> Text:
 
 
 def summary(verdicts: Sequence[Verdict]) -> Text:
-    """How many claims and numbers came out how."""
+    """A line on how many claims and numbers came out how."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     counts = "; ".join(map(" ".join, wording.totals(ran)))
     shown = Text(f"{wording.headline(ran)}: {counts}. {wording.coarse_and_missing(ran)}".strip(), "bold")

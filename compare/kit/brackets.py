@@ -45,7 +45,7 @@ class Bracket:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Both values."""
+        """The lower and the upper value."""
         return self.low, self.high
 
     @property
@@ -55,7 +55,7 @@ class Bracket:
 
     @property
     def place(self) -> Measured:
-        """Its middle; the uncertainty is that of a uniform distribution, and the shift."""
+        """The middle, with the uncertainty of a uniform distribution and the shift."""
         return Measured((self.low + self.high) / 2, math.hypot(self.width / math.sqrt(12), self.shift))
 
 

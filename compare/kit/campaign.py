@@ -142,7 +142,7 @@ class Campaign:
 
     @property
     def at_once(self) -> int:
-        """How many parts keep the workers busy: two more than there are workers, as some wait for a single long run."""
+        """How many parts to carry out at once: two more than workers, as some parts wait for a single long run."""
         count = self._workers.count
         return count + 2 if count > 1 else 1
 
@@ -178,7 +178,7 @@ class Campaign:
         brief = SOON_DONE if self.passing else 0.0
         return Storing(self.directory, self.label, self.save, self.looked_at, brief)
 
-    def _done(self, key: str) -> bool:
+    def _has_run(self, key: str) -> bool:
         return key in self._files or key in self._read
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
@@ -200,7 +200,7 @@ class Campaign:
         The directory's `FAILURES` lists all that have failed in this campaign, for programs.
         """
         unique = {task.key: task for task in tasks}
-        todo = [task for key, task in unique.items() if not self._done(key)]
+        todo = [task for key, task in unique.items() if not self._has_run(key)]
         earlier = [key for key in unique if key in self._files and _broke_down(self._files[key])]
         failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
         done = len(unique) - len(todo) - len(failures)

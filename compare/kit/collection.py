@@ -165,8 +165,7 @@ def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
 
 
 def _means(runs: Mapping[str, Trajectory]) -> Columns:
-    """For each run parameters, means over the last quarter with uncertainties by drift, and the last case. Those are
-    nan, and the case -1, for a run too short for them."""
+    """Parameters, means over the last quarter with uncertainties by drift, last case of runs; nan and -1 if short."""
     rows = []
     for name, run in runs.items():
         row: dict[str, Any] = {"run": name, "engine": run.header.engine} | dataclasses.asdict(run.header.parameters)
@@ -184,8 +183,7 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
 
 
 def _solution_of(row: Mapping[str, Any]) -> dict[str, float]:
-    """The stable stationary solution of a run's case by theory; nan if there is none, where it is free, or the flow
-    changes."""
+    """The stable stationary solution of a run's case by theory; nan where it has none, and in unsteady flow."""
     found = dict.fromkeys(VARIABLES, math.nan)
     if row["case"] >= 0 and row["steady"]:
         p = Parameters(**{f.name: row[f.name] for f in dataclasses.fields(Parameters)})

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from compare.kit.record import Check, Measurement, Records
-from model import Parameters, StorageError, Trajectory, storage
+from model import Parameters, Trajectory, storage
 from model.files import write_bytes, write_text
 
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands it over never draws
@@ -65,7 +65,7 @@ class GapError(Exception):
 
 
 def only_where(p: Parameters, folds: bool) -> None:
-    """Raise `GapError` unless the wall of a set has less friction than j (`folds`), or more."""
+    """Raise `GapError` unless eta < j in a set, if a figure shows folds, or else eta > j."""
     if (p.eta < p.j) != folds:
         raise GapError(f"it is for η {'<' if folds else '>'} j, here η = {p.eta:g} and j = {p.j:g}")
 
@@ -90,13 +90,11 @@ SUFFIXES = (".svg", ".pdf", ".png")
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure to a file, in the format that its name says; equal figures make equal files.
+    """Write a figure to a file, in the format that its name says, one of `SUFFIXES`; equal figures make equal files.
 
-    Raises `StorageError` if it can't be written or the name says no format.
+    Raises `StorageError` if it can't be written.
     """
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise StorageError(f"cannot write {path}: a figure is a .png, .svg or .pdf")
     if suffix == ".svg":
         from compare.kit.pictures import svg  # here, because drawing takes a second to load
 

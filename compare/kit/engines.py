@@ -81,7 +81,7 @@ class Engine:
 
     @property
     def missing(self) -> str:
-        """Why it can't run here; empty if it can."""
+        """Why the engine can't run on this machine; empty if it can."""
         return self.needs.missing if self.needs else ""
 
     @cached_property
@@ -97,7 +97,7 @@ class Engine:
         return self.study(step, p) if self.study else self.configure({"timestep": step}, p)
 
     def configured(self, given: Mapping[str, float], p: Parameters) -> AnySettings:
-        """`configure`, but an option that belongs to other engines is an `InputError`."""
+        """Settings from given options, as `configure`; `InputError` for an option of other engines."""
         for name in given:
             if name not in self.options:
                 own = " and ".join(f"--{option}" for option in self.options)

@@ -48,7 +48,7 @@ class Lab:
         flow: Flow | None = None,
         samples: int = 100,
     ) -> Task:
-        """A run of the engine on trial with a time step in s, in the studies' settings.
+        """The task of a run by the lab's engine with a time step in s, in the studies' settings.
 
         One that goes on from another begins on floor and wall, into which contacts may have let it sink.
         """

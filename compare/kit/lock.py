@@ -58,7 +58,7 @@ class Lock:
         return True
 
     def release(self) -> None:
-        """Let others have the directory."""
+        """Release the lock: others may have the directory."""
         if sys.platform != "win32":
             self._path.unlink(missing_ok=True)
             self._file.close()

@@ -72,11 +72,11 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
     made = {}
     for k, (name, picture) in enumerate(pictures.items()):
 
-        def letter(found: re.Match[str]) -> str:
+        def collect_letter(found: re.Match[str]) -> str:
             letters[found[1]] = found[0]
             return ""
 
-        text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', letter, picture).replace("<defs></defs>", "")
+        text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', collect_letter, picture).replace("<defs></defs>", "")
         text = re.sub(r"<style.*?</style>", "", text)  # for all lines of a picture: pages have it, too
         text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace("xlink:href", "href")
         made[name] = re.sub(r'^<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', _svg_start, text)
@@ -114,7 +114,7 @@ def _flat(artists: Any) -> Iterator[Artist]:
 
 
 def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
-    """Of axes their box, and what each axis says: panels in a row or column share one label."""
+    """The box of axes, and the scale of each axis as in `_scale`: panels in a row or column share one label."""
     width, height = 72 * figure.get_size_inches()
     box = axes.get_position()
     x, y = (box.x0 * width, box.x1 * width), (height * (1 - box.y0), height * (1 - box.y1))
@@ -129,7 +129,7 @@ def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
 def _scale(
     name: str, axis: Axis, limits: tuple[float, float], places: tuple[float, float], alike: list[Axes]
 ) -> dict[str, Any]:
-    """Of an axis its label, its kind, and (a, b): a + b times the place is the value, or its logarithm."""
+    """Label and kind of an axis, and (a, b) for a page: a + b times the place is the value, or its logarithm."""
     label = next(filter(None, (getattr(each, f"get_{name}label")() for each in alike)), name)
     about: dict[str, Any] = {"label": str(typeset(plain(label))), "kind": axis.get_scale()}
     low, high = np.log10(limits) if about["kind"] == "log" else limits
@@ -142,7 +142,7 @@ def _scale(
 
 
 def _join_marks(group: ElementTree.Element) -> None:
-    """Make marks that look alike one path with a mark at each of its points, which is a tenth as long."""
+    """Replace marks that look alike by one path with a mark at each of its points, which is a tenth as long."""
     looks = {(mark.tag, mark.get(f"{_XLINK}href"), mark.get("style"), *sorted(mark.keys())) for mark in group}
     if len(group) < _FEW or len(looks) > 1 or group[0].tag != f"{_SVG}use" or {"x", "y"} - {*group[0].keys()}:
         return
@@ -160,16 +160,16 @@ def _join_marks(group: ElementTree.Element) -> None:
 
 
 def _renumber(root: ElementTree.Element) -> None:
-    """Name what is referred to, but letters, in order, and nothing else: matplotlib's names are drawn by lot."""
+    """Number the ids in an SVG in order, but those of letters: matplotlib's own are random."""
     names: dict[str, str] = {}
 
-    def named(found: re.Match[str]) -> str:
+    def new_name(found: re.Match[str]) -> str:
         return found[1] + (found[2] if "-" in found[2] else names.setdefault(found[2], f"n{len(names)}"))
 
     for each in root.iter():
         for attribute in (f"{_XLINK}href", "clip-path", "style", "marker-start", "marker-mid", "marker-end"):
             if "#" in (text := each.get(attribute, "")):
-                each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", named, text))
+                each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", new_name, text))
     for each in root.iter():
         if "id" in each.attrib and "-" not in each.attrib["id"]:
             name = each.attrib.pop("id")
@@ -178,7 +178,7 @@ def _renumber(root: ElementTree.Element) -> None:
 
 
 def _rounded(text: str) -> str:
-    """Places to hundredths of a point, which are fine enough, and half as long; no spaces that say nothing."""
+    """SVG text with places rounded to hundredths of a point, and without superfluous spaces: half as long."""
 
     def rounded(found: re.Match[str]) -> str:
         return re.sub(r" +(?=[ \"])", "", re.sub(r"(\.\d\d)\d+", r"\1", found[0]))

@@ -53,14 +53,14 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         began, ended = time.monotonic(), threading.Event()
         before, last = -1, ("starting", 0, 0, 0)
 
-        def note(what: str, done: int, total: int, failed: int) -> None:
+        def remember(what: str, done: int, total: int, failed: int) -> None:
             nonlocal before, last
             if before < 0:
                 before = done  # what an earlier session did is no measure of how fast this one is
                 print(what, file=sys.stderr, flush=True)
             last = what, done, total, failed
 
-        def tell() -> None:
+        def print_progress() -> None:
             while not ended.wait(INTERVAL):
                 what, done, total, failed = last
                 rate = (time.monotonic() - began) / (done - before) if done > before >= 0 else 0.0
@@ -69,10 +69,10 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
                 bad = f", {failed} failed" if failed else ""
                 print(f"{time.monotonic() - began:.0f} s: {what}{share}{bad}{left}", file=sys.stderr, flush=True)
 
-        thread = threading.Thread(target=tell, daemon=True)
+        thread = threading.Thread(target=print_progress, daemon=True)
         thread.start()
         try:
-            yield note
+            yield remember
         finally:
             ended.set()
             thread.join()
@@ -92,20 +92,20 @@ class ValidationProgress:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def measuring(self, protocol: str, done: int, total: int, failed: int) -> None:
-        """So many runs of a protocol are done, of so many that are known so far, and so many failed."""
+        """Note how many runs of a protocol are done, how many are known so far, and how many failed."""
         with self._lock:
             self._under_way[protocol] = done, total, failed
             self._tell()
 
     def measured(self, protocol: str) -> None:
-        """A protocol is done."""
+        """Note that a protocol is done."""
         with self._lock:
             self._under_way.pop(protocol, None)
             self._measured += self.costs[protocol]
             self._tell()
 
     def judged(self) -> None:
-        """One more claim is judged."""
+        """Note that one more claim is judged."""
         with self._lock:
             self._judged += 1
             self._tell()

@@ -144,8 +144,7 @@ class Check:
 
     @property
     def share(self) -> float:
-        """Size of the deviation divided by the tolerance; inf where theory knows no such state, or without
-        tolerance."""
+        """Size of the deviation divided by the tolerance; inf without tolerance, or where theory has no such state."""
         if self.deviation == 0:
             return 0.0
         share = abs(self.deviation / self.tolerance) if self.tolerance else math.inf
@@ -191,7 +190,7 @@ class Records:
 
     @classmethod
     def of(cls, rows: Iterable[Measurement | Missing]) -> Records:
-        """Sort what a protocol yields into the two kinds."""
+        """Records from what a protocol yields: measurements, and what is missing."""
         kept = list(rows)
         missing = tuple(row for row in kept if isinstance(row, Missing))
         return cls(tuple(row for row in kept if isinstance(row, Measurement)), missing)
@@ -213,7 +212,7 @@ class Records:
                 yield m
 
     def threshold(self, set: str, quantity: str) -> Measured | None:
-        """The surest value of a threshold of a set, as the protocol of that name measured it; None if it did not."""
+        """The least uncertain measured value of a threshold of a set; None if it was not measured."""
         measured = self.select("thresholds", quantity, lambda m: m.set == set)
         best = min(measured, key=lambda m: m.uncertainty, default=None)
         return Measured(best.value, best.uncertainty) if best else None

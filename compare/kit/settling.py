@@ -76,9 +76,9 @@ class Patience:
 
 
 def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -> list[Settled]:
-    """Run the ball from each start until it is settled: the states, in order. Of an engine as it comes every state
-    counts, for what it is when time is up.
+    """Run the ball from each start until it is settled; the states, in order.
 
+    Of an engine as it comes every state counts, for what it is when time is up.
     What isn't settled goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land.
     """
@@ -187,7 +187,7 @@ def rounded_duration(p: Parameters, units: float) -> float:
 
 
 def named_start(set: str, p: Parameters, how: str) -> Start:
-    """At the flow of p from rest, going round with the fluid or half as fast, or with it and so high up on the wall."""
+    """A start at the flow of p by its name: from rest, with the fluid or half as fast, or so high up on the wall."""
     orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
     return Start(set, p, how, State(y=safe_height(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked())
 

@@ -52,7 +52,7 @@ def plain(value: Any) -> Any:
 
 
 def taper(length: int) -> Array:
-    """The tapered window (n,)."""
+    """Weights (n,) of a tapered window, which fall to zero at both ends."""
     return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
 
 
@@ -72,7 +72,7 @@ def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
 
 
 def tail(run: Trajectory, share: float = 0.1) -> slice:
-    """The samples of the last part of a run."""
+    """The slice of samples of the last part of a run."""
     return slice(int((1 - share) * len(run.time)), None)
 
 
@@ -112,7 +112,7 @@ def hops_on(y: Array, R: float) -> bool:
 
 
 POINTS = 5
-"""Least number of points that `vanishing`, `initial_slope` and `turning` extrapolate from."""
+"""Least number of points that `extrapolated_zero`, `initial_slope` and `extrapolated_maximum` extrapolate from."""
 LEAST_RATIO, LARGEST_RATIO = 0.2, 0.9
 """Range of the ratio of the geometric series by which the changes of an estimate, point by point, are continued: two
 changes may be small by chance, and with a ratio near 1 the sum has no bound."""
@@ -179,7 +179,7 @@ def extrapolated_zero(where: Array, values: Sequence[Measured]) -> Measured:
 
 
 def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:
-    """Derivative of the place with respect to a quantity where that is zero; arguments as for `vanishing`."""
+    """Derivative of the place with respect to a quantity where that is zero; arguments as for `extrapolated_zero`."""
     size = max(abs(m.value) for m in values)
     return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size, values)
 

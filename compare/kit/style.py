@@ -109,7 +109,7 @@ OMEGA_0, OMEGA_C, OMEGA_X = (f"{name} (rad/s)" for name in ("$ω_0$", symbol("om
 
 
 def named(p: Parameters, *names: str) -> str:
-    """The dimensionless parameters as a caption gives them, all but omega_0 if none is named, and the law of drag."""
+    """Dimensionless parameters as text of a caption, all but that of omega_0 if none is named, and the drag law."""
     values = [f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")]
     if p.drag != STOKES:
         values.append(f"{p.drag} drag with Re = {2 * p.r * math.sqrt(p.g * p.R) / p.nu_f:.3g} at √(gR)")
@@ -117,7 +117,7 @@ def named(p: Parameters, *names: str) -> str:
 
 
 def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = ()) -> str:
-    """Sentences, the parameters, and what the marks of measured states are."""
+    """A caption: sentences, the parameters of a set, and what the marks of measured states mean."""
     return " ".join(filter(None, (*sentences, f"{named(p)}."))) + marks(states)
 
 
@@ -139,7 +139,7 @@ def marks(states: Sequence[Measurement]) -> str:
 
 
 def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
-    """Second scales, at the top and on the right if they are named: angular velocity in units of sqrt(g/R)."""
+    """Draw second scales, at the top and right if they are named: angular velocities in units of sqrt(g/R)."""
     unit = math.sqrt(p.g / p.R)
     scale: Any = (lambda w: w / unit, lambda W: W * unit)
     if x:
@@ -149,7 +149,7 @@ def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
 
 
 def tint(*cases: Case) -> str:
-    """The pale ground of a region in which balls end in these cases."""
+    """The pale colour of a region in which balls end in these cases."""
     colours = [to_rgb(COLOURS[case]) for case in cases]
     return to_hex(0.86 + 0.14 * np.mean(colours, axis=0))
 
@@ -162,7 +162,7 @@ def curve(
     name: Name = ("", None),
     line: Line = STABLE,
 ) -> None:
-    """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place.
+    """Draw a line of theory (n,) in the colour of its case, where y is finite, and its name if that has a place.
 
     Of several cases that lie on it the colours take turns.
     """
@@ -184,13 +184,13 @@ def curve(
 
 
 def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float]) -> None:
-    """A black dot with its name beside it, `offset` in points."""
+    """Draw a black dot with its name beside it, `offset` in points."""
     axes.plot([x], [y], **POINT)
     beside(axes, x, y, text, offset)
 
 
 def beside(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> Text:
-    """A name beside a point or a curve, `offset` in points; one that is far off has a line to it."""
+    """Write a name beside a point or a curve, `offset` in points, with a line to it if it is far off."""
     leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1} if math.hypot(*offset) > 16 else None
     ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
     va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
@@ -199,7 +199,7 @@ def beside(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float
 
 
 def guides(axes: Axes, values: dict[str, float]) -> None:
-    """Dotted lines at thresholds by name, rad s-1, named at the foot, one higher where names would overlap."""
+    """Draw dotted lines at thresholds by name, rad s-1, named at the foot, one higher where names would overlap."""
     low, high = axes.get_xlim()
     last, step = -math.inf, 0
     look: dict[str, Any] = {"xytext": (2, 0), "textcoords": "offset points", "fontsize": 9, "bbox": HALO}
@@ -240,7 +240,7 @@ def points(
     way: str = "",
     **look: Any,
 ) -> None:
-    """Measured values, one `unit` each, by engine; capped bars of three standard uncertainties, pale marks without."""
+    """Draw measured values times `unit`, by engine, with bars of three standard uncertainties; pale where too long."""
     rows = list(rows)
     for m in rows:
         axes.update_datalim([(x(m), unit * y(m))])
@@ -259,7 +259,7 @@ def points(
 
 
 def legend(of: Axes | Figure, **where: Any) -> None:
-    """A legend that names everything once, if there is anything to name; of a figure it stands outside the panels."""
+    """Draw a legend that names everything once, if there is anything to name; of a figure outside the panels."""
     once: dict[str, Any] = {}
     for axes in of.axes if isinstance(of, Figure) else [of]:
         handles, labels = axes.get_legend_handles_labels()
@@ -284,7 +284,7 @@ def ground(
 
 
 def deviations(axes: Axes, rows: Iterable[Measurement], predicted: Callable[[Measurement], float]) -> None:
-    """A panel of relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
+    """Draw relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
     for engine, own in by_engine(rows, lambda m: m.engine).items():
         off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
         axes.plot(list(map(omega_0, own)), off, ls="none", ms=5, **mark_of(engine))

@@ -53,7 +53,7 @@ class Axis:
 
     @classmethod
     def several(cls, texts: Sequence[str], *kind: Any) -> list[Axis]:
-        """Read each as `parse` does; raises `InputError`, for a name that comes twice, too."""
+        """Read several texts as `parse` does; raises `InputError`, for a name that comes twice, too."""
         axes = [cls.parse(text, *kind) for text in texts]
         names = [axis.name for axis in axes]
         for name in names:
@@ -70,7 +70,7 @@ class Axis:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Of the range; raises `InputError` if there is none."""
+        """Lowest and highest value of the range; raises `InputError` if there is none."""
         if len(self.values) != 2:
             raise InputError(f"here {self.name} needs a range: write {self.name}=from:to")
         return self.values[0], self.values[1]

@@ -87,7 +87,7 @@ class Task:
 
     @property
     def steps(self) -> float:
-        """Time steps; 1 for an engine that has none."""
+        """How many time steps it takes; 1 for an engine that has none."""
         return self.t_end / (self.settings.timestep or self.t_end)
 
     @property
@@ -145,12 +145,12 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
     check = deadline(limit)
     if task.simulator.simulate:
 
-        def interrupted() -> None:
+        def check_stop() -> None:
             check()
             if stop():
                 raise InterruptedError("interrupted")
 
-        (run,) = carry_out([task], interrupted)
+        (run,) = carry_out([task], check_stop)
         failure = run.header.failure
         storage.save(run, failed_path(path) if failure else path)
     else:
@@ -179,7 +179,7 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
 
 
 def failed_path(path: Path) -> Path:
-    """Where a run that broke down is kept."""
+    """The path at which a run that broke down is kept, by that of a whole run."""
     return path.with_suffix(".failed.h5")
 
 

@@ -113,7 +113,7 @@ def slip_unit(p: Parameters) -> float:
 
 
 def lag_error(p: Parameters, refine: int = 1) -> float:
-    """Least uncertainty of a force divided by the weight, which halving the step may by chance not show.
+    """Least uncertainty of a force divided by the weight, as halving the step may by chance change nothing.
 
     Half the square of the lag `LAG` in units of `time_unit`: the second order, once the first is extrapolated. The
     steps of `REFINED` may be divided by `refine`.

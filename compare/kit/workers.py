@@ -100,7 +100,7 @@ def processes(count: int) -> Workers:
         for library in ("OMP", "OPENBLAS", "MKL"):  # inherited by the workers; numpy reads it when they import it
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
         resource_tracker.ensure_running()  # it lets signals through
-        with _deaf():  # a semaphore that is half made would be left
+        with _without_signals():  # a semaphore that is half made would be left
             return _Pool(count)
 
     def stop(executor: Executor, at_once: bool) -> None:
@@ -118,15 +118,17 @@ class _Pool(ProcessPoolExecutor):
     def __init__(self, count: int) -> None:
         context = get_context("spawn")
         self._end, self.leash = context.Pipe(duplex=False)  # ours must stay open until all workers have started
-        super().__init__(count, mp_context=context, initializer=_follow, initargs=(self._end,))
+        super().__init__(count, mp_context=context, initializer=_follow_parent, initargs=(self._end,))
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        with _deaf():  # as the workers are that it may start: they have no handlers before they have imported much
-            return super().submit(_work, fn, *args, **kwargs)
+        with (
+            _without_signals()
+        ):  # as the workers are that it may start: they have no handlers before they have imported much
+            return super().submit(_call_in_worker, fn, *args, **kwargs)
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def _without_signals() -> Iterator[None]:
     """A context in which signals that end a program wait, and whose new processes never get them.
 
     Those that another thread gets are handled by the main one, blocked or not: they are sent again afterwards.
@@ -154,7 +156,7 @@ _between = threading.Lock()
 """Held by a worker between its tasks, while it may be sending a result: half of one would keep the parent waiting."""
 
 
-def _work(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
+def _call_in_worker(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
     """In a worker: call a function, during which the parent may end the worker."""
     if _between.locked():
         _between.release()
@@ -164,10 +166,10 @@ def _work(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
         _between.acquire()
 
 
-def _follow(end: Connection) -> None:
+def _follow_parent(end: Connection) -> None:
     """In a worker: leave Ctrl-C to the parent, and end with it, or when it says so."""
 
-    def wait() -> None:
+    def wait_for_parent() -> None:
         end.poll(None)
         parent = parent_process()
         if parent and parent.is_alive():
@@ -178,7 +180,7 @@ def _follow(end: Connection) -> None:
     signal.signal(signal.SIGTERM, lambda number, frame: leave(1))  # by the pool, where another worker died
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-    threading.Thread(target=wait, daemon=True).start()
+    threading.Thread(target=wait_for_parent, daemon=True).start()
 
 
 class _Here(Executor):
@@ -220,7 +222,7 @@ def dask(address: str) -> Workers:
 
 @contextmanager
 def threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads that an error doesn't wait for: they end by themselves, and what they still do is of no use."""
+    """A context with a pool of threads for which an error doesn't wait: they end by themselves."""
     pool = ThreadPoolExecutor(count)
     try:
         yield pool
@@ -244,10 +246,10 @@ def at_most(limit: float) -> Iterator[None]:
         yield
         return
 
-    def late(*_: object) -> None:
+    def raise_late(*_: object) -> None:
         raise LateError(f"it took longer than {limit:g} s")
 
-    before = signal.signal(signal.SIGVTALRM, late)
+    before = signal.signal(signal.SIGVTALRM, raise_late)
     signal.setitimer(signal.ITIMER_VIRTUAL, limit)
     try:
         yield

@@ -69,7 +69,7 @@ AT_WALLS = (
 
 
 def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
-    """A number with at most `most` digits, and beyond the third none that its relative error `off` makes uncertain.
+    """A number as text: at most `most` digits, and beyond the third none that its relative error `off` makes doubtful.
 
     With fewer than three what differs by half would look alike.
     """
@@ -161,7 +161,7 @@ def tables(made: Design) -> list[Table | str]:
 def described(made: Design) -> dict[str, Any]:
     """A design as plain data; what doesn't exist is nan."""
 
-    def meter(c: Choice) -> dict[str, Any]:
+    def meter_data(c: Choice) -> dict[str, Any]:
         limits = {"limit": c.limit, "worst": c.worst}
         ends = {name: {"omega_0": of.omega_0, "end": of.end.name} for name, of in limits.items()}
         return {"values": c.values, **ends, "margin": c.margin, "response": c.response}
@@ -170,7 +170,7 @@ def described(made: Design) -> dict[str, Any]:
     return {
         "request": made.request,
         "material": made.material,
-        "meter": meter(made.choice),
+        "meter": meter_data(made.choice),
         "parameters": p,
         "covers": made.choice.margin >= 1,
         "model_error": made.model_error,
@@ -178,7 +178,7 @@ def described(made: Design) -> dict[str, Any]:
         "worst_limit_with_inertia": made.with_inertia,
         "reading_range": flowmeter.reading_range(p),
         "unloading_limit": flowmeter.unloading_limit(p),
-        "materials": {name: meter(c) for name, c in made.choices.items()},
+        "materials": {name: meter_data(c) for name, c in made.choices.items()},
         "refused": made.refused,
         "thresholds": {
             key: {"value": getattr(made.thresholds, key), **dict(zip(ends, of, strict=True))}

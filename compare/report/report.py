@@ -149,7 +149,7 @@ def errata() -> str:
 def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str, list[Any]]:
     """Columns of the page's searchable table: a row for each check, and each measurement on which no claim bears."""
 
-    def key(m: Measurement) -> tuple[Any, ...]:  # the same for a copy that another process has judged
+    def identity(m: Measurement) -> tuple[Any, ...]:  # the same for a copy that another process has judged
         conditions = tuple(sorted(m.conditions.items()))
         return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, conditions
 
@@ -161,8 +161,8 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
         return float(f"{round(value, digits):.9g}") + 0.0  # no negative zero
 
     judged = [(claim, check.measurement, check) for claim, own in checks.items() for check in own]
-    known = {key(m) for _, m, _ in judged}
-    rows = [*judged, *(("", m, None) for m in records.measurements if key(m) not in known)]
+    known = {identity(m) for _, m, _ in judged}
+    rows = [*judged, *(("", m, None) for m in records.measurements if identity(m) not in known)]
     return {
         "set": [m.set for _, m, _ in rows],
         "omega_0": [float(f"{m.parameters.omega_0:.6g}") for _, m, _ in rows],

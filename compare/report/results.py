@@ -95,8 +95,7 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
 
 
 def open_directory(directory: Path) -> None:
-    """Make sure that results may be written here.
-
+    """Make a directory for results, and check that they may be written there.
     Raises `StorageError` if the directory can't be written or holds results of another version of the program.
     """
     make_directory(directory)

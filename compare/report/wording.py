@@ -31,12 +31,12 @@ MARKS = {
 
 
 def size(value: float, sign: str = "") -> str:
-    """The size of a small number: two digits, or 0."""
+    """A small number as text: two digits, or 0."""
     return f"{value:{sign}.1e}" if value else "0"
 
 
 def value(m: Measurement, of: float) -> str:
-    """A value of the measurement's quantity; cases by their names, of what is tiny its size alone."""
+    """A value of the measurement's quantity as text; cases by their names, of what is tiny its size alone."""
     if not math.isfinite(of):
         return "none" if math.isnan(of) else f"{of:g}"
     if m.quantity == "case":

@@ -24,6 +24,6 @@ NAMES = (
 
 
 def parts(part: str) -> list[ModuleType]:
-    """The `measure`, `claims` or `figures` of all subjects that have them."""
+    """The modules `measure`, `claims` or `figures` of all subjects that have them."""
     modules = (f"{__name__}.{name}.{part}" for name in NAMES)
     return [import_module(module) for module in modules if find_spec(module)]

@@ -74,7 +74,7 @@ def with_value(p: Parameters, name: str, value: float | str) -> Parameters:
 
 
 def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
-    """omega_c of stationary solutions over omega_0, the thresholds, where the ball starts; a click anywhere counts."""
+    """A figure of omega_c of stationary solutions over omega_0, the thresholds, and where the ball starts."""
     t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, stable_ends(p)
     lines: list[tuple[str, Case, Any, Any, str]] = []
     if np.isfinite(rolls):
@@ -106,7 +106,7 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
 
 
 def regions(p: Parameters, fastest: float) -> Figure:
-    """Which stationary solutions exist over the wall's friction and the flow, and where the set is."""
+    """A figure of which stationary solutions exist over the wall's friction and the flow, and where the set is."""
     eta, flows = np.linspace(0.0, SLIDERS["eta"][2], 121), np.linspace(0.0, fastest, 161)
     found = bifurcation.case_map(p, p.mu, eta, flows).T
     kinds, index = np.unique(found, return_inverse=True)
@@ -163,7 +163,7 @@ def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more
 
 
 def simulated(p: Parameters, start: State) -> Trajectory:
-    """A motion; what there is of one that breaks down."""
+    """The motion of theory from a start; as far as it came if it broke down."""
     try:
         return analytic.simulate(p, start.stacked(), LASTS, sample_interval=1 / RATE)
     except SimulationError as error:
@@ -218,7 +218,7 @@ def serve(p: Parameters, port: int, show: bool) -> None:
 
 
 def page(p: Parameters) -> None:
-    """Build a tab."""
+    """Build the page in a tab of the browser."""
     from nicegui import ui
 
     tab, draw = Tab(p), list[Callable[[], None]]()
@@ -301,7 +301,7 @@ def _download(ui: Any, tab: Tab) -> None:
 
 
 def _bytes(save: Callable[[Path], object], name: str) -> bytes:
-    """What a function writes into a file."""
+    """The bytes that a function writes into a file of a name."""
     with tempfile.TemporaryDirectory() as directory:
         save(Path(directory) / name)
         return (Path(directory) / name).read_bytes()

@@ -79,7 +79,7 @@ def resampled(run: Trajectory, times: Array) -> Trajectory:
 
 
 def orientations(run: Trajectory) -> Rotation:
-    """How the ball is turned at each sample, from its angular velocity in the middle between them; upright at first."""
+    """The ball's orientation at each sample, from its angular velocity in the middle between them; upright at first."""
     middle = resampled(run, (run.time[1:] + run.time[:-1]) / 2)
     spin = to_world(middle.x, middle.theta, run.header.parameters).spin
     turned = [Rotation.identity()]

@@ -156,7 +156,7 @@ def compared_tables(about: dict[str, Any]) -> list[Any]:
 
 
 def draw_both(a: Series, b: Series) -> Figure:
-    """Both motions in the quantities that both have, on the cases of the first, and how far they are apart in each."""
+    """A figure of two motions in the quantities that both have, on the cases of the first, and of their differences."""
     from compare.kit import style  # here, because drawing takes a second to load
 
     names = [name for name in a.values if name in b.values]
@@ -183,7 +183,7 @@ def draw_both(a: Series, b: Series) -> Figure:
 
 
 def draw(run: Trajectory) -> Figure:
-    """omega_c, slip, gaps and forces over time; backgrounds in the colour of the case, named above."""
+    """A figure of omega_c, slip, gaps and forces over time, on backgrounds in the colour of the case."""
     from compare.kit import style  # here, because drawing takes a second to load
 
     t, p = run.time, run.header.parameters

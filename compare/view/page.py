@@ -59,7 +59,7 @@ def write(p: Parameters, speed: float, motion: dict[str, Any] | None = None, run
 
 
 def _three() -> str:
-    """three.js with its controls, as a module in an address of its own."""
+    """The library three.js with its controls, as a module in a data address."""
     nicegui = importlib.util.find_spec("nicegui")
     if nicegui is None or nicegui.origin is None:
         raise InputError("a page needs NiceGUI, which has three.js: pip install 'dualball[explore]'")

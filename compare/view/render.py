@@ -167,7 +167,7 @@ def _mp4(images: Iterator[Image.Image], rate: int) -> bytes:
 
 
 def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, note: str, slips: bool) -> Image.Image:
-    """The picture from outside, changed in place, with the one from beside the ball in its corner.
+    """The picture from outside with that from beside the ball in its corner, labelled with time, case and note.
 
     Written over it are the case and numbers of sample k of the run, a note beside the time, and a legend, with slip
     velocities if there are any.

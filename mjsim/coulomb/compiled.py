@@ -42,7 +42,7 @@ COMPILES = numba is not None and not numba.config.DISABLE_JIT
 
 
 def _layout(struct: str) -> type[ctypes.Structure]:
-    """A structure of MuJoCo as ctypes knows it."""
+    """The memory layout of a structure of MuJoCo, as a ctypes structure."""
     scalars = {"int": ctypes.c_int, "mjtNum": ctypes.c_double, "float": ctypes.c_float} | dict.fromkeys(
         ("mjtSize", "size_t", "uintptr_t", "uint64_t"), ctypes.c_uint64
     )
@@ -89,7 +89,7 @@ _LATER = {"map_efc2iefc", "iefc_R", "iefc_D"}
 
 
 def _offset(layout: Any, name: str) -> int:
-    """Where a member stands; -1 for one that this MuJoCo may lack."""
+    """Offset in bytes of a member of a structure; -1 for one that this MuJoCo may lack."""
     member = getattr(layout, name, None) or getattr(layout, _OLD.get(name, name), None)
     if member is None and name not in _LATER:
         raise ImportError(f"Coulomb's law doesn't know MuJoCo {mujoco.__version__}, which has no {name}")
@@ -302,7 +302,7 @@ W = law.WIDTH
 
 @compiled
 def _room(head: int, block: int, numbers: int) -> Any:
-    """A block with room for so many reals."""
+    """A block of the simulation's memory, grown to so many reals if it is smaller."""
     blocks = _int64(head)
     if blocks[block + 1] < numbers:
         blocks[block + 1] = numbers + numbers // 2 + 64
@@ -312,7 +312,7 @@ def _room(head: int, block: int, numbers: int) -> Any:
 
 @compiled
 def room(head: int, block: int, numbers: int) -> None:
-    """Make room."""
+    """Grow a block of the simulation's memory to so many reals if it is smaller."""
     _room(head, block, numbers)
 
 
@@ -334,7 +334,7 @@ def _elliptic(m: int) -> bool:
 
 @compiled
 def _gravity(m: int) -> float:
-    """Its acceleration, m s-2; the earth's if there is none."""
+    """The size of the model's gravity, m s-2; the earth's if it has none."""
     g = _real(m + _at(GRAVITY))
     size = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
     return size if size > 0 else 9.81
@@ -364,8 +364,9 @@ def control(m: int, d: int, head: int) -> None:
     if over or not known:
         numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _value(m, STEP), resets
     numbers[CALLED] = time
-    start = _array(d, START)
+    start, last = _array(d, START), _array(d, QACC)
     for i in range(_number(m, DOFS)):
+        last[i] = start[i] if counts[COUNT_FOUND] < 0 else last[i]  # of restored states MuJoCo keeps but that
         start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
     if known and over:
         _go_along(m, d, head)
@@ -475,7 +476,7 @@ def _still(m: int, d: int, head: int) -> bool:
 
 @compiled
 def _turn_in(m: int, d: int, head: int, source: int, known: bool) -> None:
-    """What contacts bore, friction in the axes of both bodies, becomes what is handed on."""
+    """Begin a step: what contacts bore in the last one becomes what is remembered, friction in the bodies' axes."""
     counts = _int64(head)
     if known and not counts[TURNED]:
         convert(m, head, source)
@@ -491,7 +492,7 @@ def _turn_in(m: int, d: int, head: int, source: int, known: bool) -> None:
 
 @compiled
 def convert(m: int, head: int, source: int) -> None:
-    """Keep what rows bear as what contacts bear, friction in the axes of both bodies."""
+    """Convert forces of constraint rows to forces of contacts, with friction in the axes of both bodies."""
     counts, elliptic = _int64(head), _elliptic(m)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
     for i in range(counts[COUNT]):
@@ -516,7 +517,7 @@ def convert(m: int, head: int, source: int) -> None:
 
 @compiled
 def carry_on(m: int, d: int, head: int) -> None:
-    """The velocity that the last Jacobian gives to the present speeds, along its last axes."""
+    """Store the slip velocity of each contact by the last Jacobian and the present speeds, along its last axes."""
     counts, edges, ngeom, speeds = _int64(head), not _elliptic(m), _number(m, NGEOM), _array(d, QVEL)
     kept, axes, poses, places = _block(head, KEPT), _block(head, AXES), _block(head, POSES), _int64(counts[PLACES])
     for i in range(counts[COUNT]):
@@ -543,8 +544,9 @@ def _tangential(head: int, r: int, t: int, edges: bool, friction: float, vector:
 
 @compiled
 def _turn(m: int, d: int, head: int, elapsed: float) -> None:
-    """Add to the reference accelerations of what is fixed on bodies that turn what the rows leave out: of soft contacts
-    that stick -dJ/dt v; of rigid ones, which lose the velocity that the turning shows, half of it."""
+    """Add to reference accelerations of contacts that stick on turning bodies what the rows leave out.
+
+    Of soft contacts that is -dJ/dt v; of rigid ones, which lose the velocity that the turning shows, half of it."""
     counts, edges, rigid = _int64(head), not _elliptic(m), _real(head)[RIGID] > 0
     kept, axes, places = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES])
     contact, reference, speeds = _int64(d + _at(CONTACT))[0], _array(d, AREF), _array(d, QVEL)
@@ -569,7 +571,7 @@ def _turn(m: int, d: int, head: int, elapsed: float) -> None:
 
 @compiled
 def _find(m: int, d: int, head: int) -> None:
-    """Contacts, their places on both bodies and their rows."""
+    """Find the contacts of a step, their places on both bodies, and their constraint rows."""
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
     xpos, xmat, contact, kbip = _array(d, XPOS), _array(d, XMAT), _int64(d + _at(CONTACT))[0], _array(d, KBIP)
     ncon, count, rows, size = _number(d, NCON), 0, 0, _at(SIZE)
@@ -639,8 +641,9 @@ def _axis(t: int) -> int:
 
 @compiled
 def _chain(head: int) -> int:
-    """Contacts of a pair of geoms one after the other: `CHAINS` has the first at `_link`, and the next of each after
-    as many links as this returns; -1: no more. Others may be between them."""
+    """Chain the contacts of each pair of geoms; return the number of links.
+
+    `CHAINS` has the first at `_link`, and the next of each after so many links; -1: no more. Others may be between."""
     counts, kept, links = _int64(head), _block(head, KEPT), 16
     while links < 2 * counts[COUNT]:
         links *= 2
@@ -655,7 +658,7 @@ def _chain(head: int) -> int:
 
 @compiled
 def _link(contacts: Any, k: int, links: int) -> int:
-    """Where the chain of a contact's geoms begins."""
+    """Index at which the chain of a contact's pair of geoms begins."""
     return (int(contacts[k]) * 2654435761 + int(contacts[k + 1]) * 40503) >> 3 & (links - 1)
 
 
@@ -756,7 +759,7 @@ def _rotated(a: Any, turn: Any) -> Any:
 
 @compiled
 def _go_along(m: int, d: int, head: int) -> None:
-    """Accelerations of free bodies, in the axes that these had, become those in the axes that they have now."""
+    """Turn angular accelerations of free bodies from the axes that these had to those that they have now."""
     counts, h, speeds = _int64(head), _value(m, STEP), _array(d, QVEL)
     free = _int64(counts[FREE])
     for i in range(counts[COUNT_FREE]):
@@ -825,7 +828,7 @@ def _gyrate(m: int, d: int, head: int, known: bool, over: bool) -> None:
 
 @compiled
 def _stiffen(m: int, d: int, head: int) -> None:
-    """Rows of rigid contacts: as stiff as `Law.softness`, for the velocities of Moreau and Jean's time stepping."""
+    """Set rows of rigid contacts as stiff as `Law.softness`, for the velocities of Moreau and Jean's time stepping."""
     counts, numbers, elliptic, h = _int64(head), _real(head), _elliptic(m), _value(m, STEP)
     kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
     softness, stiffness, diagonal = _array(d, R), _array(d, D), _array(d, DIAG)
@@ -906,7 +909,7 @@ def _copy_rows(m: int, d: int, head: int) -> None:
 
 @compiled
 def _hold(m: int, d: int, head: int) -> None:
-    """The rows' own numbers, with what memory adds: of soft ones friction, of pyramids what differs from the mean."""
+    """Set softness, reference and remembered force of rows: of soft ones friction, of pyramids less the mean."""
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
     places, rows, softness, reference = _int64(counts[PLACES]), _block(head, ROWS), _array(d, R), _array(d, AREF)
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
@@ -925,7 +928,7 @@ def _hold(m: int, d: int, head: int) -> None:
 
 @compiled
 def _multiply(m: int, head: int, vector: Any) -> None:
-    """J times a vector, of all rows, into `RESIDUAL`."""
+    """Set `RESIDUAL` of all rows to J times a vector."""
     counts, rows, moves = _int64(head), _block(head, ROWS), False
     for i in range(_number(m, DOFS)):
         moves |= vector[i] != 0
@@ -962,7 +965,7 @@ def _slip(rows: Any, r: int, length: int, elliptic: bool, axes: Any, mu: int) ->
 
 @compiled
 def _lack(head: int) -> None:
-    """What accelerations J a lack of the reference, as `RESIDUAL`."""
+    """Set `RESIDUAL` of rows to J a less the reference acceleration."""
     counts, rows = _int64(head), _block(head, ROWS)
     for r in range(0, ROW * counts[COUNT_ROWS], ROW):
         rows[r + RESIDUAL] -= rows[r + REFERENCE]
@@ -1052,7 +1055,7 @@ def _holds(rows: Any, r: int, length: int, edges: bool, axes: Any, mu: int, diag
 
 @compiled
 def _refer(m: int, d: int, head: int) -> None:
-    """Reference accelerations with memory, less slip in the normal direction."""
+    """Write the engine's reference accelerations: with memory, less the lift by slip in the normal direction."""
     counts, elliptic, reference = _int64(head), _elliptic(m), _array(d, AREF)
     kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
@@ -1130,7 +1133,7 @@ def _share(rows: Any, r: int, length: int, edges: bool, axes: Any, a: int) -> in
 
 @compiled
 def _take_over(m: int, d: int, head: int) -> None:
-    """What was found is what is foreseen next: slip, and the forces of rigid contacts."""
+    """Take slip, and forces of rigid contacts, that were found as what is foreseen next."""
     counts, kept, rows = _int64(head), _block(head, KEPT), _block(head, ROWS)
     for i in range(counts[COUNT]):
         kept[W * i + law.SLIP] = kept[W * i + law.SEEN]
@@ -1269,14 +1272,14 @@ def step(m: int, d: int, head: int) -> None:
 
 @compiled
 def advance(m: int, d: int, head: int, nstep: int) -> None:
-    """So many steps."""
+    """Advance by `nstep` steps."""
     for _ in range(nstep):
         step(m, d, head)
 
 
 @compiled
 def step_of(m: int, d: int, head: int, duration: float, anew: bool) -> None:
-    """A step of so many seconds, with nothing remembered or with what is."""
+    """Take a step of so many seconds, with the memory, or anew without it."""
     _real(m + _at(STEP))[0] = duration
     if anew:
         _reset(head)
@@ -1292,7 +1295,7 @@ _FIND = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
 def _adopt(function: int, m: int, d: int) -> int:
-    """What a `_FIND` at an address returns."""
+    """Call the function `_FIND` at an address, and return what it returns."""
     return int(_FIND(function)(m, d))
 
 

@@ -98,8 +98,9 @@ class Coulomb:
             simulation.reset()
 
     def state(self) -> dict[str, Array]:
-        """A copy of what is remembered: contacts, (n, `law.WIDTH`), friction of joints, spins of free bodies with rigid
-        contacts, (m, 6), time and time step, s."""
+        """A copy of the memory, for `restore`: arrays by name.
+
+        Contacts, (n, `law.WIDTH`), friction of joints, spins of free bodies, (m, 6), time and time step, s."""
         return self._own.state()
 
     def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
@@ -137,7 +138,7 @@ class Coulomb:
         self._own.advance(self.model, data, nstep)
 
     def addresses(self, data: Any) -> tuple[int, int, int]:
-        """Of model, data and what is remembered, for compiled loops that take steps by `compiled.step_of`."""
+        """Addresses of model, data and memory, for compiled loops that take steps by `compiled.step_of`."""
         self._begin(data)
         return self.model._address, data._address, self._own.serve(data._address)
 
@@ -241,7 +242,7 @@ def _see_ahead(model: Any) -> None:
 
 
 def _damp_at_the_end(model: Any) -> bool:
-    """Dampers, at the speed after a step, as inertia: h times their damping; the integrator becomes Euler's.
+    """Replace dampers at the speed after a step by inertia, h times their damping; the integrator becomes Euler's.
 
     Returns whether there are any.
 

@@ -18,7 +18,7 @@ from compare.commands import cli
 from compare.kit import collection
 from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
 from compare.kit.tasks import Task
-from compare.kit.workers import Workers, _deaf, dask, processes
+from compare.kit.workers import Workers, _without_signals, dask, processes
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
@@ -230,7 +230,7 @@ def test_a_signal_that_another_thread_gets_waits_until_a_worker_has_started():
     (thread := threading.Thread(target=wait.wait)).start()
     before = signal.signal(signal.SIGTERM, lambda *_: heard.append(1))
     try:
-        with _deaf():
+        with _without_signals():
             signal.pthread_kill(thread.ident, signal.SIGTERM)
             time.sleep(0.05)
             assert not heard

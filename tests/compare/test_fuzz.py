@@ -1,5 +1,6 @@
 """Damaged files: one clear line or the right result, never a traceback, a wrong number or a file elsewhere."""
 
+import re
 import shutil
 import tomllib
 from contextlib import contextmanager
@@ -19,6 +20,8 @@ from model.hdf5 import seal
 from tests.commands import refused, told
 
 P = Parameters.named("reference")
+SAMPLES = 1001
+"""Of a run, as it comes."""
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
 """Mutants of a file."""
 
@@ -180,7 +183,7 @@ def foreign(tmp_path):
     """A motion as another program keeps it, without a checksum."""
     path = tmp_path / "foreign.h5"
     with h5py.File(path, "w") as file:
-        file["time"], file["omega_c"] = np.linspace(0.0, 1.0, 51), np.linspace(10.0, 11.0, 51)
+        file["time"], file["omega_c"] = np.linspace(0.0, 1.0, SAMPLES), np.linspace(10.0, 11.0, SAMPLES)
     return path
 
 
@@ -190,47 +193,40 @@ def test_a_damaged_file_of_another_program_is_read_or_refused_in_a_line(foreign,
 
 
 def virtual(file, secret):
-    layout = h5py.VirtualLayout((51,), float)
-    layout[:] = h5py.VirtualSource(secret, "x", (51,))
+    layout = h5py.VirtualLayout((SAMPLES,), float)
+    layout[:] = h5py.VirtualSource(secret, "y", (SAMPLES,))
     file.create_virtual_dataset("y", layout)
 
 
 def link(file, secret):
-    file["y"] = h5py.ExternalLink(secret, "x")
+    file["y"] = h5py.ExternalLink(secret, "y")
 
 
 def external(file, secret):
-    file.create_dataset("y", (51,), float, external=[(str(secret), 0, 51 * 8)])
+    file.create_dataset("y", (SAMPLES,), float, external=[(str(secret), 0, SAMPLES * 8)])
 
 
 @pytest.mark.parametrize("outside", [virtual, link, external])
-def test_nothing_in_a_file_is_followed_to_another_one(tmp_path, files, foreign, capsys, outside):
-    """Neither in a run nor in what another program wrote."""
-    secret, run = tmp_path / "secret.h5", tmp_path / "run.h5"
-    with h5py.File(secret, "w") as file:
-        file["x"] = np.arange(51.0)
-    shutil.copy(files["theory"], run)
+def test_nothing_in_a_run_is_followed_to_another_file(tmp_path, stocked, capsys, outside):
+    run = tmp_path / "run.h5"
+    shutil.copy(stocked / "run.h5", run)
     with edited(run) as file:
         del file["y"]
-        outside(file, secret)
+        outside(file, stocked / "runs" / "one.h5")
     assert "'y'" in refused(capsys, f"inspect {run}")
-    told(capsys, f"compare {foreign} {foreign}")
-    with h5py.File(foreign, "r+") as file:
-        outside(file, secret)
-    assert "'y'" in refused(capsys, f"compare {foreign} {foreign}")
 
 
 @pytest.mark.parametrize(
-    ("made", "says"),
+    ("add", "says"),
     [
-        ({"shape": (4 * 10**9,), "dtype": float, "chunks": (1000,)}, "'y' has 4e+09 samples, and 1e+07 are the most"),
-        ({"data": ["a", "b"]}, "'y' is no column of numbers"),
-        ({"data": np.ones((51, 3))}, "'y' is no column of numbers"),
-        ({"data": 1.0}, "'y' is no column of numbers"),
+        *((outside, "'y'") for outside in (virtual, link, external)),
+        (lambda file, _: file.create_dataset("y", (4 * 10**9,), float, chunks=(1000,)), "4e+09 samples, and 1e+07 are"),
+        *((lambda file, _, data=data: file.create_dataset("y", data=data), "'y' is no column of numbers")
+          for data in (["a", "b"], np.ones((SAMPLES, 3)), 1.0)),
     ],
-)
-def test_what_is_no_column_is_said(foreign, capsys, made, says):
+)  # fmt: skip
+def test_what_is_no_column_of_a_foreign_file_is_said(foreign, stocked, capsys, add, says):
+    told(capsys, f"compare {foreign} {foreign}")
     with h5py.File(foreign, "r+") as file:
-        file.create_dataset("y", **made)
-    assert f"cannot read {foreign}: " in (said := refused(capsys, f"compare {foreign} {foreign}"))
-    assert says in said
+        add(file, stocked / "runs" / "one.h5")
+    assert re.search(f"cannot read {foreign}: .*{re.escape(says)}", refused(capsys, f"compare {foreign} {foreign}"))

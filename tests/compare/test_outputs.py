@@ -10,50 +10,34 @@ from compare.commands import options
 from tests.commands import COMMANDS, NEEDED, parser_of, refused
 
 
-def outputs():
-    """Every command with each of its options that names a file to be written."""
-    for command in COMMANDS:
-        for action in parser_of(command)._actions:
-            if isinstance(action.type, options.Output):
-                yield command, action.option_strings[-1], action.type
-
-
 def reading(command, file):
     """A command line that reads a file."""
-    dests = [action.dest for action in parser_of(command)._actions]
-    for option in ("kept", "parameters"):
-        if option in dests:
-            return [command, *NEEDED.get(command, "").split(), f"--{option}", str(file)]
-    return [command, str(file), *NEEDED.get(command, "run.h5").split()[1:]]
+    if "--parameters" in parser_of(command)._option_string_actions:
+        return [command, *NEEDED.get(command, "").split(), "--parameters", file]
+    return [command, file, *NEEDED[command].split()[1:]]
 
 
-OUTPUTS = pytest.mark.parametrize(("command", "option", "kind"), list(outputs()))
+OUTPUTS = [
+    (command, action.option_strings[-1], suffix)
+    for command in COMMANDS
+    for action in parser_of(command)._actions
+    if isinstance(action.type, options.Output)
+    for suffix in action.type.suffixes
+]
+"""Every command with each of its options that names a file to be written, and what that may end in."""
 
 
-@OUTPUTS
-def test_an_output_that_is_read_is_refused(command, option, kind, tmp_path, capsys):
+@pytest.mark.parametrize(("command", "option", "suffix"), OUTPUTS)
+def test_an_output_that_is_read_is_refused(command, option, suffix, tmp_path, capsys):
     """By its own name, by one that leads elsewhere, or by a link."""
-    for suffix in kind.suffixes:
-        mine, soft, hard = (tmp_path / f"{name}{suffix}" for name in ("mine", "soft", "hard"))
-        mine.write_text("mine")
-        soft.symlink_to(mine)
-        hard.hardlink_to(mine)
-        for output in (mine, tmp_path / ".." / tmp_path.name / mine.name, soft, hard):
-            assert "is read and would be lost" in refused(capsys, *reading(command, mine), option, output)
-        assert {path.read_text() for path in (mine, soft, hard)} == {"mine"}
-        assert soft.is_symlink()
-
-
-@OUTPUTS
-def test_an_output_whose_name_promises_something_else_is_refused(command, option, kind, tmp_path, capsys):
-    """A model, a set, a program, or what another option writes."""
-    names = {f"mine{suffix}" for suffix in {".xml", ".toml", ".csv", ".py", "", *options.ENDINGS} - {*kind.suffixes}}
-    for name in names:
-        (tmp_path / name).write_text("mine")
-        said = refused(capsys, *reading(command, tmp_path / "other"), option, tmp_path / name)
-        assert f"would hold {kind.what}: its name must end in {kind.suffixes[0]}" in said
-        assert (tmp_path / name).read_text() == "mine"
-    assert {path.name for path in tmp_path.iterdir()} == names
+    mine, soft, hard = (tmp_path / f"{name}{suffix}" for name in ("mine", "soft", "hard"))
+    mine.write_text("mine")
+    soft.symlink_to(mine)
+    hard.hardlink_to(mine)
+    for output in (mine, tmp_path / ".." / tmp_path.name / mine.name, soft, hard):
+        assert "is read and would be lost" in refused(capsys, *reading(command, mine), option, output)
+    assert {path.read_text() for path in (mine, soft, hard)} == {"mine"}
+    assert soft.is_symlink()
 
 
 @pytest.mark.parametrize(

@@ -120,14 +120,17 @@ def test_projected_solver_agrees(monkeypatch, plain, cone):
 @pytest.mark.parametrize(("law", "cone"), [({}, "elliptic"), ({"rigid": True}, "pyramidal")], ids=str)
 @pytest.mark.parametrize("name", ["pile, condim 6", "dry joints", "sparse"])
 def test_restored_to_the_bit(name, law, cone):
-    """Others that go on from a state, each in a thread of its own."""
+    """Others that go on from a state or a copy, each in a thread of its own."""
     model = scene(name, cone)
     data, coulomb = mujoco.MjData(model), Coulomb(model, **law)
     coulomb.step(data, 60)
     others = [(Coulomb(model, **law), mujoco.MjData(model)) for _ in range(3)]
+    kept = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION))
+    mujoco.mj_getState(model, data, kept, mujoco.mjtState.mjSTATE_INTEGRATION)
     for restored, again in others:
         restored.restore(coulomb.state())
-        mujoco.mj_copyData(again, model, data)
+        mujoco.mj_setState(model, again, kept, mujoco.mjtState.mjSTATE_INTEGRATION)
+    mujoco.mj_copyData(others[0][1], model, data)
     coulomb.step(data, 60)
     with ThreadPoolExecutor(3) as pool:
         list(pool.map(lambda other: other[0].step(other[1], 60), others))

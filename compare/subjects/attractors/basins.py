@@ -59,11 +59,11 @@ class Basins:
     timestep: float
 
     def share(self, fate: str) -> tuple[int, int]:
-        """Points of the plane that come to a fate, by theory, and all of them."""
+        """How many points of the plane come to a fate, by theory, and how many there are."""
         return int(np.sum(self.fates == FATES.index(fate))), self.fates.size
 
     def differences(self) -> Array:
-        """Distances from a boundary of the points at which the two differ, in cells of the fine map (1: next to it)."""
+        """Distances from a boundary of the points at which MuJoCo and theory differ, in cells of the fine map."""
         from scipy.ndimage import distance_transform_cdt  # slow to import
 
         distance = np.zeros(self.fates.shape)
@@ -131,7 +131,7 @@ def basins(
 
 
 def fate(y: Array, last: Case, p: Parameters) -> int:
-    """What a run comes to by its heights and last case: an index of `FATES`."""
+    """What becomes of the ball in a run, by its heights and last case: an index of `FATES`."""
     if hops_on(y[int(0.7 * len(y)) :], p.R):
         return FATES.index("hops")
     if last in (Case.RR, Case.SS):

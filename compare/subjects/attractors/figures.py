@@ -33,7 +33,7 @@ STARTS = 20
 
 
 def select(evidence: Evidence, quantity: str) -> Diagram:
-    """What was measured of the hopping ball; the orbits are theory's."""
+    """The measurements of the hopping ball for a figure; the orbits are theory's."""
     return Diagram(quantity, SET, tuple(evidence.select(quantity, "period")))
 
 
@@ -55,7 +55,7 @@ def _hopping_orbit(p: Parameters) -> orbits.Orbit | None:
 
 
 def _orbit_or_gap(p: Parameters) -> orbits.Orbit:
-    """The ball that hops for ever; `GapError` if none is found."""
+    """The orbit of a ball that hops for ever; `GapError` if none is found."""
     if orbit := _hopping_orbit(p):
         return orbit
     raise GapError(f"no ball hops for ever that starts in one of {STARTS} random states at ω₀ = {p.omega_0:g} rad/s")
@@ -75,7 +75,7 @@ def _branch(p: Parameters) -> OrbitBranch:
 
 
 def draw_branch(of: Diagram) -> tuple[Figure, str]:
-    """omega_c and the spin on the wall over the flow."""
+    """A figure of hops over the flow: omega_c and the spin on the wall; and its caption."""
     p, top, branch = of.p, _fastest(of.p), _branch(of.p)
     edge = bifurcation.thresholds(p).omega_02
     figure, (orbit, wall) = style.panels(9.0, 4.2, 1, 2)
@@ -125,7 +125,7 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
 
 
 def draw_orbit(of: Diagram) -> tuple[Figure, str]:
-    """Height over time, height over its rate, and height over the slip."""
+    """A figure of one hop: height over time, over its rate, and over the slip; and its caption."""
     orbit = _orbit_or_gap(of.p)
     cycle = orbit.cycle
     figure, axes = style.panels(9.0, 3.2, 1, 3, sharey=True)
@@ -179,7 +179,7 @@ def _wall_branch(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifu
 
 
 def draw_walls(of: Diagram) -> tuple[Figure, str]:
-    """Height and mean omega_c of the hops over the friction of the wall."""
+    """A figure of height and mean omega_c of hops over the friction of the wall; and its caption."""
     rows, places = _wall_branch(of.p)
     figure, panels = style.panels(9.0, 3.8, 1, 2)
     shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)

@@ -109,12 +109,12 @@ class Hops(NamedTuple):
         return {name: Measured(float(mean), float(np.ptp(hops)) / 2) for name, (mean, hops) in values.items()}
 
     def conditions(self, p: Parameters) -> dict[str, Any]:
-        """A state at a top, and the period: near a closed orbit."""
+        """Conditions of a measurement: a state at a top, and the period, near a closed orbit."""
         return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
 
 
 def _multiplier(result: TrialResult, begin: float, end: float, p: Parameters) -> Measured:
-    """By which factor disturbances by a step of the flow shrink between two times; a later part shows how surely."""
+    """The factor by which disturbances shrink from hop to hop, between two times; its uncertainty by a later part."""
     parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
     slow, fast, later = (hop_map(tops(run, begin + after, end).x, p)[0] for run, after in parts)
     return with_step_error(slow, Measured(fast, abs(fast - later)))

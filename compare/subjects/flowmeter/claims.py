@@ -95,11 +95,11 @@ def _simulated(m: Measurement) -> Trajectory:
 def _end_cases(*starts: str) -> tuple[Bearing, ...]:
     """Bearings on the case in which motions end that start in one of these ways."""
 
-    def case(m: Measurement) -> float:
+    def end_case(m: Measurement) -> float:
         return physical_case(Case(_simulated(m).case[-1]))
 
     ends = (given(start=start) for start in starts)
-    return tuple(Bearing("unloading", "case", case, when=when, by=_SIMULATED) for when in ends)
+    return tuple(Bearing("unloading", "case", end_case, when=when, by=_SIMULATED) for when in ends)
 
 
 def _at_event(m: Measurement) -> Measured:
@@ -180,8 +180,7 @@ CLAIMS = (
     claim(
         "slope-mean",
         "Section 5.3",
-        "Between ω₀₁ and ω₀₂ the slope is small: what is measured on average from end to end is what theory says, "
-        "a few hundredths for the reference.",
+        "Between ω₀₁ and ω₀₂ the characteristic curve has a small mean slope: a few hundredths for the reference.",
         *_slope("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),
     ),
     claim(

@@ -43,9 +43,9 @@ def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
 
 
 def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
-    """Two columns, one a parameter set: the curve above, deviations from the nearest attracting solution below."""
+    """A figure with a column for each of two sets: characteristic curve, and deviations from it; and its caption."""
 
-    def nearest(m: Measurement) -> float:
+    def nearest_prediction(m: Measurement) -> float:
         omega_c = [float(s.state.omega_c) for s in analytic.stable_solutions(m.parameters)]
         return min(omega_c, key=lambda w: abs(m.value / w - 1), default=np.nan)
 
@@ -60,7 +60,7 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         style.legend(above, loc="upper left", frameon=False)
         style.dimensionless(above, p, style.FREE_0)
         above.grid(alpha=0.25)
-        style.deviations(below, curve.states, nearest)
+        style.deviations(below, curve.states, nearest_prediction)
         below.set(xlabel=style.OMEGA_0)
     sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
     states = [m for curve in curves for m in curve.states]
@@ -91,7 +91,7 @@ def curve_of_set(figure: str, p: Parameters) -> Diagram:
 
 
 def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
-    """One panel, with both scales."""
+    """A panel of Fig. 13: the characteristic curve and measured states, with both scales; and its caption."""
     p, top = of.p, top_flow(of.p)
     figure, axes = style.panels(6.0, 4.3)
     if p.eta < p.j:
@@ -131,7 +131,7 @@ def top_flow(p: Parameters) -> float:
 
 
 def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
-    """All solutions up to the fastest flow, but for unstable SR; the thresholds. For eta > j all are on one line."""
+    """Draw all stationary solutions up to the fastest flow, but for unstable SR; return the thresholds."""
     t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, stable_ends(p)
     spans: list[tuple[tuple[Case, ...], tuple[float, float], float]] = [
         ((Case.RR,), (0.0, rolls if folds else t.omega_02), 0.45),
@@ -157,7 +157,7 @@ def select_fall(evidence: Evidence) -> Motion:
 
 
 def fall_of_set(p: Parameters) -> Motion:
-    """The fall by the event-driven simulation."""
+    """The fall of a ball whose wall no longer carries it, by the event-driven simulation."""
     only_where(p, folds=False)
     check_thresholds(p)
     # Flows held for no longer than 5 s each: longer ones are sampled less densely.
@@ -165,7 +165,7 @@ def fall_of_set(p: Parameters) -> Motion:
 
 
 def draw_fall(fall: Motion) -> tuple[Figure, str]:
-    """Height, velocities and slip around the fall, and 20 ms about the landing: the gaps as high as the ball hops."""
+    """A figure of a fall from the wall: height, velocities and slip, and 20 ms about the landing; and its caption."""
     run = fall.load()
     landings = [t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N]
     if not landings:
@@ -247,7 +247,7 @@ _FINE = 51
 
 
 def draw_readings(made: Design) -> tuple[Figure, str]:
-    """Reading over flow, with the band of the tolerances, the flows to measure and the limits."""
+    """A figure of a design: reading over flow, with the band of the tolerances and the limits; and its caption."""
     curve, chosen, request = made.curve, made.choice, made.request
     figure, axes = style.panels(7.0, 4.3)
     flows, low, high, below, above = (np.append(0.0, each) for each in (curve.omega_0, *curve.meant, *curve.band))
@@ -267,7 +267,7 @@ def draw_readings(made: Design) -> tuple[Figure, str]:
 
 
 def draw_sensitivities(made: Design) -> tuple[Figure, str]:
-    """Bars: by how many per cent each threshold changes if a value does by one."""
+    """A bar chart: by how many per cent each threshold changes if a value does by one; and its caption."""
     figure, axes = style.panels(7.0, 3.6)
     there = [key for key in THRESHOLDS if np.isfinite(getattr(made.thresholds, key))]
     names = list(made.sensitivities[there[0]])
@@ -290,7 +290,7 @@ def draw_sensitivities(made: Design) -> tuple[Figure, str]:
 
 
 def draw_friction(made: Design) -> tuple[Figure, str]:
-    """The operating limit of the chosen ball and vessel over both frictions."""
+    """A map of the operating limit of the chosen ball and vessel over both frictions; and its caption."""
     chosen = made.choice
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
     mu, eta = (np.linspace(top[name] / 50, top[name], _FINE) for name in ("mu", "eta"))

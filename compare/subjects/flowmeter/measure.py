@@ -185,7 +185,7 @@ def _loop_task(lab: Lab, levels: Sequence[Parameters]) -> Task:
 
 
 def _loop(name: str, p: Parameters, records: Records, parts: int) -> list[Start]:
-    """The levels of the loop of a set, up and down, see `_levels`."""
+    """Starts at all levels of a set's hysteresis loop, up and down, see `_levels`."""
     rise = _levels(name, records, parts)
     sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
     return [Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides]
@@ -225,7 +225,7 @@ PUSH = 1e-2
 
 
 def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Settle a ball on the wall of every set that carries it, and begin from there."""
+    """How a ball that rides the wall slips, falls and lands as the flow falls, or is lifted by a push."""
     starts, trials = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:

@@ -76,7 +76,7 @@ def _figure_12() -> Iterator[Check]:
     pushed = slipping_branch.branch(s, p).A_y
 
     def determinant(omega_0: float) -> float:
-        """Of SR: its sign is that of the eigenvalue that isn't the decay of omega_c."""
+        """Determinant of SR's Jacobian, whose sign is that of the eigenvalue that isn't the decay of omega_c."""
         q = p.replace(omega_0=omega_0)
         (state,) = analytic.stationary_solutions(q, (Case.SR,))
         return float(np.linalg.det(dynamics.jacobian(Case.SR, state.x, q)))

@@ -37,7 +37,7 @@ def _sinking(m: Measurement) -> float:
 
 
 def _end_of_motion(m: Measurement) -> float:
-    """A column of theory's motion where the measured one ends."""
+    """A state variable of theory's motion at the time at which the measured one ends."""
     flow = late_ramp(m.parameters, m.at("rate"), m.at("time")) if "rate" in m.conditions else None
     motion = simulated(m.parameters, state(m), m.at("time"), flow=flow)
     return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
@@ -46,10 +46,10 @@ def _end_of_motion(m: Measurement) -> float:
 def _end_states(*starts: str) -> tuple[Bearing, ...]:
     """Bearings on the state at the end of motions from starts whose names begin so."""
 
-    def when(m: Measurement) -> bool:
+    def starts_so(m: Measurement) -> bool:
         return str(m.conditions["start"]).startswith(starts)
 
-    return bearings("runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=when, by=_RUN)
+    return bearings("runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN)
 
 
 def _is_stable(case: Case, m: Measurement) -> bool:
@@ -215,12 +215,12 @@ def _motion_bearings(case: Case) -> Iterator[Bearing]:
         both = theory(analytic.contact_forces, case, state(m), m.parameters)
         return float(forces(*both)[m.quantity.removeprefix("moving_force_")])
 
-    def rising(m: Measurement) -> float:
+    def lift(m: Measurement) -> float:
         return slip_stability.lift_acceleration(case, case, state(m), m.parameters)
 
     when = given(case=case.name)
     if case in (Case.NR, Case.NS):  # into which a ball lifts off
-        yield Bearing("field", "rate_v_y", rising, when=when, by="analytic.slip_stability.lift_acceleration")
+        yield Bearing("field", "rate_v_y", lift, when=when, by="analytic.slip_stability.lift_acceleration")
     for name in TRAITS[case].active:
         if name not in ("y", "h"):
             yield Bearing("field", f"rate_{name}", rate, when=when, by="analytic.vector_field")

@@ -199,7 +199,7 @@ CLAIMS = (
     claim(
         "eq-69",
         "(69)",
-        "Rolling is the mean of slipping to one side and to the other, weighted so that no slip is left.",
+        "Rolling moves as the mean of slipping to one side and to the other, weighted so that no slip is left.",
         Bearing("growth", "filippov_share", _filippov_share, by="slip_bounds.filippov_share"),
     ),
     claim(
@@ -215,7 +215,7 @@ CLAIMS = (
     claim(
         "extrema",
         "after (80)",
-        "(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
+        "Out of RR into SS γ has its global extrema along (α, β) = (0, 0) and (π, π).",
         Bearing(
             "growth",
             "gamma",

@@ -36,7 +36,7 @@ def of_set(p: Parameters, figure: str) -> Motion:
 
 
 def _pushed(p: Parameters, lasts: float) -> Trajectory:
-    """The run; where slip ends, so short that what is shown has samples enough."""
+    """The motion after a push out of NR; where slip ends soon, a short one with samples enough."""
     run = simulator.slip_perturbation(p, PUSHED, BETA, t_end=lasts)
     if len(run.events) and run.cases[-1] is Case.NR:
         return simulator.slip_perturbation(p, PUSHED, BETA, t_end=1.6 * float(run.events.time[-1]))
@@ -44,12 +44,12 @@ def _pushed(p: Parameters, lasts: float) -> Trajectory:
 
 
 def select(_: Evidence, figure: str) -> Motion:
-    """That of the set of the paper's kind, measured or not."""
+    """The motion of the set of the paper's kind, whatever was measured."""
     return of_set(SET, figure)
 
 
 def draw(push: Motion) -> tuple[Figure, str]:
-    """Slip at the wall over time, and its path in the orthogonal plane (55)."""
+    """A figure of the slip at the wall over time, and of its path in the orthogonal plane (55); and its caption."""
     run = push.load()
     figure = style.figure(8.4, 3.3)
     time, plane = figure.subplots(1, 2)

@@ -179,7 +179,7 @@ def chosen_states(records: Records, name: str, p: Parameters, more: float) -> It
 
 
 def _settled(records: Records, name: str) -> Iterator[Pushed]:
-    """The settled states of a set; one on the wall alone high up, and where it only just touches the floor."""
+    """The settled states of a set as states to push; one on the wall alone high up, and just touching the floor."""
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
         values.setdefault((m.parameters, physical_case(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
@@ -269,7 +269,7 @@ Row = Callable[..., Measurement]
 def _modes(
     state: Pushed, exponents: Exponents, uncertainty: Array, step: float, row: Row
 ) -> Iterator[Measurement | Missing]:
-    """One of each pair of conjugates, in the order of frequency and decay, slowest first."""
+    """Measurements of decay rate and frequency of each mode, slowest first, one of each pair of conjugates."""
     p, parts = state.start.p, []
     order = np.lexsort((-exponents.real, exponents.imag))
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):

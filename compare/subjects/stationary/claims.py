@@ -115,7 +115,8 @@ def _omega_c_beyond_fold(m: Measurement) -> float:
 
 
 def _drag_at_birth(m: Measurement) -> float:
-    """The drag c at which the fold is born at the eta of the set; the eta at which it is born is proportional to c^2.
+    """The drag c in s-1 at which the fold is born at the eta of the set, which is proportional to c^2.
+
     Computed from that point at the measured drag, since at the set's own there may be no fold for any eta below j.
     """
     p = m.parameters.replace(c=m.value)
@@ -262,7 +263,7 @@ DIAGRAMS = (
     claim(
         "double-points",
         "Figs. 7 and 8, black dots",
-        "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j rolling ends at ω₀₃ = √(g/(jR)), where all meet.",
+        "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j all thresholds are √(g/(jR)), and rolling ends.",
         Bearing("birth", "critical_drag", _drag_at_birth, by=_DOUBLE),
         Bearing("thresholds", "omega_03", lambda m: bifurcation.double_points(m.parameters)[-1].omega_0, by=_DOUBLE),
     ),

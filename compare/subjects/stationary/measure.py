@@ -78,7 +78,7 @@ class Attractor:
 
 
 def _starts(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Start]:
-    """At rest, going round with the fluid, and so high up on the wall; and spinning in a fluid at rest."""
+    """Starts of all sets: at rest, with the fluid on the floor and high up on the wall, spinning in a fluid at rest."""
     for name, p in sets.items():
         for how, flows in lab.effort.settled_starts:
             yield from (named_start(name, p.replace(omega_0=flow / time_unit(p)), how) for flow in flows)
@@ -97,7 +97,7 @@ def _why_drag_fades(state: Settled) -> str:
 
 
 def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measurement | Missing]:
-    """Values of a state with half the step, uncertain, too, by what step and start change: the most in each group."""
+    """Measured values of a settled state with half the step; uncertain by what step and start change, too."""
     p = fine.start.p
     if fine.failure:
         yield _unsettled(fine, len(fine.values))

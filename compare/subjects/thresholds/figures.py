@@ -63,7 +63,7 @@ def select_plane(evidence: Evidence, figure: str) -> Plane:
 
 
 def draw_plane(plane: Plane) -> tuple[Figure, str]:
-    """Regions with their names, the thresholds between them, measured points by what was reached there."""
+    """A figure of regions with their names, thresholds between them, and measured points; and its caption."""
     p = plane.p
     figure = style.figure(6.4, 4.9)
     axes = figure.add_subplot()
@@ -91,7 +91,7 @@ def draw_plane(plane: Plane) -> tuple[Figure, str]:
 
 
 def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> None:
-    """Which cases exist over friction and flow, up to a flow at least, rad s-1; the thresholds and where they meet."""
+    """Draw which cases exist over friction and flow, up to a flow at least, rad s-1, and the thresholds."""
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if equal else np.full(eta.shape, p.mu)
     doubles = [point for point in bifurcation.double_points(p, equal) if point.eta > _LEAST]
@@ -205,7 +205,7 @@ def _draw_round_with_fluid(
 
 
 def draw_diagram(of: Diagram) -> tuple[Figure, str]:
-    """One diagram, with both scales."""
+    """A bifurcation diagram, the spin on the wall over the flow, with both scales; and its caption."""
     figure, p = style.figure(5.8, 4.1), of.p
     axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
     draw = partial(_draw_round_with_fluid, axes, p)

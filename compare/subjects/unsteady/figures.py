@@ -91,7 +91,7 @@ def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
 
 
 def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
-    """Gain, phase, onset, mean error over frequency."""
+    """A figure of pulsations: gain, phase, onset of slip and mean error over frequency; and its caption."""
     p = of.mean
     figure, ((gain, onset), (phase, error)) = style.panels(9.0, 5.6, 2, 2, sharex=True)
     frequencies, onsets, errors = _theory(p)
@@ -132,7 +132,7 @@ def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
 
 
 def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
-    """Step responses, ramps, overshoot over rate."""
+    """A figure of step responses, ramps, and their overshoot over the rate; and its caption."""
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
     t = np.linspace(0.0, min(_LASTS[0] / of.p.c, _LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
     jump.plot(t, response.step_response(of.mean, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")

@@ -140,7 +140,7 @@ def _pulsations(lab: Lab, name: str, p: Parameters, end: float) -> list[Pulsatio
 
 
 def _response(lab: Lab, each: Pulsation) -> Iterator[Measurement | Missing]:
-    """Gain and phase with which a ball follows."""
+    """Measurements of gain and phase with which a ball follows a pulsation."""
     if each.failure:
         yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
         return
@@ -151,7 +151,7 @@ def _response(lab: Lab, each: Pulsation) -> Iterator[Measurement | Missing]:
 
 
 def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
-    """The amplitude at which slip begins."""
+    """The measurement of the amplitude at which slip begins."""
     at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
     if low is None or high is None:
         return Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
@@ -174,9 +174,7 @@ class Round(NamedTuple):
 def _settled_rounds(
     lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
 ) -> list[list[Round] | str]:
-    """Runs in pulsations of these amplitudes until they are settled: the last two of each, the last with half the step,
-    or why one broke down.
-
+    """Runs in pulsations until they are settled: the last two of each, the last with half the step, or its error.
     A ball that slips goes on with the rest of its last state.
     """
     states, seen = [each.start(a) for each, a in driven], list[list[Round] | str]([[]] * len(driven))
@@ -215,7 +213,7 @@ def _as_followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
 
 
 def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
-    """The largest of rising amplitudes at which the ball still rolls, where the law of drag isn't Stokes'."""
+    """Pulsations of the largest of rising amplitudes at which the ball still rolls, if drag isn't Stokes'."""
     raised, todo = list(pulsations), [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
     for _ in range(12):
         higher = [
@@ -230,7 +228,7 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
 
 
 def _search(lab: Lab, each: Pulsation) -> Search:
-    """For the amplitude at which slip begins, in runs of one period and a half of which the first sixth is left out."""
+    """A search for the amplitude at which slip begins, in runs of a period and a half without the first sixth."""
 
     def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
         timing = Timing(1.5 * attempt.time, lab.effort.pulsation_samples, 2 * attempt.refine)
@@ -337,7 +335,7 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
 
 
 def _jump(lab: Lab, start: Start, size: float) -> Trial:
-    """Jumps up and down of the flow, rad s-1, from a state in the case that the start is named by."""
+    """The trial of jumps of the flow up and down, rad s-1, from a state in the case that the start is named by."""
     p, t_end = start.p, rounded_duration(start.p, lab.effort.unsteady_lasts)
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
@@ -346,7 +344,7 @@ def _jump(lab: Lab, start: Start, size: float) -> Trial:
 
 
 def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial]:
-    """Ramps from settled slipping, which is between two flows in rad s-1, at several rates."""
+    """Trials of ramps of the flow at several rates, rad s-2, from settled SS, which is between two flows."""
     p, span = start.p, ends - begins
     last = begins + RAMP_ENDS[1] * span
     for rate in lab.effort.unsteady_rates:

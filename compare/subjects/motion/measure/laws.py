@@ -49,9 +49,7 @@ class ContactLaw(NamedTuple):
 
 
 def _laws(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Measurement | Missing]:
-    """Every law at its worst in motions from rest in a flow that rises, high on the wall in one that falls, and along
-    the floor towards the wall.
-    """
+    """How far each law of contact is off at its worst in motions from rest, down the wall, and along the floor."""
     tasks = []
     for p in sets.values():
         t_end, fast = RUN_LENGTH * coarse_step(p), 3.0 / time_unit(p)
@@ -97,7 +95,7 @@ def _sinking(lab: Lab, balls: Mapping[str, Parameters]) -> Iterator[Measurement 
 def deviations(runs: Sequence[Trajectory]) -> dict[ContactLaw, float]:
     """How far runs of one set are from every law, dimensionless; nan where no sample can show it."""
 
-    def farthest(values: Array, off: float) -> float:
+    def largest(values: Array, off: float) -> float:
         return float(values[np.argmax(np.abs(values - off))]) if len(values) else math.nan
 
     worst: dict[ContactLaw, float] = {}
@@ -111,10 +109,10 @@ def deviations(runs: Sequence[Trajectory]) -> dict[ContactLaw, float]:
             ("where it is closed there is no gap", np.abs(gap[(letter == "R") | (letter == "S")])),
             ("(14), (15): friction opposes the slip", against[slides]),
         ):
-            worst[ContactLaw("law_in_motion", law, contact)] = farthest(values, 0.0)
+            worst[ContactLaw("law_in_motion", law, contact)] = largest(values, 0.0)
         ratios = friction[slides] / normal[slides]
         usual = float(np.median(ratios)) if len(ratios) else 0.0
-        worst[ContactLaw("friction_ratio", "friction over normal force", contact)] = farthest(ratios, usual)
+        worst[ContactLaw("friction_ratio", "friction over normal force", contact)] = largest(ratios, usual)
     return worst
 
 

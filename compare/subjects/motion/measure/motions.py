@@ -88,9 +88,7 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
 
 
 def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
-    """Random starts in every case; under laws of drag other than Stokes' some in so thin a fluid that the ball moves
-    through it at Reynolds numbers as balls in water have them, so that drag shows.
-    """
+    """Trials from random states in every case; with drag other than Stokes' some at Reynolds numbers as in water."""
     rng = np.random.default_rng([SEED, *name.encode()])
     for case, k in product(Case, range(lab.effort.field_starts)):
         x = random_state(case, p, rng)
@@ -109,8 +107,9 @@ def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
 
 
 def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
-    """What is read at the centre of a window (3, 22): extrapolated to a vanishing step, by the finer run, and by that
-    with the lower degree. None if another case is in or near the window, or `turns_or_hovers`.
+    """States, rates and forces at the centre of a window (3, 22); None if its case changes, or it `turns_or_hovers`.
+
+    Three rows: extrapolated to a vanishing step, by the finer run, and by that with polynomials of the lower degree.
     """
     read = []
     for run, times in zip((coarse, fine), lab.effort.halves, strict=True):
@@ -130,9 +129,7 @@ def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: 
 
 
 def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
-    """Whether a slipping contact carries almost no load, or its slip changes by more than `TURN` of itself, or would by
-    friction alone.
-    """
+    """Whether a slipping contact carries almost no load, or its slip, by itself or by friction, changes too much."""
     p, time = run.header.parameters, float(np.ptp(run.time[window]))
     loads = (p.mu, run.force_A[window, 1]), (p.eta, run.force_B[window, 0])
     for v, contact, (friction, load) in zip(slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True):
@@ -226,7 +223,7 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
-    """Where pieces begin, about evenly spread: their ends are away from changes of case.
+    """Samples at which pieces of a run begin, about evenly spread, whose ends are away from changes of case.
 
     There the gap of an open contact exceeds 1e-4 R, for an unloaded one may hover; a slipping one slips by more than
     weight causes in the two steps by which landings may be late; a rolling one needs 1 % less friction than it may, for
@@ -278,9 +275,7 @@ LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 
 
 def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The state six coarse steps after every landing, when friction has built up; and in how many runs, with both time
-    steps, the contact opens again.
-
+    """The state six coarse steps after every landing, and in how many runs the contact opens again.
     It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts are 4 to 5 times that
     high, and of a plastic landing nothing is left but the fall within a step.
     """
@@ -299,7 +294,7 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _landing(name: str, p: Parameters, how: str) -> Trial:
-    """A motion in which a ball lands."""
+    """The trial of a motion in which a ball lands."""
     start = _start(name, p, 0.8, LANDINGS[how], how)
     step = coarse_step(start.p) / REFINED
     conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}

@@ -88,7 +88,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _trials(name: str, p: Parameters) -> Iterator[Trial]:
-    """All starts of a set."""
+    """Trials of a set from all starts."""
     unit = time_unit(p)
 
     def trial(how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None) -> Trial:

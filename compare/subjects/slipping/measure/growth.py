@@ -122,14 +122,14 @@ class Push:
         return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
 
     def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
-        """The runs with one size of slip, in units of `start_unit`, with either step divided by `refine`."""
+        """Tasks with one size of slip, in units of `start_unit`, with both time steps, divided by `refine`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
         steps, step = STEPS * refine, coarse_step(p) / (REFINED * refine)
         return [lab.task(p, x, steps * step, step / n, samples=steps * n) for n in lab.effort.halves]
 
     def tasks(self, lab: Lab) -> list[Task]:
-        """The pairs of every size."""
+        """Tasks with every size of slip and both time steps."""
         return [task for size in self.sizes for task in self.pair(lab, size)]
 
     def rates(self, run: Trajectory) -> Array:
@@ -144,7 +144,7 @@ class Push:
     def row(
         self, lab: Lab, protocol: str, quantity: str, value: Measured | float, tasks: Sequence[Task], **at: float
     ) -> Measurement:
-        """What was measured of it, with its state and direction."""
+        """A measurement of the push, with its state and direction as conditions."""
         start, n = self.start, dict(zip(("n_x", "n_y", "n_z"), self.n.tolist(), strict=True))
         along = {"inner": self.inner.name, "outer": self.outer.name, "by": start.name} | state_of(start.x0) | n
         return measurement(lab, protocol, start.set, start.p, quantity, value, tasks, **along, **at)
@@ -152,9 +152,7 @@ class Push:
     def following_case(
         self, lab: Lab, protocol: str, size: float, tasks: Sequence[Task], runs: Sequence[Trajectory]
     ) -> Measurement | None:
-        """The case that follows where a slip doesn't last, if runs with both steps agree; None if it lasts, or they
-        don't, since a change is detected some steps late.
-        """
+        """The case that follows where a slip doesn't last; None if it lasts, or runs with both steps disagree."""
         coarse, fine = runs
         ended = int(fine.case[-1])
         if ended == self.outer or np.any(coarse.case[-SETTLED:] != ended) or np.any(fine.case[-SETTLED:] != ended):

@@ -103,7 +103,7 @@ class Growths:
 
 
 def _lines_on_wall(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[str, Crossing]:
-    """For each set the line out of rolling on the wall alone, from settled states; none where one is no such state."""
+    """For each set pushes out of rolling on the wall alone, from settled states; none where one is no such state."""
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
     starts = [
         [named_start(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in HANGING]
@@ -149,7 +149,7 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
 
 
 def _zero_and_slope(lab: Lab, line: Crossing, seen: Growths, more: Growths) -> Iterator[Measurement | Missing]:
-    """What gamma at the first flows of a line and at those around its zero show."""
+    """Measurements of zero and slope of gamma on a line, from its first flows and from those around the zero."""
     push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*seen.tasks, *more.tasks]
     name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
     if np.isnan(seen.points[1]).any():
@@ -173,7 +173,7 @@ def _zero_and_slope(lab: Lab, line: Crossing, seen: Growths, more: Growths) -> I
 
 
 def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
-    """The lines out of rolling at both points, in natural units; what friction and inertia there are sets the scale."""
+    """Pushes out of rolling at both points at flows along a line, scaled by friction and inertia, for every bound."""
     unit = time_unit(p)
     slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     rubbing, spinning = math.sqrt(p.mu) / unit, math.sqrt(1 / p.j) / unit
@@ -258,7 +258,7 @@ class Arrow:
         return self.p.replace(omega_0=leads * omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
 
     def task(self, omega_c: float, times: int = 1) -> Task:
-        """The run from there, with steps half as long as those of `REFINED`, divided by `times`."""
+        """A short run from the orbit at omega_c, with steps half as long as those of `REFINED`, divided by `times`."""
         step = coarse_step(self.p) / (2 * REFINED * times)
         return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
 
@@ -269,9 +269,7 @@ class Arrow:
         return runs[first : [*strays, True].index(True, first)]
 
     def tasks_near_onset(self, kept: Sequence[Trajectory]) -> list[Task]:
-        """Tasks just below the orbit at which the ball lifts off, if it does: where the line over omega_c^2 through the
-        floor's forces at the last two orbits before vanishes.
-        """
+        """Tasks just below the orbit at which the ball lifts off by a line through the last two forces of the floor."""
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
         if not 2 <= len(pressed) < len(kept):
             return []
@@ -281,7 +279,7 @@ class Arrow:
         return [self.task(orbit, times) for orbit in orbits for times in self.lab.effort.halves]
 
     def row(self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]) -> Measurement:
-        """What was measured along it, with the state at one orbit."""
+        """A measurement along the arrow, with the state at one orbit as conditions."""
         p, x0 = self.start(omega_c)
         at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(x0)
         return measurement(self.lab, "lift", self.set, p, quantity, value, tasks, **at)
@@ -301,7 +299,7 @@ def _force(run: Trajectory) -> Measured | None:
 
 
 def _onset(runs: Sequence[Trajectory]) -> Measured | None:
-    """omega_c where the force vanishes, from runs with both steps at each orbit; None if it does not so smoothly."""
+    """omega_c at which the floor's force is zero, from runs with both steps; None if it doesn't fall smoothly."""
     squares, forces = np.array([run.omega_c[0] ** 2 for run in runs[::2]]), []
     for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:

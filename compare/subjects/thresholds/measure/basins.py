@@ -80,7 +80,7 @@ def spread_points(count: int, seed: int) -> list[Array]:
 
 
 def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
-    """Midpoints between neighbours that differ, each kind of border in turn, the longest first; and among rare ones.
+    """Points to measure next: midpoints between neighbours that differ, for each kind of border, and among rare ones.
 
     A set of cases is rare if it was seen less than half as often as if all were seen equally often.
     """
@@ -106,7 +106,7 @@ CLOSING = (0.1, 0.17, 0.26, 0.38)
 
 
 def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Between the measured omega_02 and omega_04, cross the border again and again; not under the quadratic law.
+    """The state on the border between two basins, at flows between omega_02 and omega_04; not with quadratic drag.
 
     At the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
     """
@@ -199,7 +199,7 @@ def _on_floor(x: Array) -> Array:
 
 
 def _search(lab: Lab, edge: Edge) -> Search:
-    """On which part of the line the border is, first between the attractors.
+    """A search for the place on an edge's line at which the border is, first between the attractors.
 
     Later lines are a hundredth as long, and four times as long after each that missed the border.
     """
@@ -283,7 +283,7 @@ def _edge_rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
 
 
 def _edge_meets_lifted(lab: Lab, near: Sequence[Edge]) -> Measurement | Missing:
-    """Where the edge of a set meets the lifted ball: where they don't differ in omega_c."""
+    """The measured flow at which the edge of a set meets the lifted ball: where both have the same omega_c."""
     noise = max(float(_uncertainty(edge)[2]) for edge in near)
     apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
     place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)

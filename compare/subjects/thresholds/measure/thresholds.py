@@ -56,9 +56,7 @@ From = Callable[[Parameters], Array]
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Begin between flows whose settled cases differ; bisect; settle states beside each change; bisect again from
-    these, and extrapolate them.
-    """
+    """The thresholds of each set: bisected between flows whose settled cases differ, and extrapolated from states."""
     sure = not lab.effort.granted
     found = [_changes(lab, name, p, records) for name, p in sets.items()]
     found = _narrowed(lab, found, _end_of_rolling, careful=sure)
@@ -77,8 +75,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What was found on one set so far, by kind: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or
-    where slip of a "riding" ball ends.
+    """What was found on one set so far, by kind of change of the motion.
+
+    Kinds: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or where slip of a "riding" ball ends.
     """
 
     lab: Lab
@@ -94,7 +93,7 @@ class Findings:
     ones near its beginning, and "turning" ones near its end."""
 
     def search(self, kind: str, around: Bracket, start: From, width: float, time: float = 1.0) -> tuple[str, Search]:
-        """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
+        """A search that narrows a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
 
         For the end of slipping, a run starts from the state that the ball reached at the largest flow so far.
         """
@@ -150,8 +149,7 @@ Questions = Callable[[Findings], Iterator[tuple[str, Search]]]
 
 
 def _changes(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
-    """Where to look on a set: between the fastest flow at which a ball was seen to settle so, and the next at which it
-    settled otherwise.
+    """For each kind of change the bracket of flows between which settled cases differ, so where to look for it.
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one on trial looks where
     that one found something.
@@ -182,14 +180,14 @@ def _narrowed(lab: Lab, found: Sequence[Findings], questions: Questions, careful
 
 
 def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
-    """The largest flow at which a ball that rolls on both goes on so."""
+    """A search for the largest flow at which a ball that rolls at both points goes on so."""
     if change := each.changes.get("rolling"):
         width = each.lab.effort.thresholds_width * change.high
         yield each.search("rolling", change, _start_state("with the fluid"), width)
 
 
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
-    """Roughly, up to which flow the wall doesn't hold a ball, and a slipping one settles on the floor."""
+    """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles on the floor."""
     if change := each.changes.get("sinking"):
         yield each.search("sinking", change, _start_state("on the wall"), COARSE * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
@@ -243,7 +241,7 @@ def _flows_beside(each: Findings) -> dict[str, tuple[Array, str]]:
 
 
 def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
-    """Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again.
+    """Searches for where a ball on the wall begins to slip, and up to where one pressed to the floor rolls again.
 
     They begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
     """
@@ -279,9 +277,7 @@ def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
 
 
 def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
-    """The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
-    the branch.
-
+    """A search for the largest flow at which a ball on the floor settles, about the maximum of omega_0 on the branch.
     At a fold all slows down, like the root of the distance.
     """
     top, _ = _end_of_slipping(each)
@@ -296,7 +292,7 @@ NONE = "no flow that was tried, up to twice the fastest of the settled states,"
 
 
 def _rolling_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """The end of rolling on both: by lifting off, or by slip."""
+    """Measurements of the end of rolling at both points: by lifting off, or by slip."""
     if not (rolling := each.bracket_seen("rolling")):
         yield each.missing(f"{NONE} ends two-point rolling")
     elif lifts(rolling):
@@ -314,7 +310,7 @@ def _rolling_rows(each: Findings) -> Iterator[Measurement | Missing]:
 
 
 def _riding_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """The least flow that holds a ball on the wall."""
+    """Measurements of the least flow that holds a ball on the wall, omega_02."""
     if riding := each.bracket_seen("riding"):
         yield each.row_of_bracket("omega_02", riding, "from above", "onset of sliding on the wall")
     else:
@@ -323,7 +319,7 @@ def _riding_rows(each: Findings) -> Iterator[Measurement | Missing]:
 
 
 def _slipping_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """The end of slipping on both: at a fold, or where the wall begins to carry the ball; and at how many folds."""
+    """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the number of folds."""
     if "turning" not in each.states:
         if (rolling := each.bracket_seen("rolling")) and not lifts(rolling):
             yield each.missing("no end of slipping at both points was found", 3)
@@ -348,7 +344,7 @@ def _slipping_rows(each: Findings) -> Iterator[Measurement | Missing]:
 
 
 def _count_ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
-    """How often, the flow rising over all that were tried, a ball from rest ceases to settle slipping at both."""
+    """At how many of the rising flows that were tried a ball from rest ceases to settle in SS."""
     said = {flow: case is Case.SS for flow, case in cases.items()} | dict(bracket.said if bracket else ())
     settles = [said[flow] for flow in sorted(said)]
     return sum(bool(before) and after is False for before, after in pairwise(settles))
