@@ -89,7 +89,7 @@ class Classifier:
         self._waiting, self._latest = len(shown) - stop, steps[:, max(0, stop - _BACK) :].copy()
 
     def _judge(self, contacts: Contacts) -> npt.NDArray[np.int_]:
-        """What each step by itself says of the contacts, (steps, 2)."""
+        """States of the contacts (rolling, slipping, open) by each step alone, (steps, 2)."""
         normal, friction, speed, _ = contacts
         limit = self._coefficients * normal
         # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
@@ -118,25 +118,23 @@ class Classifier:
     def _note(self, step: int, steps: Array, old: Array, new: Array) -> None:
         """Note that a case begins with a step, the last one of `steps` (4, n, 2), and locate its beginning."""
         mid = self._midpoint
-        closes, other = [], []
+        closes, other = list[float](), list[float]()
         for contact in np.flatnonzero(old != new).tolist():
             normal, friction, speed, gap = steps[..., contact]
+            k = last = len(gap) - 1
+            values, ahead, within = normal, mid, (mid - 1, mid)
             if old[contact] == _N:
-                closes.append(_vanishes(gap[:-1], mid, (-1.0, 0.01)))
-            elif new[contact] == _N:
-                other.append(_vanishes(normal[:-1], mid, (mid - 1, mid)))
-            elif old[contact] == _S:
-                k = len(speed) - 1
+                values, within = gap, (-1.0, 0.01)
+            elif old[contact] == _S and new[contact] == _R:
                 while k > 3 and speed[k - 1] < _SLIDES * (speed[k - 2] - speed[k - 1]):
                     k -= 1
-                other.append(k - len(speed) + 1 + _vanishes(speed[:k], 0.0, (-1.0, len(speed) - k + 2.0)))
-            else:
-                limit = self._coefficients[contact] * np.maximum(normal, 1e-300)
-                free = 1 - _SATURATED - friction / limit
-                k = len(free) - 1
-                while len(free) - k < _BACK and k > 1 and free[k - 1] <= 0:
+                values, ahead, within = speed, 0.0, (-1.0, last - k + 3.0)
+            elif new[contact] == _S:
+                values = 1 - _SATURATED - friction / (self._coefficients[contact] * np.maximum(normal, 1e-300))
+                while last - k < _BACK - 1 and k > 1 and values[k - 1] <= 0:
                     k -= 1
-                other.append(k - len(free) + 1 + _vanishes(free[:k], mid, (mid - 1, mid)))
+            found = k - last + _vanishes(values[:k], ahead, within)
+            (closes if old[contact] == _N else other).append(found)
         located = (step + (min(closes) if closes else max(other))) * self._timestep
         self._changes.append((step, max(self._changes[-1][1], located), _code(old), _code(new)))
 

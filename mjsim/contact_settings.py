@@ -52,13 +52,7 @@ def _choice(*known: Any) -> Any:
 class ContactSettings:
     """How MuJoCo is set; names are its own where it has one. The defaults belong to a step of 1 ms.
 
-    `at` scales the times of the defaults to another step; `suited` looks at the friction of a ball, and `for_problem`
-    also at the speeds of a run.
-
-    Raises
-    ------
-    InputError
-        If a value is outside what the engine can do or would be unstable.
+    Raises `InputError` if a value is outside what the engine can do or would be unstable.
     """
 
     timestep: float = _number(1e-3, "s", POSITIVE)
@@ -95,10 +89,10 @@ class ContactSettings:
                 check_number(field.name, getattr(self, field.name), field.metadata["unit"], field.metadata["allowed"])
             elif "known" in field.metadata:
                 check_choice(field.name, getattr(self, field.name), field.metadata["known"])
-        if self.rigid and (self.memory or self.servo or self.order == 2 or self.noslip_iterations):
-            raise InputError("rigid contacts need memory = False, servo = 0, order = 1, noslip_iterations = 0")
-        if self.rigid and self.integrator == "discrete":
-            raise InputError("rigid contacts need another integrator than 'discrete'")
+        if self.rigid and (self.memory or self.servo or self.order == 2):
+            raise InputError("rigid contacts need memory = False, servo = 0, order = 1")
+        if self.rigid and (self.noslip_iterations or self.integrator == "discrete"):
+            raise InputError("rigid contacts need noslip_iterations = 0 and another integrator than 'discrete'")
         if self.memory and self.cone == "pyramidal":
             raise InputError("cone = 'pyramidal' needs memory = False: rows of the pyramid mix normal and friction")
         if self.timestep > self.largest_timestep * (1 + 1e-12):
@@ -113,7 +107,7 @@ class ContactSettings:
         """Largest stable time step, s.
 
         The normal rows need tc >= 2 h (else the engine silently replaces tc), the friction rows b_f h <= 1 to die
-        out without changing sign, and the servo must be slower than a step. Rigid contacts are stable with any step.
+        out without changing sign, and the servo must be slower than a step.
         """
         if self.rigid:
             return math.inf
@@ -220,8 +214,7 @@ class ContactSettings:
     @classmethod
     def rigid_at(cls, timestep: float) -> Self:
         """Rigid contacts of a free ball, for a step of any length."""
-        own = cls(rigid=True, solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
-        return dataclasses.replace(own, timestep=timestep)
+        return cls(timestep=timestep, rigid=True, solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
 
     def suited(self, p: Parameters) -> Self:
         """With slower contacts if the friction of a ball would make these chatter, else as they are."""

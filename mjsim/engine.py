@@ -7,6 +7,7 @@ import functools
 import math
 import os
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
@@ -14,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from mjsim import limits, recorder, scene
+from mjsim import recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
-from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
+from mjsim.corrections import Ball, resistance
+from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory, time_scales
 from model.arrays import Array
 from model.errors import check_type
-from model.kinematics import UNITS, VARIABLES
+from model.kinematics import UNITS, VARIABLES, check_place
 from model.parameters import Range, check_number
 
 if TYPE_CHECKING:
@@ -77,9 +79,9 @@ class Run:
         self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
         self._journal, self._progress = journal, progress or (lambda done: None)
         self._timestep = self._settings.timestep
-        self._interval, self._count = limits.sampling(t_end, self._timestep, sample_interval)
-        limits.check_timestep(self._timestep, p, self._flow, t_end)
-        limits.check_start(self._x0, p, self._settings)
+        self._interval, self._count = sampling(t_end, self._timestep, sample_interval)
+        check_timestep(self._timestep, p, self._flow, t_end)
+        check_start(self._x0, p, self._settings)
         self._model, mjcf = scene.build(p, self._settings)
         shown = dataclasses.asdict(self._settings) | {
             "t_end": float(t_end), "sample_interval": self._interval * self._timestep, "x0": list(self._x0),
@@ -128,6 +130,7 @@ class Run:
     def trajectory(self) -> Trajectory:
         """The whole run, carried out to its end."""
         blocks = list(self)
+        del self.ball  # of many runs the engines would take gigabytes
         return Trajectory.from_blocks(self.header, blocks, self.events)
 
     def _finish(self, first: int, raw: Array) -> npt.NDArray[np.void]:
@@ -145,6 +148,33 @@ class Run:
             failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
             self.header = dataclasses.replace(self.header, failure=failure)
         return block
+
+
+def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
+    """`check_place`, and a warning if friction at both contacts makes them chatter."""
+    if settings.contact_decay(p.mu, p.eta) > 1:
+        warnings.warn(
+            f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters with these settings; "
+            "ContactSettings.suited gives slower contacts",
+            stacklevel=4,
+        )
+    check_place(x, p, settings.touching(p.g))
+
+
+def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> None:
+    """`time_scales.check_timestep` with the drag of these engines."""
+    ball = Ball.of(p, ContactSettings())
+    time_scales.check_timestep(timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m)
+
+
+def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tuple[int, int]:
+    """Steps between samples and number of samples, both ends included."""
+    t_end = check_number("t_end", t_end, "s", Range(timestep), "to hold a time step it")
+    if sample_interval is None:
+        sample_interval = max(t_end / 1000, timestep)
+    check_number("sample_interval", sample_interval, "s", Range(timestep * (1 - 1e-9)), "to hold a time step it")
+    steps = max(1, round(sample_interval / timestep))
+    return steps, math.floor(t_end / (steps * timestep) + 1e-9) + 1
 
 
 def simulate(

@@ -10,9 +10,8 @@ from model import Parameters, State, trajectory
 from model.arrays import Array
 from model.kinematics import frame
 
-COORDINATES, NSENSOR = 3, 30
-"""Sizes of the row of a step: azimuth, inward and upward; after their velocities and spin two contact sensors and gaps.
-"""
+COORDINATES, NSENSOR = 3, 28
+"""Sizes of the row of a step: azimuth, inward and upward; after their velocities and spin two contact sensors."""
 SENSORS = COORDINATES + 6
 """Where the sensors begin; place and velocities are those before the step."""
 COLUMNS = SENSORS + NSENSOR
@@ -47,16 +46,16 @@ def state(place: Array, qvel: Array, p: Parameters) -> State:
 
 
 def contacts(rows: Array) -> Contacts:
-    """What the contacts do in successive steps, of rows (steps, `COLUMNS`)."""
-    each, gaps = rows[:, SENSORS:-2].reshape(len(rows), 2, NSENSOR // 2 - 1), rows[:, -2:]
+    """Loads, friction, slip speeds and gaps of contacts in successive steps, from rows (steps, `COLUMNS`)."""
+    each = rows[:, SENSORS:].reshape(len(rows), 2, NSENSOR // 2)
     normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
     slips = np.moveaxis(each[..., _SLIP], -1, 0)
-    return Contacts(normal, np.hypot(first, second), np.hypot(slips[0], slips[1]), gaps)
+    return Contacts(normal, np.hypot(first, second), np.hypot(slips[0], slips[1]), rows[:, COORDINATES - 1 : 0 : -1])
 
 
 def forces(sensors: Array, theta: npt.ArrayLike) -> Array:
     """Forces at A and B in the paper's axes, (n, 2, 3), of sensors (n, `NSENSOR`) at an azimuth, or one each, N."""
-    each = sensors[:, :-2].reshape(len(sensors), 2, NSENSOR // 2 - 1)
+    each = sensors.reshape(len(sensors), 2, NSENSOR // 2)
     (normal, first, second), n, t = np.moveaxis(each[..., _FORCE, None], 2, 0), each[..., _NORMAL], each[..., _TANGENT]
     in_world: Array = normal * n + first * t + second * np.cross(n, t)
     return in_world @ np.swapaxes(frame(np.asarray(theta)), -1, -2)
@@ -71,7 +70,7 @@ def samples(time: Array, rows: Array, lead: float, p: Parameters) -> npt.NDArray
     loads = forces(sensors, place[:, 0])
     place = place - lead * qvel[:, :3]
     block = trajectory.samples(time, place[:, 0], state(place, qvel, p), p)
-    for k, (contact, sensor) in enumerate(zip("AB", np.split(sensors[:, :-2], 2, axis=1), strict=True)):
+    for k, (contact, sensor) in enumerate(zip("AB", np.split(sensors, 2, axis=1), strict=True)):
         gap, speed, touches = block[f"gap_{contact}"], block[f"slip_speed_{contact}"], sensor[:, _COUNT] > 0
         block[f"force_{contact}"] = loads[:, k]
         # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.

@@ -35,8 +35,8 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     for name, friction in (("A", p.mu), ("B", p.eta)):
         _set_pair(spec.pair(name), friction, settings)
     if settings.rigid:
-        for each in (*map(spec.sensor, ("gap A", "gap B")), *map(spec.joint, ("azimuth", "inward", "upward", "spin"))):
-            spec.delete(each)
+        for name in ("azimuth", "inward", "upward", "spin"):
+            spec.delete(spec.joint(name))
         body.add_freejoint(name="free")
         # The wall is the face of a block that goes with the ball, so heavy that it isn't moved.
         option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia

@@ -3,12 +3,10 @@
 Before each step the wall is turned to be tangent at the ball's azimuth, the margins follow the gaps, and
 `mjsim.corrections` says what drives the step. The body axes of a homogeneous ball are arbitrary: they are set upright,
 so that forces and velocities of the ball's joint are along the paper's axes. Positions are kept half a step ahead of
-velocities (leapfrog).
+velocities (leapfrog). Contacts are in the order A, B.
 
-A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as `mjsim.landing` says; so
+A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as `mjsim.free` says; so
 it does the first one, which finds the margins and forces that belong to the start.
-
-The same text runs in plain Python, or compiled (`mjsim.compiled`). Contacts are in the order A, B.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, Velocity, corrections, eventful, near_axis
 from mjsim.coulomb import compiled as kernels
-from mjsim.landing import Fine
+from mjsim.free import Fine
 from mjsim.recorder import COORDINATES, HUGE, NORMALS, NSENSOR, SENSORS
 from model import Parameters, State
 from model.arrays import Array
@@ -84,8 +82,7 @@ def seen_forces(body: Joints) -> None:
 def drive(omega_0: float, row: Any, body: Joints) -> None:
     """Let the margins follow the gaps and set what drives the next step; say if the ball is due to land in it.
 
-    The row begins with place and velocities; to the sensors that follow is to be added what they leave out of the
-    normal forces.
+    Place and velocities are noted in the row.
     """
     qpos, forces, margins, applied, ball = body.qpos, body.forces, body.margins, body.applied, body.ball
     seen_forces(body)
@@ -109,9 +106,6 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
     # by as much. With the pull taken back, minus what slip would take from the contact leaves De Saxce's share.
     lift_A, lift_B = lift_A * (y < margins[0]), lift_B * (h < margins[1])
     body.adhesion[0], body.adhesion[1] = -lift_A, -lift_B
-    for i in range(SENSORS, SENSORS + NSENSOR):
-        row[i] = 0.0
-    row[SENSORS + _NORMAL_A], row[SENSORS + _NORMAL_B] = -lift_A, -lift_B
     applied[1] -= lift_B
     applied[2] -= lift_A
 
@@ -131,8 +125,9 @@ def velocity_of(v: Any) -> Velocity:
 
 @loop
 def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
-    """A step for each omega_0, of which some are done, noted in rows (steps, `COLUMNS`), up to one that the ball takes
-    in fine ones: its number; one that has diverged takes none."""
+    """Take a step for each omega_0 from number `done` on, up to one with a landing: the number of that.
+
+    Steps are noted in rows (steps, `COLUMNS`); a ball that has diverged takes none."""
     while done < len(fluid):
         row = rows[done]
         drive(float(fluid[done]), row, body)
@@ -143,7 +138,9 @@ def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
         body.marks[_DUE] = body.marks[_HELD] = 0
         kernels.mj_step(body.served[0], body.served[1])
         for i in range(NSENSOR):
-            row[SENSORS + i] += body.sensors[i]
+            row[SENSORS + i] = body.sensors[i]
+        row[SENSORS + _NORMAL_A] += body.adhesion[0]
+        row[SENSORS + _NORMAL_B] += body.adhesion[1]
         done += 1
     return done
 
@@ -213,12 +210,11 @@ class JointedBall:
         The contacts get margins with which they bear their forces.
         """
         p, body, how = self._p, self.body, int(self.body.marks[_DUE])
-        ahead, v = body.qpos[:3].copy(), body.qvel.copy()
+        v = body.qvel.copy()
         rates = (v - body.last) / self._h
-        place = ahead - self.lead * (v + rates * self.lead / 2)[:3]
+        place = body.qpos[:3] - self.lead * (v + rates * self.lead / 2)[:3]
         x, theta = recorder.state(place, v, p), float(place[0])
         place, v, rates, body.forces[:], change, row[SENSORS:] = self._fine.step(x, theta, rates, omega_0, how != LANDS)
-        row[-2:] = ahead[:0:-1]
         near = near_axis(p.R - place[1], Velocity(*v), body.ball) and body.forces[7] == 0
         pace = max(abs(v[0]), math.sqrt(p.g / p.R))
         most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(body.forces[[1, 2]]).max())

@@ -25,7 +25,7 @@ EXCEPTIONS = {
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_interpolant", "_first_fall")),
     *(f"analytic/simulation/solvers.py:_{name}" for name in ("extrapolation_step", "explicit_steps", "implicit_steps")),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
-    *("mjsim/corrections.py:corrections", "mjsim/landing.py:through"),
+    *("mjsim/corrections.py:corrections", "mjsim/free.py:through"),
     *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_hand_on", "_holds", "_put_back")),
     "mjsim/world_axes.py:driven",
     # what an exact case is made of

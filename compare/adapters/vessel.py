@@ -17,11 +17,10 @@ import numpy.typing as npt
 
 from compare.adapters.free import BreakdownError, Free, Library
 from compare.adapters.scene import Body, Scene, Surface, Vector
-from mjsim import limits
 from mjsim.classify import Classifier, Contacts
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
-from mjsim.engine import EVENT_TIMES
+from mjsim.engine import EVENT_TIMES, check_timestep, sampling
 from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import Motion, check_place, frame, from_world, to_world
@@ -100,8 +99,8 @@ def simulate(library: Library, member: str, task: Any, progress: Callable[[float
         If the library is not installed, an argument out of range, or the time step too large for the problem.
     """
     p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep
-    every, count = limits.sampling(t_end, h, task.sample_interval)
-    limits.check_timestep(h, p, flow, t_end)
+    every, count = sampling(t_end, h, task.sample_interval)
+    check_timestep(h, p, flow, t_end)
     if p.fluid_torque:
         raise InputError(
             f"fluid_torque = {p.fluid_torque:g} s-1: {task.engine} leaves it out; mujoco, time-stepping don't"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mjsim import ContactSettings, limits, recorder, scene
+from mjsim import ContactSettings, engine, recorder, scene
 from mjsim.stepping import JointedBall
 from model import Flow, InputError, Parameters, State
 from model.parameters import POSITIVE, check_number
@@ -43,12 +43,12 @@ def view(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings
 
 
 def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> JointedBall:
-    """The simulation, with what only serves contact out of sight."""
+    """A simulation for the viewer, with what only serves contact hidden."""
     if settings.rigid:
         raise InputError("the viewer shows no rigid contacts")
-    limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
+    engine.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
     x = State.one(x0)
-    limits.check_start(x, p, settings)
+    engine.check_start(x, p, settings)
     model, _ = scene.build(p, settings, shown=True)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
     return JointedBall(model, p, settings, x, 0.0)

@@ -7,7 +7,7 @@ import mjsim
 from docs.studies.states import HITTING, LANDING
 from mjsim import ContactSettings
 from mjsim.classify import PERSISTENCE, Classifier, Contacts
-from mjsim.landing import FINE
+from mjsim.free import FINE
 from model import Case, Parameters
 
 P = Parameters.named("reference")

@@ -28,8 +28,8 @@ FREE = {"rigid": True, "memory": False, "servo": 0.0, "order": 1}
         ({"order": 3}, "order = 3 must be one of 2, 1"),
         ({"servo": float("nan")}, r"servo = nan s must be finite"),
         ({"rigid": True, "memory": False, "order": 1}, "rigid contacts need memory = False, servo = 0, order = 1"),
-        (FREE | {"noslip_iterations": 5}, "rigid contacts need .*noslip_iterations = 0"),
-        (FREE | {"integrator": "discrete"}, "rigid contacts need another integrator than 'discrete'"),
+        (FREE | {"noslip_iterations": 5}, "rigid contacts need noslip_iterations = 0"),
+        (FREE | {"integrator": "discrete"}, "rigid contacts need .* another integrator than 'discrete'"),
     ],
 )
 def test_refused(changes, words) -> None:

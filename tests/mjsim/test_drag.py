@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mjsim import ContactSettings, limits
+from mjsim import ContactSettings, engine
 from mjsim.corrections import Ball, resistance
 from model import Flow, InputError
 from model.drag import LAWS
@@ -33,5 +33,5 @@ def test_a_step_too_long_for_the_drag_is_refused():
     p = BY_LAW["quadratic"].replace(omega_0=1.0, c=5.0)
     stiff = 2 * float(drag_laws.resistance(p.R * p.omega_0, p))
     with pytest.raises(InputError, match=r"must be <= .* half of 1/\(2 c\(R omega_0\)\)"):
-        limits.check_timestep(0.51 / stiff, p, Flow.steady(1.0), 1.0)
-    limits.check_timestep(0.49 / stiff, p, Flow.steady(1.0), 1.0)
+        engine.check_timestep(0.51 / stiff, p, Flow.steady(1.0), 1.0)
+    engine.check_timestep(0.49 / stiff, p, Flow.steady(1.0), 1.0)

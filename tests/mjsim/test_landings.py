@@ -6,7 +6,7 @@ import pytest
 import analytic
 import mjsim
 from mjsim import ContactSettings, recorder, scene
-from mjsim.landing import COARSE
+from mjsim.free import COARSE
 from mjsim.stepping import NOT, JointedBall
 from model import Case, Parameters, State
 
