@@ -213,13 +213,6 @@ def _free_fall(s: Any, p: Any) -> Any:
     return replace(s, x=_with(s.x, v_y=v_y, slip_z=-v_y / p.r))
 
 
-def _by_modulus(right: Function, of: Any) -> float:
-    if not math.isfinite(right(of)):
-        return float(right(of))
-    sizes = np.abs(of.eigenvalues)
-    return float(1 / sizes[-of.eigenvalues.real > 1e-9 * sizes.max()].min())
-
-
 def _mirrored(right: Function, *args: Any) -> tuple[Any, Any]:
     x, flows = right(*args)
     return np.where(np.arange(8) == VARIABLES.index("slip_x"), -x, x), flows
@@ -245,7 +238,7 @@ _STATIONARY: dict[str, list[Wrong]] = {
         ),
         ("RR whatever friction it takes", "_rr", _each(lambda s, p: replace(s, exists=True))),
         ("a ball sinks by its weight, unbraked by the wall", "_ns", _each(_free_fall)),
-        ("a time constant by the modulus of an eigenvalue", "slowest_time_constant", instead(_by_modulus)),
+        ("a half-life for a time constant", "slowest_time_constant", scaled(math.log(2))),
     ],
     "analytic.stationary.slipping_branch": [
         ("SS leans the other way", "states", instead(_mirrored)),
