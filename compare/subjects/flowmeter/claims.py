@@ -140,7 +140,16 @@ def _meant(m: Measurement) -> dict[str, float]:
 def _one_end(m: Measurement) -> bool:
     """Whether one and the same threshold ends the range of that meter at every corner of its tolerances."""
     eta = _meant(m)["eta"]
-    return m.parameters.drag == STOKES and not eta * (1 - OFF) < m.parameters.j < eta * (1 + OFF)
+    return not eta * (1 - OFF) < m.parameters.j < eta * (1 + OFF)
+
+
+def _stokes(m: Measurement) -> bool:
+    return m.parameters.drag == STOKES
+
+
+def _exact(m: Measurement) -> float:
+    """The flow up to which a design covers a ball without tolerances."""
+    return design.choice(m.parameters.replace, {}, {}, fastest=1.0).margin
 
 
 def _worst(m: Measurement) -> float:
@@ -256,12 +265,12 @@ CLAIMS = (
     claim(
         "design-limit",
         "extension",
-        "A ball whose friction is off by 5 % to the worse comes to its limit at the worst that a design states for the "
-        "meter that it was meant to be; ω₀₂ changes with the wall's friction by the power that it states.",
+        "The operating range of a meter ends where its design says: with friction off by 5 % to the worse, at the "
+        "worst limit of the meter as it was meant. ω₀₂ changes with the wall's friction by the power that a design says.",
         *(
-            Bearing("thresholds", end, predict, when=all_of(first, _one_end), by="analytic.flowmeter.design")
+            Bearing("thresholds", end, predict, when=all_of(first, _stokes, *more), by="analytic.flowmeter.design")
             for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
-            for predict in (_worst, _least)
+            for predict, more in ((_exact, ()), (_worst, (_one_end,)), (_least, (_one_end,)))
         ),
         Bearing("thresholds", "omega_02", _by_sensitivity, by="analytic.flowmeter.design.sensitivities"),
     ),
