@@ -266,7 +266,7 @@ CLAIMS = (
         "design-limit",
         "extension",
         "The operating range of a meter ends where its design says: with friction off by 5 % to the worse, at the "
-        "worst limit of the meter as it was meant. ω₀₂ changes with the wall's friction by the power that a design says.",
+        "worst limit of the meter as it was meant. ω₀₂ changes with the wall's friction by the power that it says.",
         *(
             Bearing("thresholds", end, predict, when=all_of(first, _stokes, *more), by="analytic.flowmeter.design")
             for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
