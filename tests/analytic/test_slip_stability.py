@@ -1,4 +1,4 @@
-"""Slip dies out by its energy where forces admit rolling, though the paper's claim after (80) fails; claims measure gamma."""
+"""Slip dies out by its energy where forces admit rolling, though the claim after (80) fails; claims measure gamma."""
 
 import numpy as np
 import pytest
