@@ -92,7 +92,7 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
 
 
 def note(row: Any, qpos: Any, qvel: Any, ahead: float, ball: Ball) -> None:
-    """Coordinates, but for the azimuth, and velocities of the joint chain, as `recorder` has them.
+    """Write coordinates, but for the azimuth, and velocities into a row, as those of a ball on joints.
 
     The place is `ahead` of the velocities; these are along the axes of where the ball was.
     """

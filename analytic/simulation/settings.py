@@ -66,7 +66,7 @@ def fitting_step(steps: float, p: Parameters, flow: Flow, t_end: float) -> float
 
 
 def check_duration(p: Parameters, flow: Flow, t_end: float) -> None:
-    """Raise `InputError` for more of a huge flow than can be computed.
+    """Raise `InputError` if a run in a huge flow is too long to be computed.
 
     That is `MAX_RADIANS`, of the orbit or of waves, where they are more than `HUGE` times as fast as sqrt(g/R).
     """

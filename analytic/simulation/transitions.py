@@ -51,7 +51,7 @@ UNSETTLED = "the contact problem doesn't settle"
 
 
 def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
-    """The case after a guard has fired, the moment in it, and the impulses of an impact."""
+    """What follows when a guard has fired: the next case, the moment at its start, and impulses of an impact."""
     x, A, B = at.x, case // 3, case % 3
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
     if guard in (A_SLIPS, B_SLIPS):

@@ -153,6 +153,7 @@ def ball_case(
         return np.concatenate(to_world(found.x, found.theta, p), axis=1)[1:], found
 
     def wrong_states(restitution: float = 0.0, **factors: float) -> Array:
+        """States (n, 9) of a ball with parameters wrong by factors."""
         changed = {key: factor * getattr(p, key) for key, factor in factors.items()}
         return run(p.replace(**changed), 1e-9, restitution)[0]
 

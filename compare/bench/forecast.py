@@ -211,7 +211,8 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
     for k, (first, second) in enumerate(geoms):
         part = belongs.ravel() == k
         own = those.subset(part)
-        largest = own.largest_step()
+        largest, slides = own.largest_step(), bool((law.slides & ~moves)[part].any())
+        harm = {name: float(values[part].max()) for name, values in harms.items()}
         pairs.append(
             PairForecast(
                 name=f"{names[first]} / {names[second]}",
@@ -219,12 +220,11 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
                 moves=bool(moves[part].any()),
                 parts=own.parts,
                 load=float(own.force[:, 0].sum()),
-                slides=bool((law.slides & ~moves)[part].any()),
+                slides=slides,
                 hover=float(law.hover[part].min()),
                 largest_step=largest,
                 replaced=dict(replacements(scene.model, own, names)),
-                harm={name: float(values[part].max()) for name, values in harms.items()}
-                | {"largest_step": those.timestep / largest},
+                harm=harm | {"largest_step": those.timestep / largest} | ({"creep": 0.0} if slides else {}),
                 **{name: float(values[part].max()) for name, values in told.items()},
             )
         )

@@ -12,7 +12,7 @@ from compare.bench.forecast import SHOWN, Forecast, PairForecast
 from compare.bench.settled import NOISE, few
 from compare.kit import pages
 
-OFF = 0.05
+CREEP_OFF = 0.05
 """Share of the predicted creep by which the measured one may differ without a word."""
 Table = tuple[str, list[list[str]]]
 """Its title and its rows, a head first."""
@@ -37,7 +37,7 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction holds them."
     if lost := [p.name for p in f.pairs if p.slides and p.creep_measured > p.hover]:
         yield f"These slide so fast that contact is lost again and again: {few(lost)}."
-    if off := [p.name for p in f.pairs if abs(p.creep_measured - p.creep) > OFF * p.creep + NOISE]:
+    if off := [p.name for p in f.pairs if abs(p.creep_measured - p.creep) > CREEP_OFF * p.creep + NOISE]:
         yield f"Creep is not what was predicted at {few(off)}: not settled yet, or the solver stops early (tolerance)."
     if f.settled.collapsed:
         how = "To hold it up: --ctrl, --keyframe, or in Python control."

@@ -37,7 +37,8 @@ def show_parameters(args: argparse.Namespace) -> int:
     for row in rows:
         table.add_row(row["option"], f"{row['value']:.6g}", readable(row["unit"]), row["range"], row["meaning"])
     table.add_row("--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}")
-    own = f"Values of {args.parameters or args.set}; other sets: {', '.join(Parameters.names())}."
+    others = [name for name in Parameters.names() if args.parameters or name != args.set]
+    own = f"Values of {args.parameters or args.set}; other sets: {', '.join(others)}."
     toml = "A file of your own for --parameters: TOML, a line NAME = value each, named as in the options (omega_0)."
     options.show({"parameters": rows, "drag": p.drag, "sets": Parameters.names()}, args.json, table, "", own, toml)
     return 0
@@ -137,7 +138,10 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         reach = f"rolling is its only lasting motion up to ω₀ = {to_digits(limit, 8)} rad/s: there {end}"
         if math.isinf(data["reading_range"]):
             reach += "; ω_c = ω₀ holds in every motion, however fast the flow"
-    remarks: list[Text | str] = [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {data['reading']}; {reach}."]
+    remarks: list[Text | str] = [
+        Text("Forces in RR are not determined: shown are those that need least friction.", "dim")
+    ]
+    remarks += [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {data['reading']}; {reach}."]
     remarks += [meter.torque(p)] if p.c and p.omega_0 else []
     if data["fluid_inertia"]:
         shifts = ", ".join(
@@ -157,12 +161,15 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     return [*first, head, groups, pages.table("Thresholds", limits, justify="left"), shown, *remarks]
 
 
-def _complex(value: complex, shown: Callable[[float, int], str]) -> str:
-    """A complex number and its conjugate; a real part that is round-off is 0."""
-    real = value.real if abs(value.real) > 1e-12 * abs(value) else 0.0
+def _complex(value: complex, largest: float, shown: Callable[[float, int], str]) -> str:
+    """A complex number and its conjugate; a real part that is round-off of the largest value is 0."""
+    real = value.real if abs(value.real) > 1e-12 * largest else 0.0
     return shown(real, 4) + (f" ± {shown(abs(value.imag), 4)}i" if value.imag else "")
 
 
+_STABILITY = {each.value: each.value.removesuffix(" stable") for each in analytic.Stability} | {
+    analytic.Stability.ALGEBRAIC.value: "algebraically"
+}
 _ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] = {
     "ω_c (rad/s)": lambda s, shown: shown(s["x"]["omega_c"], 8),
     "ω̃_x (rad/s)": lambda s, shown: shown(s["x"]["slip_x"], 8),
@@ -172,9 +179,11 @@ _ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] =
     "A_y (N)": lambda s, shown: shown(s["force_A"][1], 6),
     "B_x (N)": lambda s, shown: shown(s["force_B"][0], 6),
     "forces admissible": lambda s, _: "yes" if s["exists"] else "no",
-    "within the case": lambda s, _: s["stability"].removesuffix(" stable"),
+    "within the case": lambda s, _: _STABILITY[s["stability"]],
     "against slipping": lambda s, _: "stable" if s["slip_stable"] else "unstable",
-    "rightmost eigenvalue (1/s)": lambda s, shown: _complex(s["eigenvalues"][0], shown),
+    "rightmost eigenvalue (1/s)": lambda s, shown: _complex(
+        s["eigenvalues"][0], max(map(abs, s["eigenvalues"])), shown
+    ),
     "free": lambda s, _: ", ".join(s["family"]) or "-",
     "Re": lambda s, shown: shown(s["Re"], 4),
 }

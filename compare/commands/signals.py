@@ -96,6 +96,7 @@ def raised() -> Iterator[None]:
         _send_later(number, 0.01)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
+        """Raise `Interrupted`, or send the signal again later if something is being imported."""
         if _is_importing(frame) and len(waits) < _WAITS:
             waits.append(number)
             send_again(number)

@@ -48,7 +48,7 @@ def torque(p: Parameters) -> str:
     laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
     stokes_told, layer_told = (
         f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({100 * law.shift:+.0f} %), and "
-        f"it would need {f'{law.friction:#.2g} times' if math.isfinite(law.friction) else 'more than'} "
+        f"it would need {f'{rounded(law.friction, most=2)} times' if math.isfinite(law.friction) else 'more than'} "
         "the friction that there is"
         for law in laws
     )

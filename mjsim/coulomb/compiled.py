@@ -159,6 +159,7 @@ def _function(name: str, source: Any = _engine, arguments: int = 2, returns: Any
 
 
 def _linked(name: str, arguments: int, returns: Any) -> Any:
+    """A function of the compiled law that other compiled functions call by its address."""
     return types.ExternalFunction(f"coulomb_{name}", returns(*[types.intp] * arguments))
 
 
@@ -245,6 +246,7 @@ def alone(function: Any) -> Iterator[None]:
 
 @compiled
 def _at(name: int) -> int:
+    """Offset in bytes of a member of one of MuJoCo's structures, by its number here."""
     return int(_int64(_offsets_address())[name])
 
 
@@ -262,11 +264,13 @@ def _whole(struct: int, name: int) -> Any:
 
 @compiled
 def _number(struct: int, name: int) -> int:
+    """An integer in `mjData` or `mjModel`."""
     return int(_int32(struct + _at(name))[0])
 
 
 @compiled
 def _value(struct: int, name: int) -> float:
+    """A real in `mjData` or `mjModel`."""
     return float(_real(struct + _at(name))[0])
 
 
@@ -318,17 +322,20 @@ def room(head: int, block: int, numbers: int) -> None:
 
 @compiled
 def _integers(head: int, block: int, numbers: int) -> Any:
+    """A block of the simulation's memory as integers, grown to so many if it is smaller."""
     _room(head, block, numbers)
     return _int64(_int64(head)[block])
 
 
 @compiled
 def _block(head: int, block: int) -> Any:
+    """A block of the simulation's memory as reals."""
     return _real(_int64(head)[block])
 
 
 @compiled
 def _elliptic(m: int) -> bool:
+    """Whether the model's friction cone is elliptic."""
     return bool(_number(m, CONE) == 1)
 
 
@@ -436,7 +443,7 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
 
 @compiled
 def _poses(m: int, d: int, head: int, block: int) -> int:
-    """What axes and Jacobians depend on, `POSE` numbers of each contact; points of flush faces shift by µm."""
+    """Store the poses that axes and Jacobians depend on, `POSE` numbers of each contact; return how many numbers."""
     ngeom, ncon, contact, size = _number(m, NGEOM), _number(d, NCON), _int64(d + _at(CONTACT))[0], _at(SIZE)
     xpos, xmat, poses = _array(d, XPOS), _array(d, XMAT), _room(head, block, 12 * ngeom + POSE * ncon)
     for i in range(3 * ngeom):
@@ -447,7 +454,7 @@ def _poses(m: int, d: int, head: int, block: int) -> int:
     for i in range(ncon):
         c, first = contact + i * size, 12 * ngeom + POSE * i
         pos, frame, friction, geom = _real(c + at[0]), _real(c + at[1]), _real(c + at[2]), _int32(c + at[3])
-        for j in range(3):
+        for j in range(3):  # points of flush faces shift by µm
             poses[first + j], poses[first + 9 + j] = 1e-3 * pos[j], friction[j]
         for j in range(6):
             poses[first + 3 + j] = frame[j]
@@ -1009,7 +1016,7 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
 
 @compiled
 def _slide_on(m: int, d: int, head: int) -> bool:
-    """Friction of what slides on opposes its slip in the middle of the step, see `Law.fast`; whether anything does."""
+    """Let friction of contacts that slide on oppose slip at mid step, see `Law.fast`; return whether there are any."""
     counts, elliptic, h = _int64(head), _elliptic(m), _value(m, STEP)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
     velocity, some = _array(d, VEL), False
@@ -1264,6 +1271,7 @@ if COMPILES:
 
 @compiled
 def step(m: int, d: int, head: int) -> None:
+    """Take one of MuJoCo's steps under the law."""
     mj_step1(m, d)
     control_linked(m, d, head)
     mj_step2(m, d)
@@ -1288,6 +1296,7 @@ def step_of(m: int, d: int, head: int, duration: float, anew: bool) -> None:
 
 @compiled
 def _reset(head: int) -> None:
+    """Forget what is remembered from the last step."""
     _real(head)[MOMENT], _int64(head)[PENDING], _int64(head)[TURNED] = math.nan, 0, 0
 
 
@@ -1356,7 +1365,7 @@ def remember(m: int, d: int, head: int) -> None:
 
 
 def forget_all() -> None:
-    """Ask again for every simulation of the callback."""
+    """Forget all simulations of the callback, so that it asks for each again."""
     _simulations[0] = 0
 
 
@@ -1436,6 +1445,7 @@ class Simulation:
 
 
 def _free(head: npt.NDArray[np.int64]) -> None:
+    """Release all memory of a simulation."""
     release = ctypes.pythonapi.PyMem_RawFree
     release.argtypes = [ctypes.c_void_p]
     for block in range(KEPT, COUNT, 2):

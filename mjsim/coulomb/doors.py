@@ -157,7 +157,7 @@ class Coulomb:
             mujoco.mj_step2(self.model, data)
 
     def _begin(self, data: Any) -> bool:
-        """Whether the law comes from here, and not from the callback."""
+        """Check model and data before a step; whether this object applies the law, and not the installed callback."""
         if data.model is not self.model:
             raise ValueError("data belong to another MjModel than this Coulomb")
         self._check()

@@ -1,4 +1,4 @@
-"""The simulation leaves rolling where a contact with steep friction does in its limit, the paper, and others.
+"""The simulation leaves rolling where a contact with steep friction does in its limit, at any friction.
 
 The steep contact has friction against the direction of v/sqrt(v^2 + eps^2) in the place of v/|v|: the equations of SS
 (26) hold throughout, nothing ever sticks and no case is chosen. The simulation has to be its limit for eps -> 0.

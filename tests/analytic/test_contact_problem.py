@@ -1,4 +1,4 @@
-"""The contact problem's solution obeys Coulomb's law at both contacts, also where friction locks the ball."""
+"""A solver of the contact problem obeys Coulomb's law at both contacts, also where friction locks the ball."""
 
 import math
 import sys

@@ -49,13 +49,12 @@ def test_rolling_at_both_points_symbolically():
         assert sp.simplify(mine - solution[0][name]) == 0, str(name)
 
 
-@pytest.mark.parametrize("friction", [(0.3, 0.45), (0.01, 0.9), (0.9, 0.01)])
+@pytest.mark.parametrize(("mu", "eta", "omega_0"), [(0.3, 0.45, 17.0), (0.01, 0.9, 17.0), (0.9, 0.01, -17.0)])
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", [case for case in Case if case is not Case.RR])
-def test_rates_and_forces_at_random_states(case, law, friction):
+def test_rates_and_forces_at_random_states(case, law, mu, eta, omega_0):
     """Off the wall, too. Errors are measured against the sum of all accelerations that enter, as round-off is."""
-    mu, eta = friction
-    x, p = random_states(case, N), P.replace(drag=law, nu_f=1e-5, mu=mu, eta=eta)
+    x, p = random_states(case, N), P.replace(drag=law, nu_f=1e-5, mu=mu, eta=eta, omega_0=omega_0)
     _, v_y, omega_c, *slips, h, v_h = x.T
     rho, fastest = p.R - h, np.abs(slips).sum(axis=0)
     c = resistance(np.sqrt(v_h**2 + v_y**2 + (rho * (omega_c - p.omega_0)) ** 2), p)
@@ -63,7 +62,7 @@ def test_rates_and_forces_at_random_states(case, law, friction):
     angles = np.arctan2(-A_z, A_x), np.arctan2(B_z, -B_y)  # alpha and beta (8), not used where nothing slips
     solved = ne.solved(case)(p.m, p.r, p.R, p.j, mu, eta, p.g, c, p.omega_0, *angles, *x.T)
     expected = np.stack(np.broadcast_arrays(*solved, x[:, 0]), axis=-1)[:, :14]
-    drag = c * (np.abs(v_y) + np.abs(v_h) + rho * (np.abs(omega_c) + p.omega_0))
+    drag = c * (np.abs(v_y) + np.abs(v_h) + rho * (np.abs(omega_c) + abs(omega_0)))
     turning = np.abs(omega_c) * (rho * np.abs(omega_c) + np.abs(v_y) + np.abs(v_h) + p.r * fastest)
     load = (p.g + drag + turning)[:, None]
     mine = np.concatenate([vector_field(case, x, p), *contact_forces(case, x, p)], axis=1)
@@ -85,22 +84,6 @@ def test_shapes_and_a_flow_of_its_own(case):
         assert [f.shape for f in contact_forces(case, x, P, fluid)] == [(2, 3, 3)] * 2
     if case.B is not Contact.N:
         np.testing.assert_array_equal(vector_field(case, x[..., :6], P), vector_field(case, x, P)[..., :6])
-
-
-@pytest.mark.parametrize("case", list(Case))
-def test_constraints_are_kept_exactly_and_mirror_images_too(case):
-    """Reflection in a plane through the axis turns (omega_c, slip_x, slip_y, omega_0) and leaves the rest."""
-    x = random_states(case, 100)
-    rates = vector_field(case, x, P)
-    rate = dict(zip(VARIABLES, rates.T, strict=True))
-    for name in TRAITS[case].constraints:
-        if name in rate:
-            assert np.all(rate[name] == 0), name
-        else:
-            np.testing.assert_allclose(rate["v_h"], -P.r * rate["slip_z"], rtol=1e-14)
-    flip = np.array([1, 1, -1, -1, -1, 1, 1, 1.0])
-    mirrored = vector_field(case, flip * x, P.replace(omega_0=-P.omega_0))
-    np.testing.assert_allclose(mirrored, flip * rates, rtol=1e-12, atol=0)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Ranges, slopes and onsets of slip where no ball can be measured: their limits, and what is said where none are."""
+"""Ranges, slopes and onsets of slip have limits where no ball can be measured, and say where there are none."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Where rolling is stable with respect to slip, and where the paper's claim after (80) fails; claims measure gamma."""
+"""Slip dies out by its energy where forces admit rolling, though the claim after (80) fails; claims measure gamma."""
 
 import numpy as np
 import pytest

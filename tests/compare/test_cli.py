@@ -41,6 +41,7 @@ ROOT = Path(cli.__file__).parents[2]
         ("--set steel-in-water", "the fluid's inertia .*: it would shift ω₀₁ by "),
         ("--set steel-in-water --omega-0 20 --drag stokes", r"Warning: Re = \d+ in SS, "),
         ("--set steel-in-water --omega-0 20", "^((?!Warning: Re).)*$"),
+        ("--drag quadratic --nu-f 1e-6", r"within the case +algebraically +unstable"),
     ],
 )
 def test_predict_says_what_the_ball_does_what_ends_the_operating_range_and_what_to_doubt(capsys, given, said):

@@ -118,7 +118,7 @@ def test_protocol_without_settled_states(lab):
     assert any("ends two-point rolling" in row.reason for row in rows)
 
 
-def test_a_range_that_another_threshold_may_end_is_not_held_against_the_spread_of_this_one():
+def test_a_range_that_another_threshold_may_end_is_not_held_against_the_tolerances_of_this_one():
     p = REFERENCE.replace(eta=0.99 * REFERENCE.j)
     row = measured("thresholds", "omega_01", analytic.thresholds(p).omega_01, 1e-9, p, "mine")
     assert judge(select(CLAIMS, ["design-limit"]), Records((row,)))[0].outcome is Outcome.CONFIRMED

@@ -356,27 +356,6 @@ def test_a_damped_finger_lands_in_a_step(integrator):
     assert abs(speeds[-1]) < 1e-12
 
 
-@WAYS
-def test_forces_turn_with_a_hand(rigid):
-    fingers = "".join(
-        f'<body pos="{side * 0.03} 0 0"><joint type="slide" axis="{-side} 0 0" stiffness="500" damping="20" '
-        'springref=".02"/><geom type="box" size=".01 .03 .03" mass=".2"/></body>'
-        for side in (-1, 1)
-    )
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic" tolerance="1e-12"/><default><geom friction="1"/></default><worldbody><body>'
-        f'<joint axis="0 0 1" armature="1000"/><geom size=".005" contype="0" conaffinity="0"/>{fingers}</body>'
-        '<body><freejoint/><geom type="capsule" size=".02 .03" mass=".1"/></body></worldbody></mujoco>'
-    )
-    data, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
-    data.qvel[0] = 2
-    law.step(data, 2000)
-    height, turned = data.qpos[5], data.qpos[0]
-    law.step(data, 500)
-    assert data.qpos[5] == pytest.approx(height, abs=1e-12)
-    assert data.qpos[0] - turned > 1
-
-
 @pytest.mark.parametrize("kind", ["capsule", "box", "cylinder"])
 @pytest.mark.parametrize("centre", ["0 0 0", ".1 .05 0"])
 def test_what_spins_keeps_its_energy(kind, centre):

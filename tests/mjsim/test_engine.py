@@ -86,8 +86,7 @@ def test_runs_need_all_that_makes_them() -> None:
             mjsim.simulate_many(sets, x0s, 0.1, flow)
 
 
-@pytest.mark.parametrize("settings", [None, RIGID], ids=["joints", "free"])
-@pytest.mark.parametrize("omega_c", [1e6, 1e9])
+@pytest.mark.parametrize(("settings", "omega_c"), [(None, 1e11), (RIGID, 1e6), (RIGID, 1e9)])
 def test_divergence_stops_a_run_and_keeps_what_there_is(settings, omega_c) -> None:
     wild = [0, 0, omega_c, 0, 0, 0]
     with pytest.raises(SimulationError, match=r"diverged by t = .* s") as caught:

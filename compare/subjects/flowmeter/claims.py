@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -12,7 +11,7 @@ import analytic
 from analytic.flowmeter import design
 from compare.claim import Bearing, Text, all_of, bearings, claim, given
 from compare.judge import simulated, theory
-from compare.kit.record import Measurement, Relation, state
+from compare.kit.record import Measurement, state
 from compare.kit.settling import physical_case
 from compare.kit.statistics import Measured
 from compare.states import case_of, from_floor, is_in, lasting_cases, lifts_first, slips_first, solution_of, solutions
@@ -125,31 +124,52 @@ def _at_event(m: Measurement) -> Measured:
     return Measured(value, math.hypot(unsure, 100 * RTOL * value))  # errors of 100 steps may have the same sign
 
 
-TOLERANCES = {"mu": 0.05, "eta": 0.05}
-"""Relative tolerances with which a meter's limit is claimed to be within its spread."""
+OFF = 0.05
+"""By how much, relatively, the friction of a meter may be off whose limits are claimed."""
 
 
-def _design_limit(m: Measurement, relation: Relation) -> float:
-    """The flow at which a design says that its operating range ends; at the soonest, and at the latest, by the spread.
+def _meant(m: Measurement) -> dict[str, float]:
+    """Friction of the meter whose worst, with friction off by `OFF`, is the ball that was measured.
 
-    Of a meter as meant, or with the worst and the best of friction within `TOLERANCES`.
+    Less friction slips sooner; a rougher wall carries the ball sooner.
     """
-    make, values = m.parameters.replace, {name: getattr(m.parameters, name) for name in design.INEXACT}
-    if relation is Relation.EQUAL:
-        return design.choice(make, values, {}, fastest=1.0).margin
-    if relation is Relation.AT_LEAST:
-        return design.choice(make, values, TOLERANCES, fastest=1.0).worst.omega_0
-    return design.threshold_spread(list(design.corners(make, values, TOLERANCES)))[m.quantity][1]
+    p, worst = m.parameters, 1 - OFF if slips_first(m) else 1 + OFF
+    return {"mu": p.mu / (1 - OFF), "eta": p.eta / worst}
+
+
+def _one_end(m: Measurement) -> bool:
+    """Whether one and the same threshold ends the range of that meter at every corner of its tolerances."""
+    eta = _meant(m)["eta"]
+    return not eta * (1 - OFF) < m.parameters.j < eta * (1 + OFF)
 
 
 def _stokes(m: Measurement) -> bool:
     return m.parameters.drag == STOKES
 
 
-def _limit_is_one_threshold(m: Measurement) -> bool:
-    """Whether one and the same threshold ends the operating range at every corner of `TOLERANCES`."""
-    p, off = m.parameters, TOLERANCES["eta"]
-    return not p.eta * (1 - off) < p.j < p.eta * (1 + off)
+def _exact(m: Measurement) -> float:
+    """The flow up to which a design covers a ball without tolerances."""
+    return design.choice(m.parameters.replace, {}, {}, fastest=1.0).margin
+
+
+def _worst(m: Measurement) -> float:
+    """The flow up to which a design covers all that the tolerances of that meter allow."""
+    meant = _meant(m)
+    return design.choice(m.parameters.replace, meant, dict.fromkeys(meant, OFF), fastest=1.0).margin
+
+
+def _least(m: Measurement) -> float:
+    """The least that a design says a threshold of that meter may be."""
+    meant = _meant(m)
+    corners = list(design.corners(m.parameters.replace, meant, dict.fromkeys(meant, OFF)))
+    return design.threshold_spread(corners)[m.quantity][0]
+
+
+def _by_sensitivity(m: Measurement) -> float:
+    """omega_02 from that on a wall with half the friction, as a power that a design tells."""
+    p, half = m.parameters, {"eta": m.parameters.eta / 2}
+    power = design.sensitivities(p.replace, half)["omega_02"]["eta"].value
+    return analytic.thresholds(p.replace(**half)).omega_02 * 2**power
 
 
 def _loop_reading_of_design(m: Measurement) -> float:
@@ -245,20 +265,14 @@ CLAIMS = (
     claim(
         "design-limit",
         "extension",
-        "The operating range of a meter ends where its design says; with friction off by up to 5 %, not below the "
-        "design's worst limit and within the spread of its thresholds.",
+        "The operating range of a meter ends where its design says: with friction off by 5 % to the worse, at the "
+        "worst limit of the meter as it was meant. ω₀₂ changes with the wall's friction by the power that it says.",
         *(
-            Bearing(
-                "thresholds",
-                end,
-                partial(_design_limit, relation=relation),
-                when=all_of(first, _stokes, *([_limit_is_one_threshold] if relation is Relation.AT_MOST else ())),
-                relation=relation,
-                by="analytic.flowmeter.design",
-            )
+            Bearing("thresholds", end, predict, when=all_of(first, _stokes, *more), by="analytic.flowmeter.design")
             for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
-            for relation in (Relation.EQUAL, Relation.AT_LEAST, Relation.AT_MOST)
+            for predict, more in ((_exact, ()), (_worst, (_one_end,)), (_least, (_one_end,)))
         ),
+        Bearing("thresholds", "omega_02", _by_sensitivity, by="analytic.flowmeter.design.sensitivities"),
     ),
     claim(
         "design-reading",

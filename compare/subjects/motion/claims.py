@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from scipy.optimize import brentq
+
 import analytic
 from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
@@ -19,6 +21,7 @@ from compare.subjects.motion.measure.motions import LANDED
 from compare.subjects.motion.measure.runs import late_ramp
 from model import Case
 from model.cases import TRAITS
+from model.drag import STOKES
 from model.kinematics import VARIABLES
 
 _OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
@@ -34,6 +37,13 @@ _HOLDS = "analytic.slip_stability.stability"
 def _sinking(m: Measurement) -> float:
     """v_y in m/s by Stokes' drag, from the properties of fluid and ball."""
     return -drag.sinking_speed(**{name: m.at(name) for name in FLUIDS[m.set]})
+
+
+def _fallen(m: Measurement) -> float:
+    """Height in m to which a ball that is thrown has come: above the floor that it would reach just then."""
+    p, (y, v_y, *_) = m.parameters, state(m)
+    fall = brentq(lambda fall: drag.fall_time(fall, v_y, p) - m.at("time"), 1e-6 * p.R, 100 * p.R)
+    return y - float(fall)
 
 
 def _end_of_motion(m: Measurement) -> float:
@@ -129,6 +139,13 @@ LAW_CLAIMS = (
         "extension, (9), (20)",
         "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and keeps its spin.",
         *_end_states("thrown"),
+        Bearing(
+            "runs",
+            "end_y",
+            _fallen,
+            when=lambda m: m.conditions["start"] == "thrown" and m.parameters.drag == STOKES,
+            by="analytic.mechanics.drag.fall_time",
+        ),
         reason=_OWN,
     ),
     claim(

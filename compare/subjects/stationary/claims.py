@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
+from analytic.mechanics import drag
 from analytic.stationary import slipping_branch
 from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
 from compare.judge import theory
@@ -15,6 +15,7 @@ from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
 from compare.states import case_of, from_floor, is_in, lasting_cases, lifts_first, quantity_of, slips_first, solution_of
 from model import Case
+from model.drag import SCHILLER_NAUMANN
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
 
@@ -77,6 +78,12 @@ def _rolling_bearing(when: When = lambda m: True) -> Bearing:
     return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
+def _sinks_at_reynolds(m: Measurement) -> float:
+    """v_y in m/s by Schiller and Naumann's C_D at the Reynolds number of the measured speed (`model.drag`)."""
+    p, Re = m.parameters, drag.reynolds(abs(m.value), m.parameters)
+    return float(-(p.g - p.eta * p.R * p.omega_0**2) / (p.c * (1 + 0.15 * Re**0.687)))
+
+
 def _along_branch(m: Measurement) -> float:
     """A contact force of SS in closed form at the flow, before the fold, N."""
     p = m.parameters
@@ -114,16 +121,17 @@ def _omega_c_beyond_fold(m: Measurement) -> float:
     return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
 
 
-def _drag_at_birth(m: Measurement) -> float:
+def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
     """The drag c in s-1 at which the fold is born at the eta of the set, which is proportional to c^2.
 
-    Computed from that point at the measured drag, since at the set's own there may be no fold for any eta below j.
+    Where friction is `equal`, as in Fig. 8, to c^(2/3). Computed from that point at the measured drag, since at the
+    set's own there may be no fold for any eta below j.
     """
     p = m.parameters.replace(c=m.value)
-    born = bifurcation.double_points(p)[0]
+    born = bifurcation.double_points(p, equal)[0]
     if born.meets != ("omega_02", "omega_04"):
         raise LookupError("no fold is born")
-    return p.c * math.sqrt(p.eta / born.eta)
+    return float(p.c * (p.eta / born.eta) ** (1.5 if equal else 0.5))
 
 
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
@@ -198,6 +206,13 @@ CLAIMS = (
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
         *_value_bearings(_STATE, _SINKS, "(49), (50)"),
+        Bearing(
+            "settled",
+            "v_y",
+            _sinks_at_reynolds,
+            when=all_of(_SINKS, lambda m: m.parameters.drag == SCHILLER_NAUMANN),
+            by="analytic.mechanics.drag.reynolds",
+        ),
         _case_bearing(given(start="on the wall")),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
@@ -265,6 +280,13 @@ DIAGRAMS = (
         "Figs. 7 and 8, black dots",
         "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j all thresholds are √(g/(jR)), and rolling ends.",
         Bearing("birth", "critical_drag", _drag_at_birth, by=_DOUBLE),
+        Bearing(
+            "birth",
+            "critical_drag",
+            lambda m: _drag_at_birth(m, equal=True),
+            when=lambda m: m.parameters.mu == m.parameters.eta,
+            by=f"{_DOUBLE}, equal friction",
+        ),
         Bearing("thresholds", "omega_03", lambda m: bifurcation.double_points(m.parameters)[-1].omega_0, by=_DOUBLE),
     ),
 )

@@ -48,6 +48,12 @@ def _ramp_end(m: Measurement) -> float:
     return end
 
 
+def _lowest_flow(m: Measurement) -> float:
+    """The flow, rad s-1, to which a slow pulsation falls when it makes the ball slip: of a slow mean flow, to rest."""
+    p = m.parameters.replace(omega_0=0.1 * math.sqrt(m.parameters.g / m.parameters.R))
+    return p.omega_0 - pulsation.slow_onset(p)
+
+
 CLAIMS = (
     claim(
         "pulsation-lag",
@@ -70,9 +76,9 @@ CLAIMS = (
     claim(
         "pulsation-limits",
         "(66), (67), (82)",
-        "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃; in a fast one ω_c hardly changes, "
-        "and the ball slips when the drag of the fluid alone is too strong. No pulsation needs a larger amplitude "
-        "than a fast one.",
+        "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃, or falls to rest; in a fast one ω_c "
+        "hardly changes, and the ball slips when the drag of the fluid alone is too strong. No pulsation needs a "
+        "larger amplitude than a fast one.",
         *(
             Bearing(
                 "thresholds",
@@ -86,6 +92,14 @@ CLAIMS = (
                 by=f"{_BY}.pulsation.slow_onset",
             )
             for end, first in (("omega_01", slips_first), ("omega_03", lifts_first))
+        ),
+        Bearing(
+            "bounds",
+            "gamma_zero_square",
+            lambda m: _lowest_flow(m) ** 2,
+            when=given(inner="RR", outer="RS", by="stationary"),
+            size=lambda m: m.parameters.g / m.parameters.R,
+            by=f"{_BY}.pulsation.slow_onset",
         ),
         Bearing(
             "bounds",
