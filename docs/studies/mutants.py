@@ -49,6 +49,15 @@ SUBJECTS = {
     "how fast a ball lifts": "a ball lifts twice as fast",
     "normal forces as slip sets in": "normal forces of floor and wall exchanged",
     "Lyapunov exponents": "exponents to the base of ten",
+    "the time of a fall": "a fall ends as if nothing braked it",
+    "Reynolds' number": "Reynolds' number by the radius",
+    "a design's tolerances": "tolerances are whole widths",
+    "a design's margin": "a design's margin without its tolerances",
+    "a design's sensitivities": "sensitivities 2 % large",
+    "the balance of energy": "energy without the spin about the vertical",
+    "rolling off the wall": "the lowest point slips as if the centre didn't move inwards",
+    "the spin as a case is chosen": "as a case is chosen the axes turn the spin the other way",
+    "1/j of the fluid's torque": "the fluid's torque as if j were 1",
 }
 """What wrong theories of others were about that nobody noticed at first, and a wrong theory here that is about it."""
 BY_HAND = {
@@ -60,6 +69,7 @@ BY_HAND = {
     "where_it_ends",
     "the fluid's spin with the wrong sign of ω₀": "analytic/test_real_fluid::test_rolling_with_the_torque_obeys_newton_"
     "and_euler",
+    "shares of starts by the normal distribution": "compare/test_basins::test_intervals_of_shares",
     "a return map without its section": "analytic/test_orbits::test_newton_closes_the_orbit",
     "a pinch at 0.95 of the friction": "compare/test_cases::test_rest_needs_the_share_of_friction_that_is_said",
     "the wall's correction of friction's direction 20 % weak in y": "mjsim/test_drag::test_slipping_converges_with_the_"

@@ -11,6 +11,7 @@ from analytic.orbits import periodic as orbits
 from analytic.orbits.fates import Kind
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import NoOrbitError
+from analytic.simulation.ensemble import random_starts
 from model import Case, InputError, Parameters, State
 from model.kinematics import state_units
 from tests.measured import motion
@@ -131,6 +132,14 @@ def test_three_attractors_at_once():
     assert {each.fate.solution.case for each in groups[1:] if each.fate.solution} <= known
     low, high = groups[0].interval
     assert 0 < low < groups[0].share < high < 1
+
+
+def test_random_starts_are_those_of_their_seed_and_inside():
+    first, again, other = (random_starts(HOPPING, 50, seed) for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    assert np.all((first[:, 0] >= 0) & (first[:, 0] <= HOPPING.R))
+    assert np.all(first[first[:, 0] == 0, 1] == 0)
 
 
 @pytest.mark.parametrize(

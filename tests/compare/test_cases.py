@@ -92,19 +92,22 @@ def newton(case, touching=None, friction=()):
         if count:
             now, after, before = (np.array(touching(state[:7] + d * begin)) for d in (0.0, NEAR, -NEAR))
             crosses = [np.cross(arm, np.eye(3)).T for arm, _, _ in now]
-            gives = [np.vstack([np.eye(3) / body.mass, np.linalg.solve(inertia, cross)]) for cross in crosses]
-            matrix, right, gives = [], [], np.hstack(gives)
-            for k, ((arm, normal, under), change) in enumerate(zip(now, (after - before) / (2 * NEAR), strict=True)):
+            pushed = [np.vstack([np.eye(3) / body.mass, np.linalg.solve(inertia, cross)]) for cross in crosses]
+            of_forces, rows, right = np.hstack(pushed), [], []  # rows of what all forces must come to
+            for k, ((arm, normal, under), rate) in enumerate(zip(now, (after - before) / (2 * NEAR), strict=True)):
                 slip, of_slip = velocity + np.cross(spin, arm) - under, np.hstack([np.eye(3), -crosses[k]])
-                rest = change[2] - np.cross(spin, change[0]) - of_slip @ found
+                rest = rate[2] - np.cross(spin, rate[0]) - of_slip @ found
                 if friction[k] is None:
-                    matrix, right = [*matrix, of_slip @ gives], [*right, rest]
+                    rows.append(of_slip @ of_forces)
+                    right.append(rest)
                     continue
-                matrix, right = [*matrix, normal[None] @ of_slip @ gives], [*right, [normal @ rest - change[1] @ slip]]
-                slip = slip - (slip @ normal) * normal
-                law = np.eye(3) - np.outer(normal - friction[k] * slip / np.linalg.norm(slip), normal)
-                matrix, right = [*matrix, np.kron(np.eye(count)[k], law)], [*right, np.zeros(3)]
-            found = found + gives @ np.linalg.lstsq(np.vstack(matrix), np.concatenate(right), rcond=1e-12)[0]
+                rows.append(normal[None] @ of_slip @ of_forces)
+                right.append([normal @ rest - rate[1] @ slip])
+                along = slip - (slip @ normal) * normal
+                law = np.eye(3) - np.outer(normal - friction[k] * along / np.linalg.norm(along), normal)
+                rows.append(np.kron(np.eye(count)[k], law))
+                right.append(np.zeros(3))
+            found = found + of_forces @ np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=1e-12)[0]
         return np.concatenate([begin, found])
 
     return rates

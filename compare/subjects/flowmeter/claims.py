@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -128,19 +129,19 @@ OFF = 0.05
 """By how much, relatively, the friction of a meter may be off whose limits are claimed."""
 
 
-def _meant(m: Measurement) -> dict[str, float]:
-    """Friction of the meter whose worst, with friction off by `OFF`, is the ball that was measured.
+def _meant(m: Measurement, off: float) -> dict[str, float]:
+    """Friction of the meter of which the ball that was measured is the worst, off by `off`; the best if that is < 0.
 
     Less friction slips sooner; a rougher wall carries the ball sooner.
     """
-    p, worst = m.parameters, 1 - OFF if slips_first(m) else 1 + OFF
-    return {"mu": p.mu / (1 - OFF), "eta": p.eta / worst}
+    p = m.parameters
+    return {"mu": p.mu / (1 - off), "eta": p.eta / (1 - off if slips_first(m) else 1 + off)}
 
 
 def _one_end(m: Measurement) -> bool:
-    """Whether one and the same threshold ends the range of that meter at every corner of its tolerances."""
-    eta = _meant(m)["eta"]
-    return not eta * (1 - OFF) < m.parameters.j < eta * (1 + OFF)
+    """Whether one and the same threshold ends the range of these meters at every corner of their tolerances."""
+    p, spread = m.parameters, (1 + OFF) / (1 - OFF)
+    return not p.eta / spread < p.j < p.eta * spread
 
 
 def _stokes(m: Measurement) -> bool:
@@ -153,16 +154,16 @@ def _exact(m: Measurement) -> float:
 
 
 def _worst(m: Measurement) -> float:
-    """The flow up to which a design covers all that the tolerances of that meter allow."""
-    meant = _meant(m)
+    """The flow up to which a design covers all that the tolerances of a meter allow."""
+    meant = _meant(m, OFF)
     return design.choice(m.parameters.replace, meant, dict.fromkeys(meant, OFF), fastest=1.0).margin
 
 
-def _least(m: Measurement) -> float:
-    """The least that a design says a threshold of that meter may be."""
-    meant = _meant(m)
+def _end_of_spread(m: Measurement, end: int) -> float:
+    """The least (0) or the most (1) that a design says a threshold of a meter may be."""
+    meant = _meant(m, (OFF, -OFF)[end])
     corners = list(design.corners(m.parameters.replace, meant, dict.fromkeys(meant, OFF)))
-    return design.threshold_spread(corners)[m.quantity][0]
+    return design.threshold_spread(corners)[m.quantity][end]
 
 
 def _by_sensitivity(m: Measurement) -> float:
@@ -178,6 +179,11 @@ def _loop_reading_of_design(m: Measurement) -> float:
     return float(low if m.conditions["side"] == "up" else high)
 
 
+_ENDS_OF_RANGES, _DESIGN = (("omega_01", slips_first), ("omega_02", lifts_first)), "analytic.flowmeter.design"
+_WITHIN_TOLERANCES: tuple[Callable[[Measurement], float], ...] = (
+    _worst,
+    *(partial(_end_of_spread, end=k) for k in (0, 1)),
+)
 CLAIMS = (
     claim(
         "slope-rolling",
@@ -265,12 +271,16 @@ CLAIMS = (
     claim(
         "design-limit",
         "extension",
-        "The operating range of a meter ends where its design says: with friction off by 5 % to the worse, at the "
-        "worst limit of the meter as it was meant. ω₀₂ changes with the wall's friction by the power that it says.",
+        "The operating range of a meter ends where its design says: with friction off by 5 %, at the worst and "
+        "the best limit of the meter as it was meant. ω₀₂ changes with the wall's friction by the power that it says.",
         *(
-            Bearing("thresholds", end, predict, when=all_of(first, _stokes, *more), by="analytic.flowmeter.design")
-            for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
-            for predict, more in ((_exact, ()), (_worst, (_one_end,)), (_least, (_one_end,)))
+            Bearing("thresholds", end, _exact, when=all_of(first, _stokes), by=_DESIGN)
+            for end, first in _ENDS_OF_RANGES
+        ),
+        *(
+            Bearing("thresholds", end, predict, when=all_of(first, _stokes, _one_end), by=_DESIGN)
+            for end, first in _ENDS_OF_RANGES
+            for predict in _WITHIN_TOLERANCES
         ),
         Bearing("thresholds", "omega_02", _by_sensitivity, by="analytic.flowmeter.design.sensitivities"),
     ),

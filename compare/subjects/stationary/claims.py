@@ -122,12 +122,12 @@ def _omega_c_beyond_fold(m: Measurement) -> float:
 
 
 def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
-    """The drag c in s-1 at which the fold is born at the eta of the set, which is proportional to c^2.
+    """The drag c in s-1 at which the fold is born at the eta of the set; that eta is proportional to c^2.
 
-    Where friction is `equal`, as in Fig. 8, to c^(2/3). Computed from that point at the measured drag, since at the
-    set's own there may be no fold for any eta below j.
+    Where friction is `equal`, as in Fig. 8, to c^(2/3). Computed from that point at half the measured drag, since at
+    the set's own there may be no fold for any eta below j.
     """
-    p = m.parameters.replace(c=m.value)
+    p = m.parameters.replace(c=m.value / 2)
     born = bifurcation.double_points(p, equal)[0]
     if born.meets != ("omega_02", "omega_04"):
         raise LookupError("no fold is born")
