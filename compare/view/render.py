@@ -187,11 +187,13 @@ def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, n
     draw.text((margin + pad, margin + 0.5 * pad), case.name, "white", font=large)
     words = f"floor: {case.A.value}\nwall: {case.B.value}"
     draw.multiline_text((right + pad, margin + 2 * unit), words, INK, font=text, spacing=5 * unit)
+    speeds = run.slip_speed_A[k], run.slip_speed_B[k]
+    slip = ["–" if contact == "N" else f"{v:.3f} m/s" for contact, v in zip(case.name, speeds, strict=True)]
     lines = (
         f"t = {run.time[k]:.3f} s   {note}",
         f"ω₀ = {float(run.header.flow(run.time[k])):.2f} rad/s",
         f"ω_c = {run.omega_c[k]:.2f} rad/s",
-        f"slip: floor {run.slip_speed_A[k]:.3f} m/s, wall {run.slip_speed_B[k]:.3f} m/s",
+        f"slip: floor {slip[0]}, wall {slip[1]}",
     )
     draw.multiline_text((margin, bottom + pad), "\n".join(lines), INK, font=text, spacing=6 * unit)
     legend = [(FORCE, "contact force")] + ([(SLIP, "slip velocity")] if slips else [])

@@ -18,17 +18,13 @@ from tests.commands import refused
 P = Parameters.named("reference")
 
 
-def free_port():
-    with socket.socket() as tried:
-        tried.bind((explore.HOST, 0))
-        return tried.getsockname()[1]
-
-
 @pytest.fixture(scope="module")
 def address():
     """Of a server of its own, which Ctrl-C must end."""
     pytest.importorskip("nicegui")
-    port = free_port()
+    with socket.socket() as free:
+        free.bind((explore.HOST, 0))
+        port = free.getsockname()[1]
     command = [sys.executable, "-m", "compare", "explore", "--no-browser", "--port", str(port)]
     env = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}  # NiceGUI looks for it
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
@@ -49,6 +45,7 @@ def address():
 
 def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tmp_path):
     expect = pytest.importorskip("playwright.sync_api").expect
+    expect.set_options(timeout=60_000)  # until theory is compiled
     page, other = (browser.new_page(viewport={"width": 1500, "height": 900}) for _ in range(2))
     for tab in (page, other):
         tab.goto(address)
@@ -121,7 +118,7 @@ def test_nobody_else_is_served(address, capsys):
 def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "nicegui", None)
     with pytest.raises(InputError, match=r"pip install 'dualball\[explore\]'"):
-        explore.serve(P, free_port(), show=False)
+        explore.serve(P, 8080, show=False)
 
 
 @pytest.mark.parametrize("changes", [{}, {"eta": 0.6}, {"mu": 0.0, "eta": 0.0}, {"c": 0.0}, {"drag": "quadratic"}])
