@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
+from analytic.mechanics import drag
 from compare.kit.settling import rotation_scale
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.arrays import Array
@@ -228,7 +229,8 @@ def assert_settles(
     InputError
         If there is no such state, or the motion is too short to judge: before its last quarter three of the slowest
         time constants must pass, or a ball that started in theory's state might not have left it yet. They are those of
-        a disturbance of the state and of a ball that is taken along from rest, (1 + 2 j)/c.
+        a disturbance of the state and of a ball that is taken along from rest, (1 + 2 j)/c with the c of its lag in the
+        state, and no less than Stokes'.
     """
     check_number("rtol", rtol, "1", POSITIVE)
     motion = read((time, omega_c))
@@ -247,7 +249,8 @@ def assert_settles(
     )
     state = min(states, key=lambda s: abs(s.state.omega_c - w.mean()))
     name, exact = state.case.name, state.state.omega_c
-    slowest = max((1 + 2 * p.j) / p.c, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)]))
+    c = max(p.c, drag.coefficient(abs(p.omega_0 - exact) * p.R, p))
+    slowest = max((1 + 2 * p.j) / c, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)]))
     lasts, swing = float(motion.time[-1] - motion.time[0]), float(np.ptp(w))
     scale, off = abs(exact) or rotation_scale(p), np.abs(w - exact)
     needed = slowest * (max(3.0, -math.log(rtol)) if off.max() > rtol * scale < swing else 3.0) / (1 - SETTLED_PART)

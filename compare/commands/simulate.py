@@ -102,5 +102,5 @@ def _check_no_other_sweep(args: argparse.Namespace, p: Parameters) -> None:
 def collect(args: argparse.Namespace) -> int:
     """Gather the runs of a directory into one file."""
     count = collection.collect(args.directory, args.output, args.workers)
-    print(f"{count} runs gathered into {args.output}")
+    print(f"{count} run{'s' * (count != 1)} gathered into {args.output}")
     return 0
