@@ -41,7 +41,7 @@ CUT = {"cut.h5": "run.h5", "cut.toml": "set.toml", "cut.csv": "flow.csv", "cut.x
 
 def furnish(here: Path, stocked: Path) -> None:
     """A directory of a user, with all that commands read, whole and damaged."""
-    shutil.copytree(stocked, here)
+    shutil.copytree(stocked, here, ignore=shutil.ignore_patterns("results"))  # which would be judged for seconds
     shutil.copy(here / "run.h5", here / "öl_ω.h5")
     (here / "link.h5").symlink_to("run.h5")
     (here / "hard.h5").hardlink_to(here / "run.h5")
