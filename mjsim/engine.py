@@ -10,7 +10,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,9 +24,6 @@ from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES, check_place
 from model.parameters import Range, check_number
-
-if TYPE_CHECKING:
-    from mjsim.journal import Journal
 
 EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
@@ -48,7 +45,7 @@ class Run:
     settings : `ContactSettings.for_problem` if None
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
-    journal : keeps what was done, and knows what an earlier process did
+    state : `state()` of an earlier process, from which to go on
     progress : called with the fraction done, from time to time; an error that it raises ends the run
 
     A run that diverges yields what it has, and its header says why.
@@ -69,7 +66,7 @@ class Run:
         *,
         sample_interval: float | None = None,
         theta_0: float = 0.0,
-        journal: Journal | None = None,
+        state: dict[str, Any] | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
         check_type("p", p, Parameters)
@@ -77,7 +74,7 @@ class Run:
         check_type("settings", settings, ContactSettings | None)
         self._flow, self._settings = flow or Flow.steady(p.omega_0), settings or ContactSettings.for_problem(p)
         self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
-        self._journal, self._progress = journal, progress or (lambda done: None)
+        self._state, self._progress = state, progress or (lambda done: None)
         self._timestep = self._settings.timestep
         self._interval, self._count = sampling(t_end, self._timestep, sample_interval)
         check_timestep(self._timestep, p, self._flow, t_end)
@@ -103,29 +100,26 @@ class Run:
 
         begin = free.FreeBall if self._settings.rigid else stepping.JointedBall
         self.ball = ball = begin(self._model, self._p, self._settings, self._x0, self._theta_0)
-        blocks, state = self._journal.recall() if self._journal else (iter(()), {})
-        steps, done, step, waiting = (self._count - 1) * self._interval + 1, 0, 0, np.empty((0, recorder.COLUMNS))
-        if state:
-            step, waiting = int(state["step"]), state["waiting"]
-            ball.restore(state)
-            self._classifier.restore(state)
-        for raw in blocks:
-            yield self._finish(done, raw)
-            done += len(raw)
-        noted = np.empty((NOTED, recorder.COLUMNS))
-        while step < steps and not self.header.failure:  # nothing is needed of steps after the last sample
-            rows = noted[: steps - step]
-            ball.advance(self._flow((step + np.arange(len(rows)) + 0.5) * self._timestep), rows)
-            waiting = np.concatenate([waiting, rows[-step % self._interval :: self._interval]])
-            step += len(rows)
-            self._classifier.add(recorder.contacts(rows), step == steps)
-            self._progress(step / steps)
-            raw, waiting = np.split(waiting, [-(-self._classifier.decided // self._interval) - done])
-            if self._journal:
-                kept = {"step": np.array(step), "waiting": waiting} | ball.state() | self._classifier.state()
-                self._journal.note(raw, kept)
-            yield self._finish(done, raw)
-            done += len(raw)
+        self._step, self._waiting = 0, np.empty((0, recorder.COLUMNS))
+        if self._state:
+            self._step, self._waiting = int(self._state["step"]), self._state["waiting"]
+            ball.restore(self._state)
+            self._classifier.restore(self._state)
+        noted, steps = np.empty((NOTED, recorder.COLUMNS)), (self._count - 1) * self._interval + 1
+        while self._step < steps and not self.header.failure:  # nothing is needed of steps after the last sample
+            rows = noted[: steps - self._step]
+            ball.advance(self._flow((self._step + np.arange(len(rows)) + 0.5) * self._timestep), rows)
+            waiting = np.concatenate([self._waiting, rows[-self._step % self._interval :: self._interval]])
+            self._step += len(rows)
+            self._classifier.add(recorder.contacts(rows), self._step == steps)
+            self._progress(self._step / steps)
+            first = -(-self._step // self._interval) - len(waiting)
+            raw, self._waiting = np.split(waiting, [-(-self._classifier.decided // self._interval) - first])
+            yield self._finish(first, raw)
+
+    def state(self) -> dict[str, Any]:
+        """All that is carried on from the blocks so far, for another run of the same to go on."""
+        return {"step": np.array(self._step), "waiting": self._waiting} | self.ball.state() | self._classifier.state()
 
     def trajectory(self) -> Trajectory:
         """The whole run, carried out to its end."""
@@ -143,8 +137,7 @@ class Run:
         block["case"] = self._classifier.cases(samples[:count] * self._interval)
         if count < len(raw):
             self._end = end = float(time[count])
-            names = zip(VARIABLES, UNITS, strict=True)
-            left = [f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in names] if count else []
+            left = [f"{x} = {block[x][-1]:.6g} {unit}" for x, unit in zip(VARIABLES, UNITS, strict=True) if count]
             failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
             self.header = dataclasses.replace(self.header, failure=failure)
         return block

@@ -20,7 +20,7 @@ import numpy.typing as npt
 import mjsim
 from compare.kit import engines
 from compare.kit.engines import Engine
-from mjsim.journal import Journal
+from compare.kit.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
 
 # MuJoCo would print each of its warnings, and write them to MUJOCO_LOG.TXT in the current directory; a run that
@@ -155,17 +155,22 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
         storage.save(run, failed_path(path) if failure else path)
     else:
         journal = Journal(journal_path(task, path)) if task.long else None
+        earlier, state = journal.recall() if journal else (iter(()), {})
         try:
-            under_way = _start_stream(task, journal)
+            under_way = _start_stream(task, state=state)
         except InputError:  # there is nothing to go on with
             if journal:
                 journal.discard()
             raise
         stopped = ""
         with storage.TrajectoryWriter(path, under_way.header) as writer:
+            for block in earlier:
+                writer.append(block)
             for block in under_way:
                 check()
                 writer.append(block)
+                if journal:
+                    journal.note(block, under_way.state())
                 if stop():
                     stopped = f"was stopped at t = {block['time'].max(initial=0.0):g} s"
                     break
@@ -188,11 +193,11 @@ def journal_path(task: Task, path: Path) -> Path:
     return path.with_name(f"{task.key}.journal")
 
 
-def _start_stream(task: Task, journal: Journal | None = None, **more: Any) -> mjsim.Run:
+def _start_stream(task: Task, **more: Any) -> mjsim.Run:
     """Begin a run that hands out its samples as it goes."""
     assert task.simulator.stream
     run = task.parameters, task.x0, task.t_end, task.fluid, task.settings
-    return task.simulator.stream(*run, sample_interval=task.sample_interval, journal=journal, **more)
+    return task.simulator.stream(*run, sample_interval=task.sample_interval, **more)
 
 
 @functools.cache

@@ -1,7 +1,7 @@
 """What a long run has done so far, on disk: killed at any moment, it goes on from there, to the bit.
 
-A journal is a directory of segments. Each holds the raw samples since the one before and everything the stepper carries
-from one step to the next; it is a whole HDF5 file or not there at all.
+A journal is a directory of segments. Each holds the samples since the one before and everything that the run carries
+on; it is a whole HDF5 file or not there at all.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from model.arrays import Array
 from model.files import make_directory, remove_leftovers
@@ -33,24 +34,24 @@ class Journal:
         self._directory, self._interval = directory, interval
         remove_leftovers(directory)
         self._segments = sorted(directory.glob("*.h5"))
-        self._waiting: list[Array] = []
+        self._waiting: list[npt.NDArray[np.void]] = []
         self._last = time.monotonic()
 
-    def recall(self) -> tuple[Iterator[Array], dict[str, Array]]:
-        """Blocks of raw samples (samples, columns) so far, one at a time, and the state after them, if any.
+    def recall(self) -> tuple[Iterator[npt.NDArray[np.void]], dict[str, Array]]:
+        """Blocks of samples so far, one at a time, and the state after them, if any.
 
         Raises `StorageError`, the blocks when they are read, if a segment is damaged.
         """
         blocks = (self._read(path)[0] for path in self._segments)
         return blocks, self._read(self._segments[-1])[1] if self._segments else {}
 
-    def _read(self, path: Path) -> tuple[Array, dict[str, Array]]:
+    def _read(self, path: Path) -> tuple[npt.NDArray[np.void], dict[str, Array]]:
         """The samples of a segment, and the state after them."""
         with reading(path, f"remove {self._directory} to start anew") as file:
             return file["samples"][...], {name: part[...] for name, part in file["state"].items()}
 
-    def note(self, samples: Array, state: dict[str, Array]) -> None:
-        """Keep a block of raw samples and the state after it; written once the interval has passed."""
+    def note(self, samples: npt.NDArray[np.void], state: dict[str, Array]) -> None:
+        """Keep a block of samples and the state after it; written once the interval has passed."""
         self._waiting.append(samples)
         if time.monotonic() - self._last < self._interval:
             return
