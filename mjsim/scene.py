@@ -60,7 +60,7 @@ def build(p: Parameters, settings: ContactSettings, shown: bool = False) -> tupl
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
-    model, text = _compiled(p, settings, shown)
+    model, text = _compiled(p.replace(omega_0=0.0), settings, shown)  # the fluid is no part of a scene
     return copy.copy(model), text
 
 
