@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,7 +62,8 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     if not path.is_file():
         raise StorageError(f"cannot read {path}: {'it is a directory' if path.is_dir() else 'there is no such file'}")
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        # MuJoCo takes the bytes of a name as UTF-8, also where Python's file system has another encoding.
+        model = mujoco.MjModel.from_xml_path(os.fsencode(path).decode("utf-8", "surrogateescape"))
         check_number("timestep", model.opt.timestep, "s", POSITIVE)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error

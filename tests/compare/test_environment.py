@@ -99,5 +99,6 @@ def test_names_beyond_ascii_in_the_c_locale(here):
     strict = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}  # as Python takes it only if it is told to
     assert dualball(here, "simulate", "--time", "0.05", "-o", "läuft.h5", **strict).returncode == 0
     assert storage.load(here / "läuft.h5").complete
+    assert dualball(here, "forecast", "Würfel.xml", **strict).returncode == 0
     done = dualball(here, "inspect", "weg ä.h5", **strict)
     assert (done.returncode, done.stderr.count(b"\n")) == (2, 1)
