@@ -63,11 +63,13 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
     """To all that belongs to it, as a terminal and a cluster send it, so many seconds after it first can answer."""
     here = Path(shutil.copytree(stocked, tmp_path / "here"))
     before = set(here.rglob("*"))
-    outside = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}  # NiceGUI looks for it
+    env = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}  # NiceGUI looks for it
+    env["PYTHONPATH"] = str(ROOT)
+    line = [sys.executable, "-m", "compare", command, *LONG.get(command, "").split()]
     process = subprocess.Popen(
-        [sys.executable, "-m", "compare", command, *LONG.get(command, "").split()],
+        line,
         cwd=here,
-        env={**outside, "PYTHONPATH": str(ROOT)},
+        env=env,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -88,7 +90,8 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
         assert process.returncode == 128 + number, err
         (said,) = (line for line in err.splitlines() if line.startswith("dualball"))
         assert "interrupted" in said or "was stopped at t =" in said
-        assert not out or command in ("simulate", "validate", "figures", "judge", "explore"), out  # no result
+        if out and command not in ("simulate", "validate", "figures", "judge", "explore"):  # then it had just been done
+            assert out == subprocess.run(line, cwd=here, env=env, capture_output=True, text=True, check=True).stdout
     new = set(here.rglob("*")) - before
     assert not [path for path in new if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))]
 
