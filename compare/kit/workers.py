@@ -121,9 +121,8 @@ class _Pool(ProcessPoolExecutor):
         super().__init__(count, mp_context=context, initializer=_follow_parent, initargs=(self._end,))
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        with (
-            _without_signals()
-        ):  # as the workers are that it may start: they have no handlers before they have imported much
+        # Workers that it may start inherit this: they have no handlers before they have imported much.
+        with _without_signals():
             return super().submit(_call_in_worker, fn, *args, **kwargs)
 
 

@@ -81,7 +81,7 @@ def _rolling_bearing(when: When = lambda m: True) -> Bearing:
 def _sinks_at_reynolds(m: Measurement) -> float:
     """v_y in m/s by Schiller and Naumann's C_D at the Reynolds number of the measured speed (`model.drag`)."""
     p, Re = m.parameters, drag.reynolds(abs(m.value), m.parameters)
-    more = max(1 + 0.15 * Re**0.687, 0.44 * Re / 24)
+    more = max(1 + drag.WAKE * Re**drag.EXPONENT, drag.BLUNT * Re / 24)
     return float(-(p.g - p.eta * p.R * p.omega_0**2) / (p.c * more))
 
 
