@@ -13,7 +13,7 @@ from unittest import mock
 import mujoco
 
 import mjsim
-from compare.kit.engines import ENGINES, MUJOCO, Engine
+from compare.kit.engines import MUJOCO, Engine
 from mjsim import ContactSettings, scene
 from model import Parameters
 
@@ -50,11 +50,6 @@ def _wrong(
     return replace(MUJOCO, name=name, stream=stream)
 
 
-def _no_impacts() -> AbstractContextManager[Any]:
-    """Landings are left to the engine's own contacts."""
-    return mock.patch.object(ContactSettings, "slowest_fall", return_value=math.inf)
-
-
 def _altered(change: Callable[[Any], None]) -> AbstractContextManager[Any]:
     """The scene is built with another model."""
     built = scene.build
@@ -88,10 +83,8 @@ WRONG_ENGINES: tuple[Engine, ...] = (
     _wrong("no servo of the margins", servo=0.0),
     _wrong("no memory of friction", memory=False),
     _wrong("forces taken at the beginning of a step", order=1),
-    _wrong("landings left to the contacts", fault=_no_impacts),
+    _wrong(
+        "landings left to the contacts",
+        fault=partial(mock.patch.object, ContactSettings, "slowest_fall", return_value=math.inf),
+    ),
 )
-
-
-def register() -> None:
-    """Let tasks name them."""
-    ENGINES.update({each.name: each for each in WRONG_ENGINES})

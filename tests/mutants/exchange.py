@@ -1,6 +1,6 @@
 """Putting a wrong function in the place of a right one, wherever it is known, for as long as a context lasts.
 
-A fault makes the wrong function from the right one. Most change its answer, or the parameters of the ball it is given.
+Most faults change the answer of the right function, or the parameters of the ball it is given.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from compare.kit.levels import Level
 from model import Case, Parameters
 
 Function = Callable[..., Any]
-Fault = Callable[[Function], Function]
+Fault = Callable[..., Any]
+"""Takes the right function, then what that takes, and gives its own answer."""
 Change = Callable[[Any], Any]
 PACKAGES = ("analytic", "compare")
 """Where functions of the theory are known by name."""
@@ -50,7 +51,7 @@ class WrongTheory:
 def believed(*wrongs: WrongTheory) -> Iterator[None]:
     """Believe wrong theories: every name and table entry of a right function stands for the wrong one."""
     rights = [getattr(importlib.import_module(each.module), each.function) for each in wrongs]
-    puts = [each.wrong(right) for each, right in zip(wrongs, rights, strict=True)]
+    puts = [functools.partial(each.wrong, right) for each, right in zip(wrongs, rights, strict=True)]
     _exchange(dict(zip(map(id, rights), puts, strict=True)))
     plainly = mock.patch.object(hybrid, "compiled", return_value=None)
     # Compiled runs would believe what they believed when they were compiled.
@@ -74,19 +75,16 @@ def _exchange(new: Mapping[int, Function]) -> None:
 def noting(what: str, seen: set[str]) -> Fault:
     """No fault: where the function is called that is noted."""
 
-    def noted(right: Function) -> Function:
-        def function(*args: Any, **named: Any) -> Any:
-            seen.add(what)
-            return right(*args, **named)
-
-        return function
+    def noted(right: Function, *args: Any, **named: Any) -> Any:
+        seen.add(what)
+        return right(*args, **named)
 
     return noted
 
 
 def answer(change: Change) -> Fault:
     """Its answer is changed."""
-    return lambda right: lambda *args, **named: change(right(*args, **named))
+    return lambda right, *args, **named: change(right(*args, **named))
 
 
 def scaled(factor: float, *entries: int) -> Fault:
@@ -94,33 +92,24 @@ def scaled(factor: float, *entries: int) -> Fault:
     return answer(times(factor, *entries))
 
 
+def of_case(case: Case | None, change: Change) -> Fault:
+    """Of its list of solutions those of a case are changed, all for None."""
+    return answer(lambda solutions: [change(s) if case in (None, s.case) else s for s in solutions])
+
+
+def without(case: Case) -> Fault:
+    """Its list of solutions lacks a case."""
+    return answer(lambda solutions: [s for s in solutions if s.case is not case])
+
+
 Ball = Parameters | Motion
 """The parameters of a ball, as they are given or as plain numbers."""
 
 
-def given(change: Callable[[Any], Any]) -> Fault:
+def given(change: Change) -> Fault:
     """It takes other parameters for those of the ball."""
     change = functools.lru_cache(change)
-
-    def taking(right: Function) -> Function:
-        return lambda *args, **named: right(*(change(a) if isinstance(a, Ball) else a for a in args), **named)
-
-    return taking
-
-
-def where(test: Callable[[Any], bool], fault: Fault) -> Fault:
-    """The fault shows only where the first argument passes a test."""
-
-    def wrong(right: Function) -> Function:
-        faulty = fault(right)
-        return lambda first, *rest, **named: (faulty if test(first) else right)(first, *rest, **named)
-
-    return wrong
-
-
-def in_case(case: Case, fault: Fault) -> Fault:
-    """The fault shows only where the first argument is this case."""
-    return where(lambda first: first == case, fault)
+    return lambda right, *args, **named: right(*(change(a) if isinstance(a, Ball) else a for a in args), **named)
 
 
 def replaced(p: Ball, **values: Any) -> Ball:
@@ -131,14 +120,25 @@ def replaced(p: Ball, **values: Any) -> Ball:
     return p._replace(law=law, **values)
 
 
-def other(**factors: float) -> Callable[[Ball], Ball]:
-    """The parameters with some of them multiplied."""
-    return lambda p: replaced(p, **{name: getattr(p, name) * factor for name, factor in factors.items()})
+def other(**factors: float) -> Fault:
+    """It takes a ball some of whose parameters are multiplied."""
+    return given(lambda p: replaced(p, **{name: getattr(p, name) * factor for name, factor in factors.items()}))
 
 
-def swapped(p: Ball) -> Ball:
-    """The parameters with the friction coefficients of floor and wall exchanged."""
-    return replaced(p, mu=p.eta, eta=p.mu)
+swapped = given(lambda p: replaced(p, mu=p.eta, eta=p.mu))
+"""It takes the friction of the floor for that of the wall, and the other way round."""
+
+
+def where(test: Change, fault: Fault) -> Fault:
+    """The fault shows only where the first argument passes a test."""
+    return lambda right, first, *rest, **named: (functools.partial(fault, right) if test(first) else right)(
+        first, *rest, **named
+    )
+
+
+def in_case(fault: Fault, *cases: Case) -> Fault:
+    """The fault shows only where the first argument is one of these cases."""
+    return where(cases.__contains__, fault)
 
 
 def fields(**changes: Change) -> Change:
@@ -154,16 +154,6 @@ def fields(**changes: Change) -> Change:
 def entries(**changes: Change) -> Change:
     """A mapping with some of its entries changed."""
     return lambda mapping: mapping | {name: change(mapping[name]) for name, change in changes.items()}
-
-
-def of_case(case: Case | None, change: Change) -> Change:
-    """Of a list of solutions those of a case are changed, all for None; None in the place of one takes it away."""
-
-    def changed(solutions: list[Any]) -> list[Any]:
-        rows = [change(s) if case in (None, s.case) else s for s in solutions]
-        return [s for s in rows if s is not None]
-
-    return changed
 
 
 def times(factor: float, *entries: int) -> Change:

@@ -18,11 +18,11 @@ from compare.catalogue import CLAIMS
 from compare.claim import Claim, Outcome
 from compare.judge import forget, verdict
 from compare.kit import levels
+from compare.kit.engines import ENGINES
 from compare.kit.record import Records
 from compare.kit.workers import LateError, at_most, processes
 from compare.report import results
 from compare.witnesses import full_verdict
-from tests.mutants import engines
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import WrongTheory, believed, noting
 from tests.mutants.theories import THEORIES
@@ -85,11 +85,13 @@ def measured(directory: Path) -> Records:
 def judged(directory: Path, workers: int = 2, whole: bool = False, by: str = "") -> Judged:
     """Every wrong theory judged on the measurements stored in a results directory, or on what a witness alone says.
 
-    By the quickest claims first and only until one notices it; if `whole`, by all.
+    By the claims that call its function, the quickest first and only until one notices it; if `whole`, by all of them.
     """
     level = results.load(directory).level.lower()
-    name = f"{level}, by {by}" if by else level
-    return Judged(name, _theories(directory, by, whole, workers), directory, whole)
+    with processes(workers) as work:
+        right = list(work.map(functools.partial(_right, directory, by), range(len(CLAIMS))))
+        trials = _shown(work.map(functools.partial(_theory, directory, by, whole, right), range(len(THEORIES))))
+    return Judged(f"{level}, by {by}" if by else level, trials, directory, whole)
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
@@ -116,13 +118,6 @@ class Right:
     """Processor time, s."""
     calls: frozenset[str]
     """Functions of `THEORIES` that its predictions call: a fault in any other can't change the outcome."""
-
-
-def _theories(directory: Path, by: str, whole: bool, workers: int) -> list[Trial]:
-    """Every wrong theory, judged by the claims that call its function."""
-    with processes(workers) as work:
-        right = list(work.map(functools.partial(_right, directory, by), range(len(CLAIMS))))
-        return _shown(work.map(functools.partial(_theory, directory, by, whole, right), range(len(THEORIES))))
 
 
 def _right(directory: Path, by: str, number: int) -> Right:
@@ -169,7 +164,7 @@ def _theory(directory: Path, by: str, whole: bool, right: Sequence[Right], numbe
 
 
 def _engine(directory: Path, number: int) -> Trial:
-    engines.register()
+    ENGINES.update({each.name: each for each in WRONG_ENGINES})  # tasks name them
     wrong, apart = WRONG_ENGINES[number], directory / "wrong-engines" / f"{number}"
     claims = [claim.id for claim in CLAIMS if claim.protocols and claim.protocols <= PROVING]
     verdicts = validation.validate(
