@@ -7,8 +7,8 @@ import pytest
 
 from analytic import stationary_solutions, thresholds
 from analytic.bifurcation import diagram
-from analytic.bifurcation.diagram import double_points, number_of_folds, threshold_curves
-from model import InputError, Parameters
+from analytic.bifurcation.diagram import double_points, threshold_curves
+from model import Parameters
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
@@ -53,12 +53,6 @@ def test_solutions_appear_and_vanish_at_the_thresholds(eta, name, changes):
     )
     above.subtract(below)
     assert {case: number for case, number in above.items() if number} == changes
-
-
-def test_the_branch_is_asked_for_where_there_is_one():
-    for change in ({"eta": 0.6}, {"eta": 0.0}, {"mu": 0.0}, {"c": 0.0}):
-        with pytest.raises(InputError, match="SS has a branch from RR to SR for"):
-            number_of_folds(P.replace(**change))
 
 
 @pytest.mark.parametrize("law", ["stokes", "quadratic"])

@@ -18,7 +18,7 @@ from analytic import (
 )
 from analytic.flowmeter import pulsation, response
 from analytic.flowmeter.characteristic import End
-from model import Case, InputError, Parameters
+from model import Case, Parameters
 
 P = Parameters.named("reference")
 ROUGH = Parameters.named("high-wall-friction")
@@ -39,12 +39,8 @@ def test_contacts_and_fluids_that_leave_no_range():
 
 def test_the_characteristic_has_two_branches_between_omega_02_and_omega_04():
     p = P.replace(omega_0=35.0)
-    with pytest.raises(InputError, match="several branches at omega_0 = 35 rad s-1: choose SR, SS, NR"):
-        characteristic_slope(p)
     assert characteristic_slope(p, Case.NR) == characteristic_slope(p, Case.SR) == 1.0
     assert characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
-    with pytest.raises(InputError, match=r"no motion follows the flow at omega_0 = 12 rad s-1 with c = 0"):
-        characteristic_slope(P.replace(c=0.0, omega_0=12.0))
 
 
 def test_the_mean_of_the_slope_below_eta_cr():
@@ -54,8 +50,6 @@ def test_the_mean_of_the_slope_below_eta_cr():
     t = thresholds(p)
     near = solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).state.omega_c
     assert mean_slope(p) == pytest.approx((near - t.omega_01) / (t.omega_02 - t.omega_01), rel=1e-9)
-    with pytest.raises(InputError, match=r"eta = 0\.6 is out of range"):
-        mean_slope(ROUGH)
 
 
 def test_a_peak_lies_between_the_points_of_a_grid():
@@ -66,15 +60,6 @@ def test_a_peak_lies_between_the_points_of_a_grid():
     y = response.step_response(p, Case.SS, t) / np.real(response.transfer(p, Case.SS, 0.0))
     assert y.argmax() == 1
     assert y[1] == pytest.approx(height, rel=1e-12)
-
-
-def test_what_there_is_not():
-    with pytest.raises(InputError, match="there is no fold"):
-        response.ramp_coefficient(P.replace(eta=0.02))
-    with pytest.raises(InputError, match="case SS has no stable"):
-        response.transfer(P, Case.SS, 1.0)
-    with pytest.raises(InputError, match="at one rate with Stokes' drag only"):
-        response.rolling_rate(P.replace(nu_f=5e-5, drag="schiller-naumann"))
 
 
 def test_forces_may_allow_more_on_a_rough_floor():

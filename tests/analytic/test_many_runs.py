@@ -9,7 +9,7 @@ from analytic import Settings, simulate, simulate_many
 from analytic.simulation import compiling, hybrid, stepping
 from analytic.simulation.ensemble import random_starts
 from analytic.simulation.integrator import StalledError
-from model import Flow, InputError, Parameters, State
+from model import Flow, Parameters, State
 from model.drag import LAWS
 
 pytest.importorskip("numba")
@@ -130,16 +130,3 @@ def test_of_processes_one_compiles(monkeypatch):
 
     assert [more(1), more(2)] == [2, 3]
     assert asked == [fcntl.LOCK_EX]
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"parameters": [P, P], "x0s": np.zeros((3, 6))}, "2 parameter sets, 3 starts"),
-        ({"x0s": [[-0.01, 0, 0, 0, 0, 0]]}, "y = -0.01 m"),
-        *(({"threads": threads}, f"threads = {threads:g}") for threads in (0, -1, 5000, 1.5)),
-    ],
-)
-def test_bad_input(given, message):
-    with pytest.raises(InputError, match=message):
-        simulate_many(**{"parameters": P, "x0s": np.zeros(6), "t_end": 0.1} | given)

@@ -142,22 +142,6 @@ def test_random_starts_are_those_of_their_seed_and_inside():
     assert np.all(first[first[:, 0] == 0, 1] == 0)
 
 
-@pytest.mark.parametrize(
-    ("given", "match"),
-    [
-        ({"starts": [[-1e-3, 0, 20, 0, 0, 0]]}, "above the floor"),
-        ({"starts": [[0, 0, 20, 0, 0, 0, 1.0, 0]]}, "h = 1 m"),
-        ({"starts": 0}, "starts = 0"),
-        ({"starts": SLIPS, "lasting": -1.0}, "lasting = -1"),
-    ],
-)
-def test_bad_input(given, match):
-    with pytest.raises(InputError, match=match):
-        attractors(HOPPING, **given)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="lasting"):  # no time constant to take it from
-        attractors(HOPPING.replace(c=0.0), 1)
-
-
 def test_lyapunov_exponent_of_a_known_growth():
     """Neighbours part by a factor of e every 1/0.3 s."""
 

@@ -6,10 +6,9 @@ from scipy.optimize import minimize
 
 from analytic import stationary_solutions, thresholds
 from analytic.mechanics import rolling_forces
-from analytic.slipping import slip_bounds
 from analytic.slipping import slip_stability as slip
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
-from model import Case, InputError, Parameters, State
+from model import Case, Parameters, State
 
 P = Parameters.named("reference")
 
@@ -121,19 +120,6 @@ def test_bounds_are_infinite_where_gamma_never_vanishes():
     """The zeros themselves claims hold, (56) claim eq-13-gamma."""
     assert SlipBound(3.0, -2.0).zero == 1.5
     assert SlipBound(3.0, 0.0).zero == HeldBound(P.replace(c=0.0), 1.0, 1, 1.0).zero == np.inf
-
-
-@pytest.mark.parametrize(
-    ("ask", "message"),
-    [
-        (lambda: slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P), "slip_x = 1 rad s-1 must be 0"),
-        (lambda: slip_bounds.gamma_nr(0.0, [0.1, 0, 9.0, 0, 0, 1.0], P), "slip_z = 1"),
-        (lambda: slip_bounds.filippov_share(Case.SS, 9.0, P), "RR divides the states of RS and SR only"),
-    ],
-)
-def test_other_cases_are_refused(ask, message):
-    with pytest.raises(InputError, match=message):
-        ask()
 
 
 def test_definition_3_without_friction_or_flow():

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from analytic import (
-    leaning_modes,
     solution,
     stationary_solutions,
     vector_field,
 )  # fmt: skip
 from analytic.mechanics.dynamics import jacobian
 from analytic.stationary.slipping_branch import branch, eigenvalues_at, fold, hopf_places, points_at
-from model import Case, InputError, Parameters, State
+from model import Case, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
 
@@ -32,16 +31,7 @@ def test_solution_of_a_case():
     first, second = of_case(p, Case.SS)
     assert np.array_equal(solution(p, Case.SS).x, first.x)
     assert np.array_equal(solution(p, Case.SS, stable=False).x, second.x)
-    slow = P.replace(omega_0=9.0)
-    assert solution(slow, Case.NR, formal=True).exists is False
-    for ask, message in (
-        (lambda: solution(slow, Case.NR), r"case NR has no stable stationary solution at omega_0 = 9 rad s-1 \(mu"),
-        (lambda: solution(slow, Case.SS), "case SS has no stable stationary solution"),
-        (lambda: solution(slow, Case.RR, stable=False), "case RR has no unstable stationary solution"),
-        (lambda: solution(p, Case.NN), "case NN has no stable"),
-    ):
-        with pytest.raises(InputError, match=message):
-            ask()
+    assert solution(P.replace(omega_0=9.0), Case.NR, formal=True).exists is False
 
 
 # --- eigenvalues -----------------------------------------------------------------------------------------------
@@ -80,8 +70,6 @@ def test_hopf_points_exist_for_rough_floors_only():
         pair = values[np.abs(values.imag) > 1]
         assert np.abs(pair.real).max() <= 1e-9 * np.abs(pair).max()
     assert np.sum(eigenvalues_at(np.mean(places), p).real > 0) == 2
-    with pytest.raises(InputError, match=r"eta = 0\.6 is out of range: SS has no whole branch"):
-        hopf_places(P.replace(eta=0.6))
 
 
 # --- the branch without loss of digits -------------------------------------------------------------------------
@@ -151,10 +139,3 @@ def test_vanishing_parameters(change, expected, those):
         assert np.abs(vector_field(s.case, s.x, p)[1:]).max() <= 1e-11, s.case
         assert s.state.omega_c == (0.0 if s.case is Case.RS and p.eta else p.omega_0) or s.case is Case.SS
         assert p.mu > 0 or abs(s.state.slip_x + p.R / p.r * s.state.omega_c) <= 1e-12 or s.case is Case.NS
-
-
-@pytest.mark.parametrize("change", [{"omega_0": 0.0}, {"mu": 0.0}])
-def test_where_nothing_leans_there_are_no_leaning_modes(change):
-    """What they are claim prop-3-rate holds."""
-    with pytest.raises(InputError, match="SR has no stationary solution that leans"):
-        leaning_modes(Parameters.named("high-wall-friction").replace(**change))

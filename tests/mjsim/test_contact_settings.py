@@ -9,39 +9,12 @@ import pytest
 import analytic
 import mjsim
 from mjsim import ContactSettings
-from model import Case, InputError, Parameters
-
-FREE = {"rigid": True, "memory": False, "servo": 0.0, "order": 1}
+from model import Case, Parameters
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"timestep": 0.0}, r"timestep = 0 s is out of range: must be > 0"),
-        ({"timestep": 2e-3}, r"timestep = 0.002 s is too large for the contact settings: .* at most 0.001 s"),
-        ({"solimp": 1.0}, r"solimp = 1 is out of range"),
-        ({"impratio": 1e9}, r"impratio = 1e\+09"),
-        ({"solref": (0.1,)}, r"solref = .* must be two numbers"),
-        ({"cone": "eliptic"}, r"cone = 'eliptic' must be one of .*did you mean 'elliptic'"),
-        ({"cone": "pyramidal"}, "cone = 'pyramidal' needs memory = False"),
-        ({"integrator": "RK4"}, r"integrator = 'RK4' must be one of"),
-        ({"order": 3}, "order = 3 must be one of 2, 1"),
-        ({"servo": float("nan")}, r"servo = nan s must be finite"),
-        ({"rigid": True, "memory": False, "order": 1}, "rigid contacts need memory = False, servo = 0, order = 1"),
-        (FREE | {"noslip_iterations": 5}, "rigid contacts need noslip_iterations = 0"),
-        (FREE | {"integrator": "discrete"}, "rigid contacts need .* another integrator than 'discrete'"),
-    ],
-)
-def test_refused(changes, words) -> None:
-    with pytest.raises(InputError, match=words):
-        ContactSettings(**changes)
-
-
-def test_mapping_round_trip_and_unknown_names() -> None:
+def test_mapping_round_trip() -> None:
     settings = ContactSettings.at(4e-3, impratio=50.0)
     assert ContactSettings.from_mapping(dataclasses.asdict(settings)) == settings
-    with pytest.raises(InputError, match=r"unknown contact setting 'solimpp' .did you mean 'solimp'"):
-        ContactSettings.at(1e-3, solimpp=0.1)
 
 
 @pytest.mark.parametrize("timestep", [1e-4, 1e-3, 4e-3])

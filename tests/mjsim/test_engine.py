@@ -9,7 +9,7 @@ import pytest
 
 import mjsim
 from mjsim import ContactSettings, scene, stepping
-from model import Case, Flow, InputError, Parameters, SimulationError, Trajectory
+from model import Case, Flow, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
 from model.trajectory import columns
 
@@ -74,18 +74,6 @@ def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> N
                 np.testing.assert_array_equal(getattr(run, name), getattr(exact, name))
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, 1_000_000, math.nan, "2"])
-def test_a_bad_number_of_threads_is_refused_in_one_line(threads) -> None:
-    with pytest.raises(InputError, match=r"^threads = [^\n]*$"):
-        mjsim.simulate_many([P, P], [np.zeros(8)] * 2, 0.1, threads=threads)
-
-
-def test_runs_need_all_that_makes_them() -> None:
-    for sets, x0s, flow in (([], [], None), ([P], [], None), ([P] * 3, [np.zeros(8)] * 3, [Flow.steady(1.0)] * 2)):
-        with pytest.raises(InputError, match="every run needs parameters, a start and a flow"):
-            mjsim.simulate_many(sets, x0s, 0.1, flow)
-
-
 @pytest.mark.parametrize(("settings", "omega_c"), [(None, 1e11), (RIGID, 1e6), (RIGID, 1e9)])
 def test_divergence_stops_a_run_and_keeps_what_there_is(settings, omega_c) -> None:
     wild = [0, 0, omega_c, 0, 0, 0]
@@ -123,21 +111,6 @@ def test_a_ball_that_slides_down_the_wall_as_fast_as_drag_lets_it_stays_on_it(st
     assert set(run.cases[len(run.time) // 2 :]) == {Case.NS}
     # Friction of the wall, eta R omega_c^2 upwards, slows it: less than the weight, which drag balances in the end.
     assert -p.g / p.c < run.v_y[-1] < -(p.g - p.eta * p.R * p.omega_0**2) / p.c * (1 - math.exp(-p.c * 2.0))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"t_end": 1.0, "x0": [-1, 0, 1, 0, 0, 0]}, "y = -1 m is out of range"),
-        ({"t_end": -1.0}, "t_end = -1 s"),
-        ({"t_end": 1.0, "sample_interval": 1e-5}, "sample_interval = 1e-05 s"),
-        ({"t_end": float("nan")}, "t_end"),
-        ({"t_end": 1.0, "x0": [0, 0, 1, 0, 0, 0, 0.06, 0]}, r"h = 0.06 m is out of range: .* must be .*< 0.05"),
-    ],
-)
-def test_bad_arguments(arguments, words) -> None:
-    with pytest.raises(InputError, match=words):
-        mjsim.simulate(**{"p": P, "x0": [0, 0, 1, 0, 0, 0]} | arguments)
 
 
 # --- the scene file ------------------------------------------------------------------------------------------

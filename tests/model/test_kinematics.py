@@ -7,12 +7,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from model import InputError, Parameters, State
+from model import Parameters, State
 from model.kinematics import (
     angular_velocity,
     frame,
     from_world,
-    full_state,
     rotated,
     slip_speeds,
     slip_velocities,
@@ -76,23 +75,7 @@ def test_on_the_axis_the_orbit_has_no_angular_velocity():
     assert theta == 0
 
 
-@pytest.mark.parametrize(
-    ("x", "says"),
-    [
-        (np.zeros(7), "6 entries"),
-        (3.0, "6 entries"),
-        ([0, 0, np.nan, 0, 0, 0], "omega_c = nan rad s-1 must be finite"),
-        ([0, np.inf, 0, 0, 0, 0, 0, 0], "v_y = inf m s-1 must be finite"),
-    ],
-)
-def test_a_state_that_is_none_is_refused(x, says):
-    with pytest.raises(InputError, match=says):
-        full_state(x)
-
-
 def test_a_state_is_one_or_many():
     columns = State.of(np.arange(24.0).reshape(3, 8))
     assert State.of(columns) is columns
     np.testing.assert_array_equal(columns.stacked(), np.arange(24.0).reshape(3, 8))
-    with pytest.raises(InputError, match=r"one state is needed, not an array of shape \(3, 8\)"):
-        State.one(columns.stacked())
