@@ -91,10 +91,7 @@ REFUSED = [
     (lambda: number_of_folds(ROUGH), "SS has a branch from RR to SR for"),
     (lambda: hopf_places(ROUGH), r"eta = 0\.6 is out of range: SS has no whole branch"),
     (lambda: mean_slope(LEANS), r"eta = 0\.6 is out of range"),
-    (
-        lambda: solution(P.replace(omega_0=9.0), Case.NR),
-        r"NR has no stable .* at omega_0 = 9 rad s-1 \(mu",
-    ),
+    (lambda: solution(P.replace(omega_0=9.0), Case.NR), r"NR has no stable .* at omega_0 = 9 rad s-1 \(mu"),
     (lambda: solution(P.replace(omega_0=9.0), Case.SS), "case SS has no stable stationary solution"),
     (lambda: solution(P.replace(omega_0=9.0), Case.RR, stable=False), "case RR has no unstable stationary solution"),
     (lambda: solution(P.replace(omega_0=35.0), Case.NN), "case NN has no stable"),
@@ -144,10 +141,7 @@ REFUSED = [
     *((lambda n=n: mjsim.simulate_many([P] * n, [], 0.1), "every run needs parameters, a start") for n in (0, 1)),
     (lambda: mjsim.simulate_many([P] * 3, [AT_REST] * 3, 0.1, [Flow.steady(1.0)] * 2), "every run needs .* a flow"),
     (lambda: ContactSettings(timestep=0.0), r"timestep = 0 s is out of range: must be > 0"),
-    (
-        lambda: ContactSettings(timestep=2e-3),
-        "timestep = 0.002 s is too large for .* at most 0.001 s",
-    ),
+    (lambda: ContactSettings(timestep=2e-3), "timestep = 0.002 s is too large for .* at most 0.001 s"),
     (lambda: ContactSettings(solimp=1.0), r"solimp = 1 is out of range"),
     (lambda: ContactSettings(impratio=1e9), r"impratio = 1e\+09"),
     (lambda: ContactSettings(solref=(0.1,)), r"solref = .* must be two numbers"),

@@ -51,7 +51,7 @@ class WrongTheory:
 def believed(*wrongs: WrongTheory) -> Iterator[None]:
     """Believe wrong theories: every name and table entry of a right function stands for the wrong one."""
     rights = [getattr(importlib.import_module(each.module), each.function) for each in wrongs]
-    puts = [functools.partial(each.wrong, right) for each, right in zip(wrongs, rights, strict=True)]
+    puts = [_with(right, each.wrong) for each, right in zip(wrongs, rights, strict=True)]
     _exchange(dict(zip(map(id, rights), puts, strict=True)))
     plainly = mock.patch.object(hybrid, "compiled", return_value=None)
     # Compiled runs would believe what they believed when they were compiled.
@@ -60,6 +60,11 @@ def believed(*wrongs: WrongTheory) -> Iterator[None]:
             yield
         finally:
             _exchange(dict(zip(map(id, puts), rights, strict=True)))
+
+
+def _with(right: Function, fault: Fault) -> Function:
+    """The wrong function."""
+    return lambda *args, **named: fault(right, *args, **named)
 
 
 def _exchange(new: Mapping[int, Function]) -> None:
@@ -131,9 +136,7 @@ swapped = given(lambda p: replaced(p, mu=p.eta, eta=p.mu))
 
 def where(test: Change, fault: Fault) -> Fault:
     """The fault shows only where the first argument passes a test."""
-    return lambda right, first, *rest, **named: (functools.partial(fault, right) if test(first) else right)(
-        first, *rest, **named
-    )
+    return lambda right, first, *rest, **named: (_with(right, fault) if test(first) else right)(first, *rest, **named)
 
 
 def in_case(fault: Fault, *cases: Case) -> Fault:
