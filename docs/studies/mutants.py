@@ -72,7 +72,7 @@ BY_HAND = {
     "shares of starts by the normal distribution": "compare/test_basins::test_intervals_of_shares",
     "a return map without its section": "analytic/test_orbits::test_newton_closes_the_orbit",
     "a pinch at 0.95 of the friction": "compare/test_cases::test_rest_needs_the_share_of_friction_that_is_said",
-    "the wall's correction of friction's direction 20 % weak in y": "mjsim/test_drag::test_slipping_converges_with_the_"
+    "the wall's correction of friction's direction 20 % weak in y": "test_drag::test_slipping_converges_with_the_"
     "square_of_the_step",
 }
 """Faults in compiled code, in methods and in MuJoCo's corrections, put in by hand, and the test that saw each."""

@@ -1,4 +1,12 @@
-"""Vector fields and contact forces are what sympy solves Newton-Euler (20) with Table 3 to, to 1e-12."""
+"""Vector fields and contact forces are what sympy solves Newton-Euler (20) with Table 3 to, to 1e-12.
+
+Both come from nothing but vectors, an origin of the equations of motion that the code doesn't share: the ball's centre
+stands at (-rho, r + y, 0) in the co-rotating frame (1), with rho = R - h; its angular velocity is split by (4), with
+rho for R. Everything else is differentiation of vectors in a rotating frame.
+"""
+
+from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,11 +18,54 @@ from model import Case, Contact, InputError, Parameters
 from model.cases import TRAITS
 from model.drag import LAWS
 from model.kinematics import VARIABLES, slip_velocities
-from tests.analytic import newton_euler as ne
 from tests.drag_laws import resistance
 
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
 N = 2_000
+t = sp.Symbol("t")
+m, r, R, j, mu, eta, g, c = sp.symbols("m r R j mu eta g c", positive=True)
+omega_0, alpha, beta = sp.symbols("omega_0 alpha beta", real=True)
+STATE = sp.symbols(VARIABLES, real=True)
+RATE = sp.symbols([f"d{name}" for name in VARIABLES], real=True)
+FORCE_A, FORCE_B = (sp.Matrix(sp.symbols(f"{F}_x {F}_y {F}_z", real=True)) for F in "AB")
+HELD = {case: {x: 0 for x in STATE if x.name in TRAITS[case].constraints} for case in Case}
+HELD[Case.RN] |= {STATE[5]: -STATE[7] / r}
+"""The constraints of a case."""
+
+
+def equations(case):
+    """(20) with what Table 3 adds, known force components and rates of constraints: each zero, linear in both."""
+    of_time = y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = [sp.Function(name)(t) for name in VARIABLES]
+    rho, frame, A, B = R - h, sp.Matrix([0, omega_c, 0]), sp.Matrix([0, -r, 0]), sp.Matrix([-r, 0, 0])
+    place = sp.Matrix([-rho, r + y, 0])
+    v_C = (place.diff(t) + frame.cross(place)).subs({y.diff(t): v_y, h.diff(t): v_h})
+    spin = sp.Matrix([rho * omega_c / r + slip_x, -rho * omega_c / r + slip_y, v_y / r + slip_z])
+    v_A, v_B = v_C + spin.cross(A), v_C + spin.cross(B)
+    drag, weight = -m * c * (v_C - sp.Matrix([0, 0, rho * omega_0])), sp.Matrix([0, -m * g, 0])
+    newton = weight + FORCE_A + FORCE_B + drag - m * (v_C.diff(t) + frame.cross(v_C))
+    turning = j * m * r**2 * (spin.diff(t) + frame.cross(spin))  # omega x J omega vanishes for a sphere
+    found = [*newton, *(A.cross(FORCE_A) + B.cross(FORCE_B) - turning), y.diff(t) - v_y, h.diff(t) - v_h]
+    found += list(FORCE_A) if case.A is Contact.N else [v_y.diff(t)]
+    found += list(FORCE_B) if case.B is Contact.N else [v_h.diff(t)]
+    if case.A is Contact.S:  # (14) with dir v_A = (cos alpha, 0, -sin alpha)
+        found += [FORCE_A[0] + mu * FORCE_A[1] * sp.cos(alpha), FORCE_A[2] - mu * FORCE_A[1] * sp.sin(alpha)]
+    if case.B is Contact.S:  # (15) with dir v_B = (0, -cos beta, sin beta)
+        found += [FORCE_B[1] - eta * FORCE_B[0] * sp.cos(beta), FORCE_B[2] + eta * FORCE_B[0] * sp.sin(beta)]
+    if case.A is Contact.R:
+        found += [v_A[0].diff(t), v_A[2].diff(t)]
+    if case.B is Contact.R:
+        found += [v_B[1].diff(t), v_B[2].diff(t)]
+    symbols = {f.diff(t): rate for f, rate in zip(of_time, RATE, strict=True)} | dict(zip(of_time, STATE, strict=True))
+    return [each.subs(symbols).subs(HELD[case]) for each in found]
+
+
+@cache
+def solved(case):
+    """Rates (8) and forces (6) of a case but RR as f(m, r, R, j, mu, eta, g, c, omega_0, alpha, beta, *state)."""
+    unknowns = [*RATE, *FORCE_A, *FORCE_B]
+    (solution,) = sp.solve(equations(case), unknowns, dict=True)
+    given = [m, r, R, j, mu, eta, g, c, omega_0, alpha, beta, *STATE]
+    return sp.lambdify(given, [solution[unknown] for unknown in unknowns])
 
 
 def random_states(case, n, seed=0):
@@ -24,9 +75,7 @@ def random_states(case, n, seed=0):
     x = sign * 10.0 ** rng.uniform(-3, 2, (n, 8)) * [1, 0.1, 1, 1, 1, 1, 1, 0.1]
     x[:, 0] = rng.uniform(0, 0.1, n)
     x[:, 6] = rng.uniform(0, 0.9 * P.R, n)
-    for k, name in enumerate(VARIABLES):
-        if name in TRAITS[case].constraints:
-            x[:, k] = 0.0
+    x[:, [name in TRAITS[case].constraints for name in VARIABLES]] = 0.0
     if case is Case.RN:
         x[:, 5] = -x[:, 7] / P.r
     return x
@@ -34,19 +83,13 @@ def random_states(case, n, seed=0):
 
 def test_rolling_at_both_points_symbolically():
     """RR has one equation too few: all forces follow from B_y, all rates are free of it (23)."""
-    rank_unknowns = [*ne.RATE, *ne.FORCE_A, ne.FORCE_B[0], ne.FORCE_B[2]]
     # dv_y = 0 follows from A, dslip_z = 0 from both contacts: the doubled equation is what leaves a force free.
-    equations = [e.subs(ne.held(Case.RR)) for e in ne.balance() + ne.closure(Case.RR)]
-    solution = sp.solve(equations, rank_unknowns, dict=True)
-    assert len(solution) == 1
-    omega_c, B_y = ne.STATE[2], ne.FORCE_B[1]
-    family = dynamics.rolling_family(omega_c, ne.PARAMETERS, ne.omega_0, B_y)
-    for name, mine in zip([*ne.FORCE_A, *ne.FORCE_B], family, strict=True):
-        assert sp.simplify(mine - solution[0].get(name, name)) == 0, str(name)
-    x = [omega_c if name == "omega_c" else sp.Integer(0) for name in ne.NAMES]
-    rates = dynamics.newton_euler(Case.RR, x, family, ne.PARAMETERS, ne.omega_0)
-    for name, mine in zip(ne.RATE, rates, strict=True):
-        assert sp.simplify(mine - solution[0][name]) == 0, str(name)
+    (solution,) = sp.solve(equations(Case.RR), [*RATE, *FORCE_A, FORCE_B[0], FORCE_B[2]], dict=True)
+    plain = SimpleNamespace(m=m, r=r, R=R, j=j, mu=mu, eta=eta, g=g, c=c, drag="stokes")
+    family = dynamics.rolling_family(STATE[2], plain, omega_0, FORCE_B[1])
+    rates = dynamics.newton_euler(Case.RR, [HELD[Case.RR].get(x, x) for x in STATE], family, plain, omega_0)
+    for name, mine in zip([*FORCE_A, *FORCE_B, *RATE], [*family, *rates], strict=True):
+        assert sp.simplify(mine - solution.get(name, name)) == 0, str(name)
 
 
 @pytest.mark.parametrize(("mu", "eta", "omega_0"), [(0.3, 0.45, 17.0), (0.01, 0.9, 17.0), (0.9, 0.01, -17.0)])
@@ -60,8 +103,8 @@ def test_rates_and_forces_at_random_states(case, law, mu, eta, omega_0):
     c = resistance(np.sqrt(v_h**2 + v_y**2 + (rho * (omega_c - p.omega_0)) ** 2), p)
     (A_x, _, A_z), (_, B_y, B_z) = (v.T for v in slip_velocities(x, p))
     angles = np.arctan2(-A_z, A_x), np.arctan2(B_z, -B_y)  # alpha and beta (8), not used where nothing slips
-    solved = ne.solved(case)(p.m, p.r, p.R, p.j, mu, eta, p.g, c, p.omega_0, *angles, *x.T)
-    expected = np.stack(np.broadcast_arrays(*solved, x[:, 0]), axis=-1)[:, :14]
+    known = solved(case)(p.m, p.r, p.R, p.j, mu, eta, p.g, c, p.omega_0, *angles, *x.T)
+    expected = np.stack(np.broadcast_arrays(*known, x[:, 0]), axis=-1)[:, :14]
     drag = c * (np.abs(v_y) + np.abs(v_h) + rho * (np.abs(omega_c) + abs(omega_0)))
     turning = np.abs(omega_c) * (rho * np.abs(omega_c) + np.abs(v_y) + np.abs(v_h) + p.r * fastest)
     load = (p.g + drag + turning)[:, None]
