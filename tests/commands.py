@@ -1,9 +1,17 @@
 """The commands as tests draw from them: their parsers, what they need, and how they refuse."""
 
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from compare.commands import cli, options, parsers
 
+ROOT = Path(__file__).parents[1]
 COMMANDS = [name for group in parsers.GROUPS.values() for name in group]
 NEEDED = {
     "basins": "--across y=0:1:2 --up h=0:0.01:2",
@@ -45,6 +53,19 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
     assert (code, out, err.count("\n")) == (2, "", 1), err
     assert err.startswith("dualball: error: ")
     return err
+
+
+def started(*words: object, **how: Any) -> subprocess.Popen[str]:
+    """A command in a process of its own, which hears Ctrl-C even if a shell ran the tests in the background."""
+    env = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}  # NiceGUI looks for it
+    return subprocess.Popen(
+        [sys.executable, "-m", "compare", *map(str, words)],
+        env=env | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        **how,
+    )
 
 
 def parser_of(command: str) -> options.Parser:

@@ -1,11 +1,13 @@
-"""Measurements and motions made up for tests."""
+"""Measurements, motions and claims made up for tests."""
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 import analytic
+from compare.claim import Bearing, Claim
 from compare.kit.record import Condition, Measurement, Records
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.trajectory import SAMPLE
@@ -31,6 +33,13 @@ def measured(
         parameters=p or Parameters.named("reference"),
         conditions=conditions,
     )
+
+
+def claim(name: str = "it", *bearings: Bearing, **others: Any) -> Claim:
+    """A claim, that a ball in a stationary state goes round with the flow unless bearings are given."""
+    own = bearings or (Bearing("settled", "omega_c", lambda m: m.parameters.omega_0),)
+    given = {"section": "Stationary states", "source": "(1)", "statement": "So it is.", "bearings": own}
+    return Claim(id=name, **(given | others))
 
 
 def motion(p: Parameters, time: npt.ArrayLike, **columns: npt.ArrayLike) -> Trajectory:

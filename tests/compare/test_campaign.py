@@ -6,7 +6,6 @@ import math
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -22,6 +21,7 @@ from compare.kit.workers import Workers, _without_signals, dask, processes
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
+from tests.commands import started
 
 REST = (0.0,) * 8
 P = Parameters.named("reference")
@@ -312,14 +312,7 @@ def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_p
     # Runs of some tenths of a second: however late the signal comes, some of them are still to be done.
     sweep, kept = f"sweep --vary omega_0=5:10:16 --batch 2 --time 15 -o {tmp_path} --workers".split(), {}
     for by in (signal.SIGINT, signal.SIGKILL):
-        process = subprocess.Popen(
-            [sys.executable, "-m", "compare", *sweep, "1"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            # a shell starts what it runs in the background with SIGINT ignored
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        )
+        process = started(*sweep, 1, stderr=subprocess.STDOUT)
         while len(written(tmp_path)) == len(kept):
             time.sleep(0.02)
         process.send_signal(by)

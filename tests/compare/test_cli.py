@@ -136,6 +136,21 @@ def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path, capsys, design)
     assert len({tuple(header.settings["solref"]) for header in headers}) == 2
 
 
+def test_attractors_says_what_is_undecided_and_what_it_did_last(capsys, tmp_path):
+    """JSON, and a page with a row for each set."""
+    page = tmp_path / "page.md"
+    line = f"attractors --set hopping --start omega_c=20 --time 1 --vary omega_0=60,70 -o {page} --json"
+    data = json.loads(told(capsys, line))
+    assert [each["omega_0"] for each in data["sets"]] == [60, 70]
+    for (only,) in (each["attractors"] for each in data["sets"]):
+        assert only["kind"] == "undecided"
+        assert only["low"]["omega_c"] <= only["mean"]["omega_c"] <= only["high"]["omega_c"]
+    head, _, table = page.read_text("utf-8").partition("| omega_0")
+    for words in ("μ = 0.45554, η = 0.072543", "ω₀ = 69.211 rad/s", f"dualball {line}"):
+        assert words in head
+    assert len([row for row in table.splitlines() if row.startswith("|")]) == 1 + 2
+
+
 def test_a_run_that_diverges_is_kept_and_told(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)  # where MuJoCo would leave its MUJOCO_LOG.TXT
     code, _, said = carried_out(capsys, "simulate --start omega_c=1e9 --time 0.1 -o run.h5")

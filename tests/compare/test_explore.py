@@ -1,7 +1,6 @@
 """The page to play with follows sliders and clicks in a real browser, saves what it shows, and serves nobody else."""
 
 import base64
-import os
 import signal
 import socket
 import subprocess
@@ -13,7 +12,7 @@ import pytest
 
 from compare.view import explore
 from model import InputError, Parameters, State, storage
-from tests.commands import refused
+from tests.commands import refused, started
 
 P = Parameters.named("reference")
 
@@ -25,10 +24,7 @@ def address():
     with socket.socket() as free:
         free.bind((explore.HOST, 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", "compare", "explore", "--no-browser", "--port", str(port)]
-    env = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}  # NiceGUI looks for it
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen(command, **pipes, text=True, env=env) as server:
+    with started("explore", "--no-browser", "--port", port, stderr=subprocess.PIPE) as server:
         assert server.stdout
         assert f"http://{explore.HOST}:{port}" in server.stdout.readline()
         for _ in range(100):

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import pytest
 
-import tests.measured
 from compare import validation
 from compare.claim import Bearing, Claim, Outcome, Text
 from compare.judge import judge, select, theory
@@ -17,6 +16,7 @@ from compare.kit.quantities import quantity
 from compare.kit.record import Missing, Records, Relation
 from compare.kit.statistics import COVERAGE, Measured
 from model import InputError, Parameters
+from tests import measured as made
 
 P = Parameters.named("reference")
 FINE = quantity("omega_c").resolves / 10
@@ -24,12 +24,11 @@ FINE = quantity("omega_c").resolves / 10
 
 
 def measured(value, uncertainty, name="omega_c"):
-    return Records((tests.measured.measured("settled", name, value, uncertainty, P, "mine"),))
+    return Records((made.measured("settled", name, value, uncertainty, P, "mine"),))
 
 
 def claim(predict=lambda m: m.parameters.omega_0, quantity="omega_c", **more):
-    bearing = Bearing(protocol="settled", quantity=quantity, predict=predict, **more)
-    return Claim(id="it", section="Stationary states", source="(1)", statement="It goes round.", bearings=(bearing,))
+    return made.claim("it", Bearing("settled", quantity, predict, **more))
 
 
 def outcome(of, records):

@@ -1,5 +1,6 @@
-"""Protocols of motions say what broke down or isn't there, and read each number as it is."""
+"""Protocols find what is known to be there, and say what broke down, did not settle or isn't there."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -7,24 +8,35 @@ import numpy as np
 import pytest
 
 import analytic
-from compare.kit.lab import Lab
+from compare.catalogue import CLAIMS
+from compare.claim import Outcome
+from compare.judge import judge, select
+from compare.kit import levels, settling
+from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
+from compare.kit.lab import Lab, time_unit
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
-from compare.kit.statistics import COVERAGE
+from compare.kit.statistics import COVERAGE, Measured, extrapolated_maximum, hops, zero_and_slope
+from compare.kit.trials import with_step_error
+from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion.measure import laws, motions
 from compare.subjects.slipping.measure import growth, onset
+from compare.subjects.stationary import measure as settled
+from compare.subjects.thresholds.measure import answers, thresholds
 from compare.subjects.unsteady import measure as unsteady
-from model import Case, Parameters
-from tests.measured import motion, thresholds
+from model import Case, Parameters, State
+from tests.measured import measured, motion
+from tests.measured import thresholds as known
 
+P, HOPPING = Parameters.named("reference"), Parameters.named("hopping")
 QUICK = sets(Level.QUICK)
-SETS = {"reference": QUICK["reference"]}
+SETS = {"reference": P}
 PROTOCOLS = {
     "field": lambda lab: motions.field(lab, SETS, Records()),
     "growth": lambda lab: growth.measure(lab, SETS, Records()),
-    "bounds": lambda lab: onset.bounds(lab, SETS, thresholds("reference", SETS["reference"], "omega_01", "omega_02")),
+    "bounds": lambda lab: onset.bounds(lab, SETS, known("reference", P, "omega_01", "omega_02")),
     "lift": lambda lab: onset.lift(lab, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
     "impacts": lambda lab: motions.impacts(lab, SETS, Records()),
 }
@@ -47,7 +59,7 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, mo
 
 
 def test_without_friction_nothing_rolls_and_the_reader_is_told(lab):
-    smooth = {"ice": SETS["reference"].replace(eta=0.0)}
+    smooth = {"ice": P.replace(eta=0.0)}
     for protocol, measure in (("growth", growth.measure), ("bounds", onset.bounds)):
         assert list(measure(lab, smooth, Records())) == [Missing(protocol, "ice", growth.FRICTIONLESS)]
 
@@ -55,21 +67,18 @@ def test_without_friction_nothing_rolls_and_the_reader_is_told(lab):
 @pytest.mark.parametrize(("share", "turns"), [(1.1, True), (0.9, False)])
 def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns):
     """It doesn't change, yet a 1e-4 of it turns its friction so far that the rates are others."""
-    p, time = Parameters.named("reference"), np.linspace(0.0, 1e-3, 5)
+    time = np.linspace(0.0, 1e-3, 5)
     # A sphere's contact point feels friction f as an acceleration f/m (1 + 1/j).
-    friction = p.m * motions.TURN / (time[-1] * (1 + 1 / p.j)) * share
-    x = np.tile([0, 0, 1.0, 0, 1.0 / p.r, 0, 0, 0], (5, 1))
-    forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / p.eta)}
-    run = SimpleNamespace(header=SimpleNamespace(parameters=p), time=time, x=x, **forces)
+    friction = P.m * motions.TURN / (time[-1] * (1 + 1 / P.j)) * share
+    x = np.tile([0, 0, 1.0, 0, 1.0 / P.r, 0, 0, 0], (5, 1))
+    forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / P.eta)}
+    run = SimpleNamespace(header=SimpleNamespace(parameters=P), time=time, x=x, **forces)
     assert motions.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
-
-
-# --- a pulsating flow, laws at every instant, tops between samples ----------------------------------------------
 
 
 def test_a_run_that_breaks_down_leaves_out_its_own_pulsation(lab, monkeypatch):
     each, tried, name = Lab.each, [], "rough-wall"
-    known = thresholds(name, QUICK[name], "omega_01", "omega_02", "omega_04", uncertainty=0.0)
+    before = known(name, QUICK[name], "omega_01", "omega_02", "omega_04", uncertainty=0.0)
 
     def breaking(lab, tasks):
         tried.append(tasks)
@@ -77,7 +86,7 @@ def test_a_run_that_breaks_down_leaves_out_its_own_pulsation(lab, monkeypatch):
         return ["diverged", *runs[1:]] if len(tried) == 1 else runs
 
     monkeypatch.setattr(Lab, "each", breaking)
-    left = Records.of(unsteady.pulsation(lab, {name: QUICK[name]}, known))
+    left = Records.of(unsteady.pulsation(lab, {name: QUICK[name]}, before))
     assert [missing.reason.endswith("the run diverged") for missing in left.missing] == [True]
     assert {m.quantity for m in left.measurements} == {"gain", "phase_lag", "slip_amplitude", "mean_error"}
 
@@ -145,3 +154,246 @@ def test_first_top_lies_between_samples():
     )
     top = flowmeter.first_top(run)
     assert abs(top.value - float(fine.y.max())) <= top.uncertainty < p.g * 0.01**2 * p.c * 0.01
+
+
+THICK = P.replace(c=10.0)
+
+
+def _measured(lab, patch, p, *flows):
+    starts = tuple((how, flows) for how in ("rest", "with the fluid", "on the wall"))
+    patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, settled_starts=starts))
+    return Records.of(settled.measure(lab, {"thick": p}, Records()))
+
+
+def test_what_does_not_settle_is_missing(lab, monkeypatch):
+    monkeypatch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, settling_rounds=(1.0,)))
+    monkeypatch.setattr(settling, "SOLVED", 1e-3)
+    found = _measured(lab, monkeypatch, THICK, 0.6)
+    assert not found.measurements
+    starts = [each for each in found.missing if " still drifts" in each.reason]
+    states = [each for each in found.missing if "no values of it" in each.reason]
+    assert len(starts) + len(states) == len(found.missing)
+    assert sum(each.rows for each in starts) == 4
+    assert len(states) == 3  # from rest and with the fluid the ball ends in the same
+    assert all(each.rows > 10 for each in states)
+
+
+def test_a_state_that_depends_on_the_step_is_missing(lab, monkeypatch):
+    right = settling.settle
+
+    def other_case(lab, starts, patience):
+        states = right(lab, starts, patience)
+        return [replace(each, case=Case.SN) for each in states] if patience.refine == 2 else states
+
+    monkeypatch.setattr(settled, "settle", other_case)
+    found = _measured(lab, monkeypatch, THICK, 0.6)
+    assert {m.quantity for m in found.measurements} == {"case"}
+    assert len(found.missing) == 3
+    assert all("is SN with half the time step" in each.reason and each.rows > 10 for each in found.missing)
+
+
+def test_what_quadratic_drag_does_not_settle_has_no_values(lab, monkeypatch):
+    """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
+    found = _measured(lab, monkeypatch, sets(Level.QUICK)["blunt"], 0.6, 2.0)
+    cases = {m.conditions["case"] for m in found.measurements if m.quantity == "omega_c"}
+    assert cases == {"SS", "NS"}
+    assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
+
+
+def test_what_swings_for_ever_settles_by_going_on_from_its_mean(lab, monkeypatch):
+    """A ball that sinks along the wall: also where a round is rounded to another length than the usual one."""
+    monkeypatch.setattr(
+        levels, "AT_QUICK", replace(levels.AT_QUICK, settling_rounds=(0.45, 1.0, 1.0), settling_steps=512)
+    )
+    p = sets(Level.QUICK)["rough-floor"].replace(omega_0=21.74)
+    (state,) = settling.settle(lab, [settling.named_start("rough-floor", p, "on the wall")])
+    assert (state.case, state.failure) == (Case.NS, "")
+
+
+def outcome_of(claim, *rows):
+    return judge(select(CLAIMS, [claim]), Records(rows))[0].outcome
+
+
+@pytest.mark.parametrize(
+    ("Omega_0", "case", "before", "outcome"),
+    [
+        (2.6, Case.SS, "SS", Outcome.CONFIRMED),  # a ball keeps to its branch
+        (2.6, Case.NR, "NR", Outcome.CONFIRMED),
+        (2.6, Case.SS, "NR", Outcome.REFUTED),
+        (2.6, Case.NR, "SS", Outcome.REFUTED),
+        (1.7, Case.SS, "NR", Outcome.CONFIRMED),  # and leaves it where it has ended
+    ],
+)
+def test_a_ball_keeps_to_its_branch_of_the_loop(Omega_0, case, before, outcome):
+    """At 2.6 SS and NR last side by side."""
+    p = P.replace(mu=0.3)
+    q = p.replace(omega_0=Omega_0 / time_unit(p))
+    s = next(s for s in analytic.stable_solutions(q) if s.case is case)
+    at = {"case": case.name, "before": before, "side": "up", "level": 1.0}
+    values = {"case": (float(case), 0.0), "omega_c": (float(s.x[2]), 1e-9 * q.omega_0)}
+    rows = (measured("hysteresis", what, *value, q, "slipping", **at) for what, value in values.items())
+    assert outcome_of("fig-13-left", *rows) is outcome
+
+
+def test_a_slope_of_a_state_that_theory_does_not_know_is_a_refutation():
+    row = measured("slope", "slope", 1.0, 1e-6, P.replace(omega_0=24.0), by="neighbours", case="NR")
+    assert outcome_of("slope-rolling", row) is Outcome.REFUTED
+
+
+def test_no_loop_without_a_change_from_slipping_to_riding(lab):
+    assert [type(row) for row in flowmeter.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
+
+
+NUMBERS = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
+"""Stands for a lab whose tasks are their own runs."""
+
+
+def narrowed(answer, width, task=lambda v, b, attempt: (v, attempt), careful=True):
+    """The bracket in which an answer to (value, attempt) changes, from 0 to 1."""
+    (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
+    return bracket
+
+
+def test_bisection_closes_in_on_the_change():
+    bracket = narrowed(lambda run: run[0] < math.pi / 10, 1e-6)
+    assert bracket.low < math.pi / 10 < bracket.high <= bracket.low + 1e-6
+    assert bracket.shift == 0
+    # An end that was taken for granted is asked: it has a run if it was right.
+    assert narrowed(lambda run: run[0] < 0.95, 0.5, careful=False).runs[1] == (1.0, USUAL)
+    assert narrowed(lambda run: True, 0.5, careful=False).runs[1] is None
+    moves = narrowed(lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4)  # with the time step
+    assert moves.low < 0.3 < moves.high
+    assert moves.place.uncertainty >= moves.shift > 0
+
+
+def test_runs_that_are_undecided_or_break_down_leave_the_place_open():
+    """What is undecided is run again, for longer; what broke says why."""
+
+    def answer(run):
+        value, attempt = run
+        if abs(value - 0.5) < 0.1:
+            return value < 0.47 if attempt is LONGER and value < 0.47 else None
+        return value < 0.5
+
+    bracket = narrowed(answer, 1e-3, careful=False)
+    assert 0.4 < bracket.low < 0.47 <= 0.5 < bracket.high
+    assert bracket.high - bracket.low > 0.1
+    broken = narrowed(lambda v: v < 0.5, 1e-3, lambda v, b, attempt: v if abs(v - 0.5) > 0.1 else "broke")
+    assert broken.low < 0.4 < 0.6 < broken.high
+    assert broken.failure == "broke"
+
+
+@pytest.mark.parametrize(("eta", "end", "lost"), [(0.99, "omega_01", False), (1.01, "omega_03", True)])
+def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(eta, end, lost):
+    """Beyond the end of rolling, on walls a little smoother and rougher than the inertia j."""
+    p = P.replace(eta=eta * P.j)
+    p = p.replace(omega_0=1.002 * getattr(analytic.thresholds(p), end))
+    run = analytic.simulate(p, State(omega_c=p.omega_0), 2.0)
+    assert answers.lifts(Bracket(0.0, 1.0, (None, run))) is lost
+    assert run.force_A[-1, 1] < settling.PRESSES * p.m * p.g
+
+
+def test_the_drag_at_which_a_fold_is_born_is_judged_where_that_of_the_set_is_too_strong_for_one():
+    p = P.replace(c=20 * P.c)
+    born = analytic.bifurcation.diagram.critical_drag(p)
+    for value, outcome in (born, Outcome.CONFIRMED), (1.01 * born, Outcome.REFUTED):
+        row = measured("birth", "critical_drag", value, 1e-4 * born, p, "mine")
+        assert outcome_of("double-points", row) is outcome
+
+
+@pytest.mark.parametrize("power", [1.3, 1.687, 2.0])
+def test_a_bent_line_has_its_zero_and_slope(power):
+    """Of growth along a line, where drag isn't linear: few claims of few sets would notice."""
+    x, noise = np.array([0.0, 1.1, 1.5, 2.0]), np.full(4, 1e-6)
+    zero, slope = zero_and_slope(x, x**power - 1.7, noise)
+    assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
+    assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
+    assert np.isnan([m.value for m in zero_and_slope(x, x + 1, noise)]).all()
+
+
+@pytest.mark.parametrize("bend", [0.0, 1e-15, -1e-15, 1e-4])
+def test_a_line_has_no_maximum(bend):
+    """Nor has one that is bent by round-off, or so little that a maximum would be far away."""
+    where = np.linspace(1.0, 2.0, 6)[::-1]
+    order = [Measured(float(w), 0.0) for w in where]
+    assert not math.isfinite(extrapolated_maximum(where - bend * where**2, order).value)
+
+
+def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):
+    """Of a set without fold, and the cases in which balls settle there."""
+    monkeypatch.setattr(thresholds, "extrapolated", lambda *what: None)
+    p, rows = sets(Level.QUICK)["thick-fluid"], []
+    for flow in (0.6, 1.4, 2.5):
+        q = p.replace(omega_0=flow / time_unit(p))
+        cases = {s.case for s in analytic.stable_solutions(q)}
+        floor = next(case for case in (Case.RR, Case.SS, Case.NR) if case in cases)
+        wall = Case.NR if Case.NR in cases else Case.NS
+        for start, case in (("rest", floor), ("with the fluid", floor), ("on the wall", wall)):
+            rows.append(measured("settled", "case", float(case), 0.0, q, "thick-fluid", start=start, case=case.name))
+    records = Records.of(thresholds.measure(lab, {"thick-fluid": p}, Records(tuple(rows))))
+    assert any("points to no flow at which it ends" in each.reason for each in records.missing)
+    assert [m.value for m in records.select("thresholds", "folds")] == [1.0]  # an end is seen, and no smooth one
+
+
+def test_protocol_without_settled_states(lab):
+    rows = list(thresholds.measure(lab, SETS, Records()))
+    assert all(isinstance(row, Missing) for row in rows)
+    assert any("ends two-point rolling" in row.reason for row in rows)
+
+
+def test_a_range_that_another_threshold_may_end_is_not_held_against_the_tolerances_of_this_one():
+    p = P.replace(eta=0.99 * P.j)
+    row = measured("thresholds", "omega_01", analytic.thresholds(p).omega_01, 1e-9, p, "mine")
+    assert outcome_of("design-limit", row) is Outcome.CONFIRMED
+
+
+def run_of(time, y, theta):
+    return motion(HOPPING, time, y=y, theta=theta, omega_c=np.gradient(theta, time))
+
+
+def test_which_balls_hop():
+    """Those that come down again and again, but none that swings on the wall, sinks, or hardly leaves the floor."""
+    t = np.arange(0, 5, 1e-3)
+    hop = 4e-3 * np.abs(np.sin(12 * t))
+    assert all(hops(run_of(t, y, t)) for y in (hop, np.exp(-t) * hop))
+    assert not any(hops(run_of(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000))
+
+
+def test_tops_of_known_hops():
+    """Parabolas of one period and height: the tops come out between the samples."""
+    period, height = 0.2217, 4e-3
+    time = np.arange(0, 5, 1e-3)
+    phase = np.mod(time, period) / period - 0.5
+    run = run_of(time, height * (1 - 4 * phase**2), 57.0 * time)
+    tops = attractors.tops(run, 1.0, 4.0)
+    # The parabola through three samples is the hop itself.
+    assert tops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
+    assert tops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
+    assert max(value.uncertainty for value in tops.values.values()) < 1e-9
+    assert len(attractors.tops(run_of(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
+
+
+@pytest.mark.parametrize("size", [0.9, 1.05])
+def test_map_from_hop_to_hop(size):
+    """States that follow a linear map with a complex pair and a fast root: how they change, and what stays."""
+    cos, sin = size * math.cos(0.23), size * math.sin(0.23)
+    turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 0.03]])
+    mixed = np.array([[1, 0.3, 0.2], [0.1, 1, 0.4], [0.5, -0.2, 1]])
+    states, z = np.zeros((12, 8)), np.array([1e-3, 2e-3, 1e-3])
+    for state in states:
+        state[[0, 2, 3]] = np.array([5e-3, 57.0, -100.0]) + mixed @ z * np.array([0.05, 14.0, 31.0])
+        z = turn @ z
+    factor, steady = attractors.hop_map(states, HOPPING)
+    assert factor == pytest.approx(size, rel=1e-6)
+    assert steady == pytest.approx((5e-3, 0, 57.0, -100.0, 0, 0, 0, 0), rel=1e-6)
+
+
+def test_where_hopping_begins_and_ends():
+    """At no height; and where disturbances neither grow nor shrink."""
+    flows = (58.0, 56.0, 54.0)
+    curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
+    place = with_step_error(attractors.birth(flows, curved).value, attractors.birth(flows, straight))
+    assert place.value == pytest.approx(52.0, abs=1e-9)
+    assert 0 < place.uncertainty < 0.1
+    place = attractors.death([0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)])
+    assert (place.value, place.uncertainty) == pytest.approx((0.1, 5e-3))

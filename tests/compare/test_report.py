@@ -14,7 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from compare import gallery
-from compare.claim import Bearing, Claim, Outcome, Text, Verdict
+from compare.claim import Claim, Outcome, Text, Verdict
 from compare.commands import validate
 from compare.kit.drawing import Drawing, Evidence, GapError
 from compare.kit.levels import Level
@@ -23,41 +23,39 @@ from compare.kit.record import Check, Missing, Records
 from compare.report import report, results, wording
 from compare.report.results import Summary
 from model import Parameters, StorageError
-from tests.measured import measured
+from tests import measured as made
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 P = Parameters.named("reference")
 
 
-def claim(name: str, section: str = "Stationary states", **changes: Any) -> Claim:
-    bearing = Bearing(protocol="settled", quantity="omega_c", predict=lambda m: 1.0, by="analytic.solution")
-    given = {"source": f"Prop. {name}", "statement": f"What {name} states of slip & <roll>.", "bearings": (bearing,)}
-    return Claim(id=name, section=section, **(given | changes))
+def claim(name: str, **others: Any) -> Claim:
+    return made.claim(name, source=f"Prop. {name}", statement=f"What {name} states of slip & <roll>.", **others)
 
 
 def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple[Check, ...]:
     """Made-up numbers, each with the same tolerance, the k-th off by k parts of `deviation`."""
     conditions = {"case": "RR", "start": "a start with a name that is rather long", "y": 0.02, "v_y": 0.0}
     sets = [P.replace(omega_0=12.0 + k) for k in range(count)]
-    made = [measured("settled", "omega_c", 12.0, 1e-9, p, **conditions) for p in sets]
+    rows = [made.measured("settled", "omega_c", 12.0, 1e-9, p, **conditions) for p in sets]
     return tuple(
         Check(measurement=m, predicted=12.0 - deviation * (k + 1) / count, tolerance=tolerance, scale=12.0)
-        for k, m in enumerate(made)
+        for k, m in enumerate(rows)
     )
 
 
 VERDICTS = (
     Verdict(claim=claim("good"), outcome=Outcome.CONFIRMED, checks=checks(report.ROWS + 40)),
     Verdict(claim=claim("bad", text=Text.CORRECTED, reason="A sign."), outcome=Outcome.REFUTED, checks=checks(3, 1e-3)),
-    Verdict(claim=claim("coarse", "Stability"), outcome=Outcome.INCONCLUSIVE, checks=checks(2, 0.0, 1.0)),
+    Verdict(claim=claim("coarse", section="Stability"), outcome=Outcome.INCONCLUSIVE, checks=checks(2, 0.0, 1.0)),
     Verdict(
-        claim=claim("broken", "Stability"),
+        claim=claim("broken", section="Stability"),
         outcome=Outcome.ERROR,
         error="ValueError: diverged & <so> on",
         missing=(Missing("thresholds", "rough-wall", "no flow <at which> it slips"),),
     ),
     Verdict(claim=claim("doubted", expected=Outcome.REFUTED), outcome=Outcome.REFUTED, checks=checks(2, 1e-3)),
-    Verdict(claim=claim("deeper", "Laws and cases"), outcome=Outcome.NOT_RUN),
+    Verdict(claim=claim("deeper", section="Laws and cases"), outcome=Outcome.NOT_RUN),
 )
 RAN = [verdict for verdict in VERDICTS if verdict.outcome is not Outcome.NOT_RUN]
 

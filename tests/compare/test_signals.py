@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from compare.commands import signals
-from tests.commands import COMMANDS
+from tests.commands import COMMANDS, started
 
-ROOT = Path(__file__).parents[2]
 SIGNALS = signal.SIGINT, signal.SIGTERM
 BOTH = pytest.mark.parametrize("number", SIGNALS)
 LONG = {
@@ -63,20 +62,8 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
     """To all that belongs to it, as a terminal and a cluster send it, so many seconds after it first can answer."""
     here = Path(shutil.copytree(stocked, tmp_path / "here"))
     before = set(here.rglob("*"))
-    env = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}  # NiceGUI looks for it
-    env["PYTHONPATH"] = str(ROOT)
-    line = [sys.executable, "-m", "compare", command, *LONG.get(command, "").split()]
-    process = subprocess.Popen(
-        line,
-        cwd=here,
-        env=env,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        # a shell starts what it runs in the background with SIGINT ignored
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    line = command, *LONG.get(command, "").split()
+    process = started(*line, cwd=here, stderr=subprocess.PIPE, start_new_session=True)
     while not catches(process, signal.SIGTERM):
         time.sleep(0.001)
     time.sleep(after)
@@ -91,8 +78,7 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
         (said,) = (line for line in err.splitlines() if line.startswith("dualball"))
         assert "interrupted" in said or "was stopped at t =" in said
         if out and command not in ("simulate", "validate", "figures", "judge", "explore"):  # then it had just been done
-            whole = subprocess.run(line, cwd=here, env=env, capture_output=True, text=True, check=True).stdout
-            assert out.rstrip() == whole.rstrip()
+            assert out.rstrip() == started(*line, cwd=here).communicate()[0].rstrip()
     new = set(here.rglob("*")) - before
     assert not [path for path in new if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))]
 

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from compare import validation
-from compare.claim import Bearing, Claim, Outcome, Verdict
+from compare.claim import Bearing, Outcome, Verdict
 from compare.kit import programme
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
@@ -16,7 +16,7 @@ from compare.kit.record import Check, Missing, Records
 from compare.report import results
 from model import Parameters, StorageError
 from tests.commands import carried_out
-from tests.measured import measured
+from tests.measured import claim, measured
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("reference").replace(c=0.0)}
@@ -39,9 +39,8 @@ def broken(lab, sets, records):
     yield
 
 
-def claim(name, protocol):
-    bearing = Bearing(protocol=protocol, quantity="omega_c", predict=lambda m: m.parameters.omega_0)
-    return Claim(id=name, section="Stationary states", source="(1)", statement="So it is.", bearings=(bearing,))
+def about(protocol):
+    return claim(f"of-{protocol}", Bearing(protocol, "omega_c", lambda m: m.parameters.omega_0))
 
 
 MEASURED = {"round": going_round, "broken": broken, "next": going_round, "after": after}
@@ -62,7 +61,7 @@ def counted(monkeypatch):
 
     protocols = [counting(*each) for each in MEASURED.items()]
     monkeypatch.setattr(validation, "PROTOCOLS", tuple(protocols))
-    monkeypatch.setattr(validation, "CLAIMS", tuple(claim(f"of-{p.name}", p.name) for p in protocols))
+    monkeypatch.setattr(validation, "CLAIMS", tuple(about(p.name) for p in protocols))
     return done
 
 
@@ -126,7 +125,7 @@ def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
         yield from ()
 
     monkeypatch.setattr(validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("waiting", waiting)))
-    monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, claim("of-waiting", "waiting")))
+    monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, about("waiting")))
     assert run(tmp_path, announce=announce)[-1].outcome == "not run"
     assert set(seen) == {each.id for each in validation.CLAIMS}
     assert seen[0] != "of-waiting"
@@ -186,7 +185,7 @@ def test_the_command_line(command, tmp_path, counted, capsys):
 def test_what_a_set_of_ones_own_is_too_rough_for_is_no_failure(of, outcome, code, monkeypatch, tmp_path, capsys):
     row = measured("round", "omega_c", 12.0, 1.0, set=of)
     check = Check(measurement=row, predicted=12.0, tolerance=1.0, scale=12.0)
-    found = Verdict(claim=claim("of-round", "round"), outcome=outcome, checks=(check,))
+    found = Verdict(claim=about("round"), outcome=outcome, checks=(check,))
     monkeypatch.setattr(validation, "judge_stored", lambda *_: [found])
     ended, said, _ = carried_out(capsys, f"judge {tmp_path}")
     assert ended == code

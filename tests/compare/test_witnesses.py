@@ -1,29 +1,21 @@
 """What other engines say is judged in limits of no step that contain the truth, of all that they were asked."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from compare.claim import Bearing, Claim, Outcome
+from compare.claim import Bearing, Outcome
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
 from compare.witnesses import CEILING, COARSEST, _limit_of_no_step, extrapolated, full_verdict
 from model import Parameters
-from tests.measured import measured
+from tests.measured import claim, measured
 
 P = Parameters.named("reference")
 RATIOS = 1 / np.array([1.0, 2.0, 3.0, 4.0])
 STEPS = RATIOS / 20
-CLAIM = Claim(
-    id="it",
-    section="Stationary states",
-    source="(1)",
-    statement="It goes round.",
-    bearings=(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: m.parameters.omega_0),),
-)
 
 
 def seen(error, **conditions):
@@ -31,9 +23,9 @@ def seen(error, **conditions):
     return Records((measured("settled", "omega_c", P.omega_0 * (1 + error), 1e-12, P, "mine", **conditions),))
 
 
-def said(steps, trial=None, claim=CLAIM, witness="mujoco-plain"):
+def said(steps, trial=None, of=None, witness="mujoco-plain"):
     """What a witness says by its measurements at steps that are so many times shorter, beside the engine on trial."""
-    return full_verdict(claim, {"mujoco": {1: trial or seen(0.0)}, witness: steps}).witnesses[1]
+    return full_verdict(of or claim(), {"mujoco": {1: trial or seen(0.0)}, witness: steps}).witnesses[1]
 
 
 SERIES = (
@@ -161,10 +153,10 @@ def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
 def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost, outcome):
     """The engine on trial has a count and a flow on three sets, the witness all counts, but not all flows."""
     flow = Bearing("thresholds", "omega_03", lambda m: m.parameters.omega_0)
-    claim = replace(CLAIM, bearings=(Bearing("thresholds", "lifts", lambda m: 1.0), flow))
+    of = claim("it", Bearing("thresholds", "lifts", lambda m: 1.0), flow)
     sets = ("one", "another", "third")
     counts = tuple(measured("thresholds", "lifts", 1.0, 0.0, P, name) for name in sets)
     flows = tuple(measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)
     own = Records(counts + flows[lost:])
-    assert said(dict.fromkeys((1, 2, 3), own), Records(counts + flows), claim).outcome is outcome
-    assert full_verdict(claim, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN  # counts confirm no number
+    assert said(dict.fromkeys((1, 2, 3), own), Records(counts + flows), of).outcome is outcome
+    assert full_verdict(of, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN  # counts confirm no number
