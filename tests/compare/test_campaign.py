@@ -1,14 +1,20 @@
-"""A campaign's results depend on nothing but its tasks, and nothing that is done is done again or lost."""
+"""A campaign's results depend on nothing but its tasks, and nothing that is done is done again or lost.
+
+A directory has one program at a time that fills it, and a run that is taken up again gives the bits of a whole one.
+"""
 
 import functools
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,12 +22,14 @@ import pytest
 from compare.commands import cli
 from compare.kit import collection
 from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
+from compare.kit.journal import Journal
+from compare.kit.lock import Lock
 from compare.kit.tasks import Task
 from compare.kit.workers import Workers, _without_signals, dask, processes
-from mjsim import ContactSettings
+from mjsim import ContactSettings, Run
 from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
-from tests.commands import started
+from tests.commands import refused, started, told
 
 REST = (0.0,) * 8
 P = Parameters.named("reference")
@@ -328,3 +336,106 @@ def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_p
     assert len(data(tmp_path)) == 16
     assert kept.items() <= written(tmp_path).items()
     assert not list(tmp_path.glob(".*"))
+
+
+def test_a_second_program_is_refused_until_the_first_is_dead(tmp_path, capsys):
+    line, first = f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch", Lock(tmp_path)
+    said = refused(capsys, f"{line} 2")
+    assert re.search(
+        rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it, or choose", said
+    )
+    assert [path.name for path in tmp_path.iterdir()] == [".lock"]
+    first._file.close()  # as when a process is killed
+    for batch in (2, 3):  # the second time there is nothing left to do
+        told(capsys, f"{line} {batch}")
+    assert collection.collect(tmp_path, tmp_path / "all.h5") == 4
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_a_lock_of_a_machine_that_is_gone_is_nobodys(tmp_path):
+    for left in ("process 1 on elsewhere, since 2001-01-01 00:00 UTC", ""):
+        (tmp_path / ".lock").write_text(left)
+        with Campaign(tmp_path, workers=0):
+            assert "process 1 on elsewhere" not in (tmp_path / ".lock").read_text()
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_failed_campaign_lets_go(tmp_path):
+    with pytest.raises(ZeroDivisionError), Campaign(tmp_path, workers=0):
+        raise ZeroDivisionError
+    Lock(tmp_path).release()
+
+
+def take_and_let_go(where, rounds, name):
+    """As fast as it can: who has the lock writes its name, and finds it unchanged."""
+    held = where / "log" / "held"
+    while rounds:
+        try:
+            lock = Lock(where)
+        except StorageError:
+            continue
+        held.write_text(name)
+        time.sleep(1e-4)
+        assert held.read_text() == name
+        held.unlink()
+        lock.release()
+        rounds -= 1
+
+
+@pytest.mark.parametrize("rounds", [20, pytest.param(400, marks=pytest.mark.slow)])
+def test_no_two_have_it_at_once(tmp_path, rounds):
+    """Threads, of which each opens the file by itself, as programs do."""
+    (tmp_path / "log").mkdir()
+    with ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(functools.partial(take_and_let_go, tmp_path, rounds), "abc")) == [None] * 3
+
+
+def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
+    def none(*_):
+        raise OSError(38, "Function not implemented")
+
+    monkeypatch.setattr("compare.kit.lock.fcntl.flock", none)
+    Lock(tmp_path).release()
+    said = f"dualball: {tmp_path} can't be locked (Function not implemented): start no second program there\n"
+    assert capsys.readouterr().err == said
+    with pytest.raises(StorageError, match="cannot write to"):
+        Lock(tmp_path / "absent")
+
+
+SLIPPING = P.replace(omega_0=25.0)
+SETTINGS = {"joints": ContactSettings.at(2.5e-4), "free": ContactSettings.rigid_at(2.5e-4)}
+
+
+def samples(directory: Path, settings: ContactSettings, blocks: int | None = None) -> np.ndarray:
+    """Spin-up from rest through rolling into slipping, about four blocks of samples: those so far."""
+    journal = Journal(directory, interval=0.0)
+    earlier, state = journal.recall()
+    seen, run = list(earlier), Run(SLIPPING, np.zeros(8), 4.5, settings=settings, sample_interval=5e-3, state=state)
+    for block in islice(run, blocks):
+        journal.note(block, run.state())
+        seen.append(block)
+    return np.concatenate(seen) if seen else np.empty(0)
+
+
+@pytest.fixture(scope="module")
+def whole() -> dict[str, np.ndarray]:
+    return {
+        name: np.concatenate(list(Run(SLIPPING, np.zeros(8), 4.5, settings=settings, sample_interval=5e-3)))
+        for name, settings in SETTINGS.items()
+    }
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("blocks", [0, 1, 3])
+def test_taken_up_after_some_blocks(tmp_path: Path, whole: dict[str, np.ndarray], blocks: int, name: str) -> None:
+    assert len(samples(tmp_path / "journal", SETTINGS[name], blocks)) < len(whole[name])
+    np.testing.assert_array_equal(samples(tmp_path / "journal", SETTINGS[name]), whole[name])
+
+
+def test_a_damaged_journal_says_what_to_do(tmp_path: Path) -> None:
+    samples(tmp_path / "journal", SETTINGS["joints"], 2)
+    (tmp_path / "journal" / "000000.h5").write_bytes(b"no HDF5")
+    with pytest.raises(StorageError, match=r"remove .*journal to start anew"):
+        samples(tmp_path / "journal", SETTINGS["joints"])
+    Journal(tmp_path / "journal").discard()
+    assert not (tmp_path / "journal").exists()

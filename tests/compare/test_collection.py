@@ -1,4 +1,4 @@
-"""A collection has varied parameters as coordinates, and names what can't be gathered."""
+"""What was measured comes back from its files; collections have what varies as coordinates, and name what they lack."""
 
 import dataclasses
 import json
@@ -10,12 +10,14 @@ import pytest
 import xarray
 
 import analytic
-from compare.kit import collection
+from compare.kit import collection, record
 from compare.kit.campaign import Campaign
+from compare.kit.record import Missing, Records
 from compare.kit.tasks import Task
-from model import Parameters, StorageError, storage
+from model import InputError, Parameters, StorageError, storage
 from model.hdf5 import column, dataset, reading
 from tests.commands import refused, told
+from tests.measured import measured
 
 P = Parameters.named("reference")
 OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
@@ -162,3 +164,31 @@ def test_a_sweep_is_sampled_as_often_as_asked(tmp_path, capsys):
     told(capsys, f"{sweep} 0.05")
     (file,) = (tmp_path / "s").glob("*.h5")
     assert {len(run.time) for run in storage.load_runs(file).values()} == {5}
+
+
+BLUNT = P.replace(drag="quadratic", nu_f=1e-6, C_D=0.5, density_ratio=0.125)
+MEASURED = (
+    dataclasses.replace(measured("settled", "omega_c", 11.9, 1e-9, case="RR"), runs=("runs/a.h5", "runs/b.h5")),
+    measured("settled", "force_Ay", 0.1, case="SS", y=0.25),
+    measured("settled", "case", 4),
+    measured("settled", "slip_x", np.float64(0.1), 1e-9, BLUNT, mode=1),
+)
+
+
+@pytest.mark.parametrize("rows", [MEASURED, ()])
+def test_a_file_gives_back_what_was_saved(rows, tmp_path):
+    path, records = tmp_path / "settled.h5", Records(rows, (Missing("settled", "reference", "it never settles"),))
+    record.save(records, path, {"level": "QUICK"})
+    assert record.load(path) == records
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        table = data.to_dataframe()
+    assert list(table.quantity) == [m.quantity for m in rows]
+    assert list(table.omega_0) == [P.omega_0] * len(rows)
+    assert [table.unit[1], np.isnan(table.at_y[0])] == ["N", True] if rows else table.empty
+
+
+def test_a_missing_file_is_named_and_an_unknown_quantity_refused(tmp_path):
+    with pytest.raises(StorageError, match="no such file"):
+        record.load(tmp_path / "nothing.h5")
+    with pytest.raises(InputError, match="omega_c"):
+        measured("settled", "omega_d", 1.0)

@@ -1,19 +1,30 @@
-"""Any engine makes a trajectory of the ball in the vessel: the same task in, the same trajectory out."""
+"""Other engines, as far as they are installed, reach their order with a free body, and make trajectories in the vessel.
+
+The same task in, the same trajectory out; what can't be had, ends, hangs or gives no numbers is said in a line.
+"""
 
 import sys
+from contextlib import closing
 
 import numpy as np
 import pytest
 
 import analytic
+from compare.adapters import siconos
+from compare.adapters.scene import upright
+from compare.adapters.vessel import Settings, Vessel
+from compare.bench import cases, run
+from compare.bench.case import TOLERANCE
+from compare.bench.runner import EngineProcess
 from compare.kit.engines import ENGINES
 from compare.kit.tasks import Task, carry_out, store
 from docs.studies.states import LANDING, STATES
-from model import InputError, Parameters, State
+from model import Flow, InputError, Parameters, State
 from model.drag import LAWS
-from model.kinematics import to_world
+from model.kinematics import rotated, to_world
 from tests.commands import refused, told
 from tests.drag_laws import resistance
+from tests.exact_cases import CASES
 
 # Drake loads IPython, which leaves files open.
 pytestmark = [
@@ -21,7 +32,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
 
-REFERENCE = Parameters.named("reference")
+P = Parameters.named("reference")
 
 
 def engines(*names):
@@ -40,7 +51,7 @@ def task_of(name, p, x0, t_end, step, interval=None):
     return Task(engine=name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval or step)
 
 
-def run(*given, **more):
+def simulated(*given, **more):
     (trajectory,) = carry_out([task_of(*given, **more)])
     return trajectory
 
@@ -50,7 +61,7 @@ def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
     """By the same rule, before anything is written, and whether or not the engine is installed."""
     words = r"timestep = 0\.5 s is out of range: must be <= 0\.0357 s, half of sqrt\(R/g\), the shortest time of"
     with pytest.raises(InputError, match=words):
-        store(task_of(name, REFERENCE, State(), 1.0, 0.5), tmp_path / "run.h5")
+        store(task_of(name, P, State(), 1.0, 0.5), tmp_path / "run.h5")
     assert not list(tmp_path.iterdir())
 
 
@@ -65,7 +76,7 @@ def test_errors_of_a_stationary_state_fall_with_the_step(name):
     p, x, truth = state.p, state.solution.x, state.solution
     errors = []
     for step in (4e-3, 2e-3):
-        seen = run(name, p, x, 10.0, step, interval=1.0)
+        seen = simulated(name, p, x, 10.0, step, interval=1.0)
         assert seen.complete
         assert seen.cases[-1] is state.case
         forces = np.concatenate([seen.force_A[-1] - truth.force_A, seen.force_B[-1] - truth.force_B])
@@ -77,15 +88,15 @@ def test_errors_of_a_stationary_state_fall_with_the_step(name):
 @engines(*TOLD)
 def test_a_ball_lands_slips_and_sticks_when_it_should(name):
     step, x0 = 1e-3, LANDING.x0
-    truth = analytic.simulate(REFERENCE, x0, 0.3)
-    seen = run(name, REFERENCE, x0, 0.3, step)
+    truth = analytic.simulate(P, x0, 0.3)
+    seen = simulated(name, P, x0, 0.3, step)
     assert seen.events.to_case.tolist() == truth.events.to_case.tolist()
     assert abs(seen.events.time[0] - truth.events.time[0]) < 2 * step
 
 
 @engines("rapier", "sapien")
 def test_cases_are_told_by_gaps_and_slip_where_forces_are_not_known(name):
-    seen = run(name, REFERENCE, LANDING.x0, 0.5, 1e-3)
+    seen = simulated(name, P, LANDING.x0, 0.5, 1e-3)
     assert np.isnan(seen.force_A).all()
     assert np.isnan(seen.force_B).all()
     assert seen.header.settings["cases_by"] == "gaps and slip"
@@ -96,9 +107,9 @@ def test_cases_are_told_by_gaps_and_slip_where_forces_are_not_known(name):
 @engines(*ALL)
 @pytest.mark.parametrize("law", LAWS)
 def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
-    p = REFERENCE.replace(drag=law, nu_f=1e-5, omega_0=12.0, c=0.3)
+    p = P.replace(drag=law, nu_f=1e-5, omega_0=12.0, c=0.3)
     x0, lasts, step = (0.02, 0.3, 4.0, 1.0, -2.0, 3.0, 0.02, -0.1), 0.05, 1e-4
-    truth, seen = analytic.simulate(p, x0, lasts), run(name, p, x0, lasts, step)
+    truth, seen = analytic.simulate(p, x0, lasts), simulated(name, p, x0, lasts, step)
     assert seen.time[-1] == pytest.approx(lasts)
     assert {case.name for case in seen.cases} == {"NN"}
     # The step is of first order: a speed lacks up to what a step of the largest acceleration gives.
@@ -112,7 +123,7 @@ def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
 
 @engines(*NEWCOMERS)
 def test_a_newcomer_goes_round_and_round(name):
-    seen = run(name, REFERENCE.replace(omega_0=12.0), (0, 0, 11.0, 0, 0, 0), 2.0, 2e-3, interval=0.02)
+    seen = simulated(name, P.replace(omega_0=12.0), (0, 0, 11.0, 0, 0, 0), 2.0, 2e-3, interval=0.02)
     assert seen.complete
     assert np.all(np.diff(seen.theta) > 0)  # the azimuth isn't wrapped
     assert seen.theta[-1] == pytest.approx(np.trapezoid(seen.omega_c, seen.time), rel=0.02)
@@ -120,9 +131,9 @@ def test_a_newcomer_goes_round_and_round(name):
 
 @engines(*BEST)
 def test_a_ball_may_cross_the_axis(name):
-    seen = run(name, REFERENCE, (0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 3.0), 0.03, 1e-3)
+    seen = simulated(name, P, (0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 3.0), 0.03, 1e-3)
     assert seen.complete
-    assert seen.h.max() > 0.9 * REFERENCE.R
+    assert seen.h.max() > 0.9 * P.R
     assert seen.h[-1] < seen.h.max() - 0.01
 
 
@@ -131,7 +142,7 @@ def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name, monkeypatch):
     import compare.adapters.drake as adapter
 
     monkeypatch.setattr(adapter, "STIFFNESS", 1e12)
-    seen = run(name, REFERENCE.replace(omega_0=25.0), State(), 8.0, 4e-3)
+    seen = simulated(name, P.replace(omega_0=25.0), State(), 8.0, 4e-3)
     assert "could not go on (MultibodyPlant's discrete update solver failed to converge" in seen.header.failure
     assert 0 < len(seen.time) < 2000
 
@@ -150,3 +161,114 @@ def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
     for words in ("--engine drake", ""):
         assert told(capsys, f"validate {words} --workers 0 --json") == "[]"
     assert asked == [ENGINES["drake"], None]
+
+
+OWN = "compare.adapters"
+
+
+@pytest.mark.parametrize("name", ["dart", "drake", "pybullet", "rapier", "sapien"])
+def test_an_engine_reaches_its_order(name):
+    """Semi-implicit steps are leapfrog where a sphere slides; a block that friction can hold rests."""
+    pytest.importorskip(f"{OWN}.{name}")
+    steps = {"sphere-slips-down": None, "block-rests": None, "cylinder": (4e-3, 2e-3)}
+    with closing(EngineProcess(f"{OWN}.{name}:best")) as trial:
+        falls, rests, turns = (trial.result(CASES[case], those) for case, those in steps.items())
+    assert falls.error < 2e-3  # substeps of Rapier, and single precision
+    assert rests.passed
+    assert turns.error < 2e-4 or turns.engine.precision == "f32"  # a wall that moves along is a cylinder to (omega h)^2
+    assert turns.error < 5e-3
+    assert run(CASES["lands"], f"{OWN}.{name}:defaults", steps=(2e-3,)).error < 2
+
+
+@pytest.fixture(scope="module")
+def mujoco():
+    with closing(EngineProcess(f"{OWN}.mujoco_free:best")) as trial:
+        yield trial
+
+
+def test_under_coulombs_law_mujoco_is_right_in_every_case(mujoco):
+    """At 2 ms by half of what passes at 1 ms."""
+    for case in cases():
+        assert mujoco.result(case, (2e-3,)).error < TOLERANCE / 2, case.name
+
+
+def test_what_spins_and_rolls_has_second_order(mujoco):
+    """A disc on its rim, whose gyroscopic moments are as large as those of its contact (1.6e-2 without these)."""
+    coarse, fine = mujoco.result(CASES["rolling-disc"], (4e-3, 2e-3)).errors
+    assert coarse < 1e-3
+    assert coarse / fine > 3.5
+
+
+def test_landings_are_late_by_a_part_of_a_step(mujoco):
+    """A blow that lifts the ball off its floor: else gravity has it for up to a step and a half before, 2e-2."""
+    assert max(mujoco.result(CASES["hits-the-wall"], (1.09e-3, 1e-3, 0.93e-3)).errors) < 2.5e-3
+
+
+@pytest.mark.slow  # they compile for minutes where they haven't run before
+@pytest.mark.parametrize("engine", ["newton:xpbd", "mujoco_warp:best"])
+def test_engines_on_warp(engine):
+    pytest.importorskip("warp")
+    assert run(CASES["sphere-slips-down"], f"{OWN}.{engine}", steps=(2e-3,), limit=600).passed
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])
+def test_turns(normal):
+    assert rotated(np.array(upright(normal)), np.array([0, 0, 1])) == pytest.approx(normal)
+
+
+@pytest.fixture
+def elsewhere(monkeypatch):
+    """No Siconos wherever this machine may have one."""
+    siconos.locate.cache_clear()
+    monkeypatch.delenv("DUALBALL_SICONOS_PYTHON", raising=False)
+    monkeypatch.setattr(siconos.shutil, "which", lambda *_, **__: None)
+    yield monkeypatch
+    siconos.locate.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("named", "says"),
+    [
+        (None, "siconos is not installed: on Debian or Ubuntu, apt-get install python3-siconos"),
+        ("absent", "siconos is not installed for absent, which DUALBALL_SICONOS_PYTHON names"),
+    ],
+)
+def test_where_it_is_missing_the_program_says_what_to_do(named, says, elsewhere, capsys):
+    if named:
+        elsewhere.setenv("DUALBALL_SICONOS_PYTHON", named)
+    assert ENGINES["siconos"].missing == says
+    assert ENGINES["siconos"].versions["siconos"] == "not installed"
+    assert refused(capsys, "simulate --engine siconos --time 0.05") == f"dualball: error: {says}\n"
+
+
+def test_a_python_without_its_libraries_is_the_person_s_error(monkeypatch):
+    monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
+    with pytest.raises(InputError, match=r"siconos ended \(ModuleNotFoundError: No module named 'siconos"):
+        siconos.best.build(Vessel.of(P, State(), Flow.steady(1.0)), 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("program", "says"),
+    [
+        ("import os; os.abort()", "ended (exit code -6)"),
+        ("raise ValueError('too much')", "ended (ValueError: too much)"),
+        ("""print('{"error": "RuntimeError: singular"}')""", "could not go on (RuntimeError: singular)"),
+        ("import time; time.sleep(60)", "gave no answer for 2 s"),
+        ("for _ in range(3): print(STATE, flush=True), input(), print([], flush=True), input()", "diverged"),
+    ],
+)
+def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monkeypatch):
+    """Whatever it does in the first step; it is gone after that."""
+    script, started, popen = tmp_path / "program.py", [], siconos.subprocess.Popen
+    state = "STATE = '[[0, NaN, 0], [0, 0, 0], [0, 0, 0]]'"
+    script.write_text(f"{state}\nfor _ in range(2):\n    input()\n    print('null', flush=True)\ninput()\n{program}\n")
+    monkeypatch.setattr(siconos, "PROGRAM", script)
+    monkeypatch.setattr(siconos, "PATIENCE", 2)  # a loaded machine takes half a second to begin
+    monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
+    monkeypatch.setattr(siconos.subprocess, "Popen", lambda *a, **b: started.append(popen(*a, **b)) or started[-1])
+    task = Task(engine="siconos", parameters=P, x0=(0.0,) * 6, t_end=0.01, settings=Settings())
+    (run,) = carry_out([task])
+    assert run.header.failure.startswith(says)
+    assert run.header.versions["siconos"] == "4.4.0"
+    assert not run.complete
+    assert all(each.returncode is not None for each in started)

@@ -1,4 +1,4 @@
-"""A verdict is computed from the numbers, and can be lost in every way."""
+"""A verdict is computed from the numbers, and can be lost in every way; what bears on claims is listed whole."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from dataclasses import replace
 import pytest
 
 from compare import validation
+from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Bearing, Claim, Outcome, Text
 from compare.judge import judge, select, theory
+from compare.kit.levels import ASSIGNMENTS, Level, sets
 from compare.kit.quantities import quantity
 from compare.kit.record import Missing, Records, Relation
 from compare.kit.statistics import COVERAGE, Measured
@@ -131,3 +133,26 @@ def test_judging_a_claim_takes_no_longer_than_it_may(monkeypatch):
     told = validation._in_time(endless, {"mujoco": {1: measured(P.omega_0, FINE)}})
     assert (told.outcome, told.error) == (Outcome.ERROR, "it took longer than 0.1 s")
     time.sleep(0.3)  # the clock has stopped
+
+
+NAMES = {protocol.name for protocol in PROTOCOLS}
+
+
+def test_names_are_unique():
+    assert len(NAMES) == len(PROTOCOLS)
+    assert len({claim.id for claim in CLAIMS}) == len(CLAIMS)
+
+
+def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols():
+    assert {name for claim in CLAIMS for name in claim.protocols} == NAMES
+
+
+def test_the_table_of_who_measures_what_lists_every_protocol():
+    assert ASSIGNMENTS.keys() == NAMES
+    asked = {name for each in ASSIGNMENTS.values() for name in (*each.quick, *each.limit, *each.as_it_comes)}
+    assert asked <= sets(Level.QUICK).keys()
+
+
+def test_what_is_corrected_or_expected_to_fail_says_why():
+    said = [claim for claim in CLAIMS if claim.text is Text.CORRECTED or claim.expected != "confirmed"]
+    assert all(claim.reason for claim in said)

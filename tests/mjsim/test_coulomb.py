@@ -1,7 +1,7 @@
 """Coulomb's law in any MuJoCo model: what sticks does not creep, what slides does not lift, what lands does not bounce.
 
 Closed forms are of one rigid body. MuJoCo's step is of first order: what moves is wrong by h/2 times its speed.
-That rigid contacts roll, turn, land and bounce as they should exact cases show, in tests/compare/test_adapters.py.
+That rigid contacts roll, turn, land and bounce as they should exact cases show, in tests/compare/test_engines.py.
 """
 
 import math
