@@ -3,7 +3,9 @@
 A directory has one program at a time that fills it, and a run that is taken up again gives the bits of a whole one.
 """
 
+import contextlib
 import functools
+import itertools
 import json
 import math
 import os
@@ -13,8 +15,6 @@ import subprocess
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -138,10 +138,9 @@ def test_runs_that_nobody_looks_at_are_not_handed_out(tmp_path):
     assert len({file for _, file, _ in ended}) == 1
 
 
-DAMAGES = [lambda content: content[:-100], lambda content: content[:4000] + bytes([content[4000] ^ 1]) + content[4001:]]
-
-
-@pytest.mark.parametrize("damage", DAMAGES, ids=["cut", "edited"])
+@pytest.mark.parametrize(
+    "damage", [lambda whole: whole[:-100], lambda whole: whole[:4000] + bytes([whole[4000] ^ 1]) + whole[4001:]]
+)
 def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path, undisturbed, capsys, damage):
     completed(tmp_path, batch=3)
     path = min(tmp_path.iterdir())
@@ -340,10 +339,8 @@ def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_p
 
 def test_a_second_program_is_refused_until_the_first_is_dead(tmp_path, capsys):
     line, first = f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch", Lock(tmp_path)
-    said = refused(capsys, f"{line} 2")
-    assert re.search(
-        rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it, or choose", said
-    )
+    in_use = rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it, or choose"
+    assert re.search(in_use, refused(capsys, f"{line} 2"))
     assert [path.name for path in tmp_path.iterdir()] == [".lock"]
     first._file.close()  # as when a process is killed
     for batch in (2, 3):  # the second time there is nothing left to do
@@ -366,28 +363,26 @@ def test_a_failed_campaign_lets_go(tmp_path):
     Lock(tmp_path).release()
 
 
-def take_and_let_go(where, rounds, name):
-    """As fast as it can: who has the lock writes its name, and finds it unchanged."""
-    held = where / "log" / "held"
-    while rounds:
-        try:
-            lock = Lock(where)
-        except StorageError:
-            continue
-        held.write_text(name)
-        time.sleep(1e-4)
-        assert held.read_text() == name
-        held.unlink()
-        lock.release()
-        rounds -= 1
-
-
 @pytest.mark.parametrize("rounds", [20, pytest.param(400, marks=pytest.mark.slow)])
-def test_no_two_have_it_at_once(tmp_path, rounds):
-    """Threads, of which each opens the file by itself, as programs do."""
+def test_no_two_have_a_lock_at_once(tmp_path, rounds):
+    """Threads, of which each opens the file by itself, as programs do: who has it writes a name, and finds that."""
     (tmp_path / "log").mkdir()
+    held = tmp_path / "log" / "held"
+
+    def take_and_let_go(name):
+        left = rounds
+        while left:
+            with contextlib.suppress(StorageError):
+                lock = Lock(tmp_path)
+                held.write_text(name)
+                time.sleep(1e-4)
+                assert held.read_text() == name
+                held.unlink()
+                lock.release()
+                left -= 1
+
     with ThreadPoolExecutor(3) as pool:
-        assert list(pool.map(functools.partial(take_and_let_go, tmp_path, rounds), "abc")) == [None] * 3
+        assert list(pool.map(take_and_let_go, "abc")) == [None] * 3
 
 
 def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
@@ -402,40 +397,37 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
         Lock(tmp_path / "absent")
 
 
-SLIPPING = P.replace(omega_0=25.0)
-SETTINGS = {"joints": ContactSettings.at(2.5e-4), "free": ContactSettings.rigid_at(2.5e-4)}
+ON_JOINTS, FREE = ContactSettings.at(2.5e-4), ContactSettings.rigid_at(2.5e-4)
 
 
-def samples(directory: Path, settings: ContactSettings, blocks: int | None = None) -> np.ndarray:
-    """Spin-up from rest through rolling into slipping, about four blocks of samples: those so far."""
+def run_of(settings, state=None):
+    """Spin-up from rest through rolling into slipping, about four blocks of samples."""
+    return Run(P.replace(omega_0=25.0), np.zeros(8), 4.5, settings=settings, sample_interval=5e-3, state=state)
+
+
+def taken_up(directory, settings, blocks=None):
+    """Samples so far of a run that goes on for so many blocks from where its journal ends."""
     journal = Journal(directory, interval=0.0)
     earlier, state = journal.recall()
-    seen, run = list(earlier), Run(SLIPPING, np.zeros(8), 4.5, settings=settings, sample_interval=5e-3, state=state)
-    for block in islice(run, blocks):
+    seen, run = list(earlier), run_of(settings, state)
+    for block in itertools.islice(run, blocks):
         journal.note(block, run.state())
         seen.append(block)
     return np.concatenate(seen) if seen else np.empty(0)
 
 
-@pytest.fixture(scope="module")
-def whole() -> dict[str, np.ndarray]:
-    return {
-        name: np.concatenate(list(Run(SLIPPING, np.zeros(8), 4.5, settings=settings, sample_interval=5e-3)))
-        for name, settings in SETTINGS.items()
-    }
+@pytest.mark.parametrize("settings", [ON_JOINTS, FREE])
+def test_a_run_that_is_taken_up_has_the_bits_of_a_whole_one(tmp_path, settings):
+    whole = np.concatenate(list(run_of(settings)))
+    for blocks in (0, 1, 3):
+        assert len(taken_up(tmp_path / f"{blocks}", settings, blocks)) < len(whole)
+        np.testing.assert_array_equal(taken_up(tmp_path / f"{blocks}", settings), whole)
 
 
-@pytest.mark.parametrize("name", SETTINGS)
-@pytest.mark.parametrize("blocks", [0, 1, 3])
-def test_taken_up_after_some_blocks(tmp_path: Path, whole: dict[str, np.ndarray], blocks: int, name: str) -> None:
-    assert len(samples(tmp_path / "journal", SETTINGS[name], blocks)) < len(whole[name])
-    np.testing.assert_array_equal(samples(tmp_path / "journal", SETTINGS[name]), whole[name])
-
-
-def test_a_damaged_journal_says_what_to_do(tmp_path: Path) -> None:
-    samples(tmp_path / "journal", SETTINGS["joints"], 2)
-    (tmp_path / "journal" / "000000.h5").write_bytes(b"no HDF5")
+def test_a_damaged_journal_says_what_to_do(tmp_path):
+    taken_up(journal := tmp_path / "journal", FREE, 2)
+    (journal / "000000.h5").write_bytes(b"no HDF5")
     with pytest.raises(StorageError, match=r"remove .*journal to start anew"):
-        samples(tmp_path / "journal", SETTINGS["joints"])
-    Journal(tmp_path / "journal").discard()
-    assert not (tmp_path / "journal").exists()
+        taken_up(journal, FREE)
+    Journal(journal).discard()
+    assert not journal.exists()

@@ -74,24 +74,29 @@ def test_the_uncertainty_of_a_limit_covers_the_truth():
 
 
 @pytest.mark.parametrize(
-    ("left", "outcome"), [(0.0, Outcome.CONFIRMED), (0.05, Outcome.REFUTED)], ids=["vanishes", "stays"]
+    ("left", "least", "steps", "near", "outcome"),
+    [
+        (0.0, 0.01, 4, 0.9, Outcome.CONFIRMED),
+        (0.05, 0.01, 4, 0.9, Outcome.REFUTED),
+        # Next to a threshold the step decides on the case, and all of a state in the wrong case would be off.
+        (0.05, 0.01, 4, 0.99, Outcome.INCONCLUSIVE),
+        # Three steps show a limit to a tenth of what extrapolation takes away, 3.3e-6; with four the lesser is noticed.
+        (5e-7, 1e-5, 3, 0.9, Outcome.CONFIRMED),
+        (5e-7, 1e-5, 4, 0.9, Outcome.REFUTED),
+        (5e-6, 1e-5, 3, 0.9, Outcome.REFUTED),
+    ],
 )
-def test_a_claim_is_judged_in_the_limit_of_no_step(left, outcome):
+def test_a_claim_is_judged_in_the_limit_of_no_step(left, least, steps, near, outcome):
     """States that differ a little with the step are the same state; at 2 ms it is off by what users see."""
-    plain = said({n: seen(left + 0.01 / n, slip_x=1.0 + 0.05 / n) for n in (1, 2, 3, 4)})
-    assert (plain.outcome, plain.left_out) == (outcome, 0)
-    assert plain.order == pytest.approx(1.0, abs=1e-6)
-    assert plain.typical == plain.worst == pytest.approx(left + 0.005)
-    (check,) = plain.checks
-    resolves = quantity("omega_c").resolves
-    assert check.ceiling == max(resolves, min(CEILING * resolves, COARSEST))
-
-
-@pytest.mark.parametrize(("left", "outcome"), [(5e-7, Outcome.CONFIRMED), (5e-6, Outcome.REFUTED)])
-def test_three_steps_show_a_limit_to_a_share_of_what_extrapolation_takes_away(left, outcome):
-    """Of 3.3e-6, with a standard uncertainty of a tenth; with four steps the lesser one is noticed, too."""
-    three, four = ({n: seen(left + 1e-5 / n) for n in range(1, most)} for most in (4, 5))
-    assert [said(three).outcome, said(four).outcome] == [outcome, Outcome.REFUTED]
+    end = Records((measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine"),))
+    errors = {n: seen(left + least / n, slip_x=1.0 + 0.05 / n) for n in range(1, steps + 1)}
+    plain = said(errors, seen(0.0) + end)
+    assert plain.outcome is outcome
+    for check in plain.checks:
+        assert (plain.left_out, plain.order) == (0, pytest.approx(1.0, abs=1e-6))
+        assert plain.typical == plain.worst == pytest.approx(left + least / 2)
+        resolves = quantity("omega_c").resolves
+        assert check.ceiling == max(resolves, min(CEILING * resolves, COARSEST))
 
 
 @pytest.mark.parametrize(
@@ -103,13 +108,6 @@ def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
     checks = [Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places]
     limit = _limit_of_no_step(list(zip((2, 3, 4), checks, strict=True)))
     assert (limit and limit[0].agrees) is agrees
-
-
-@pytest.mark.parametrize(("near", "outcome"), [(0.99, Outcome.INCONCLUSIVE), (0.9, Outcome.REFUTED)])
-def test_no_limit_is_taken_next_to_a_threshold(near, outcome):
-    """There the step decides on the case, and all of a state in the wrong case would be off."""
-    end = Records((measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine"),))
-    assert said({n: seen(0.05 + 0.01 / n) for n in (1, 2, 3, 4)}, seen(0.0) + end).outcome is outcome
 
 
 def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
