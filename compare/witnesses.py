@@ -17,11 +17,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial, reduce
 from operator import or_
 from statistics import median
-from typing import Self
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
@@ -93,36 +93,6 @@ def full_verdict(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     return replace(said, witnesses=(first, *beside))
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What the protocols of a claim measured with one engine, a row each with the number that divides its step."""
-
-    rows: tuple[tuple[int, Measurement | Missing], ...]
-
-    @classmethod
-    def of(cls, claim: Claim, steps: Mapping[int, Records]) -> Self:
-        """The rows of records that bear on a claim, with the numbers by which steps were divided, least first."""
-        wanted = claim.protocols
-        return cls(tuple((n, row) for n, own in sorted(steps.items()) for row in own.rows if row.protocol in wanted))
-
-    @property
-    def finest(self) -> dict[str, int]:
-        """By protocol the largest number by which its step was divided."""
-        return {row.protocol: n for n, row in self.rows}
-
-    @property
-    def missing(self) -> list[Missing]:
-        """What could not be measured with the finest step of its protocol."""
-        finest = self.finest
-        return [row for n, row in self.rows if isinstance(row, Missing) and finest[row.protocol] == n]
-
-    def shared(self, trial: Iterable[Check]) -> set[tuple[int, str]]:
-        """Bearings and sets of those checks of the engine on trial that this engine was to measure, too."""
-        places = {(row.protocol, row.set) for _, row in self.rows}
-        checks = (c for c in trial if (c.measurement.protocol, c.measurement.set) in places)
-        return {(c.bearing, c.measurement.set) for c in checks}
-
-
 def _testify(
     claim: Claim, by: Engine, steps: Mapping[int, Records], ends: Set[tuple[str, float]], trial: Sequence[Check] = ()
 ) -> Witness:
@@ -134,23 +104,35 @@ def _testify(
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves the claim undecided
     where too few of its numbers can tell, those without a limit among them: see `_limit_of_no_step`.
     """
-    asked = Asked.of(claim, steps)
+    protocols = claim.protocols
+    rows = [(n, row) for n, own in sorted(steps.items()) for row in own.rows if row.protocol in protocols]
+    finest = {row.protocol: n for n, row in rows}  # the largest number by which the step of each was divided
+    missing = [row for n, row in rows if isinstance(row, Missing) and finest[row.protocol] == n]
     try:
         found = {n: checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
         return Witness(engine=by.name, outcome=Outcome.ERROR, reason=f"{type(error).__name__}: {error}")
-    shared, missing = asked.shared(trial), asked.missing
+    asked = {(row.protocol, row.set) for _, row in rows}
+    shared = {(c.bearing, m.set) for c in trial if ((m := c.measurement).protocol, m.set) in asked}
     if not shared and not any(found.values()):
         reasons = ["at this level nothing that bears on the claim was asked of it", *map(str, missing[:3])]
         return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason="; ".join(reasons))
-    if by.allowance:
-        limits = [(_with_allowance(check, by.allowance), math.nan) for check in found[max(found)]]
+    if by.allowance:  # its numbers have a share of their scales as tolerance, since their errors have no limit
+        checks, orders = (
+            tuple(
+                replace(c, tolerance=by.allowance * c.scale, ceiling=2 * by.allowance)
+                if quantity(c.measurement.quantity).resolves
+                else c
+                for c in found[max(found)]
+            ),
+            list[float](),
+        )
     else:
-        limits = [limit for row in _sequences_by_step(found, asked.finest) if (limit := _limit_of_no_step(row, ends))]
-    checks, orders = tuple(check for check, _ in limits), [order for _, order in limits if math.isfinite(order)]
+        limits = [limit for row in _sequences_by_step(found, finest) if (limit := _limit_of_no_step(row, ends))]
+        checks, orders = tuple(check for check, _ in limits), [order for _, order in limits if math.isfinite(order)]
     most = reduce(or_, map(per_bearing, found.values()))
     wanted = most | Counter(bearing for bearing, _ in shared) | Counter({check.bearing for check in trial})
-    usual = ((c, coarse_step(c.measurement.parameters) / n) for n, own in found.items() for c in own)
+    usual = ((c, coarse_step(c.measurement.parameters) / n) for n, each in found.items() for c in each)
     return Witness(
         engine=by.name,
         outcome=outcome(claim, checks, wanted),
@@ -181,29 +163,6 @@ def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
     return tuple(each for each in off if math.isfinite(each))
 
 
-def _with_allowance(check: Check, share: float) -> Check:
-    """The check with a share of its scale as its tolerance, for an engine whose errors have no limit."""
-    exact = quantity(check.measurement.quantity).resolves == 0
-    return check if exact else replace(check, tolerance=share * check.scale, ceiling=2 * share)
-
-
-@dataclass(frozen=True)
-class Alike:
-    """What checks of one thing with different time steps share: all but the numbers among their conditions."""
-
-    protocol: str
-    bearing: int
-    set: str
-    texts: tuple[tuple[str, str], ...]
-
-    @classmethod
-    def of(cls, check: Check) -> Self:
-        """What a check shares with those of the same thing with other steps."""
-        m = check.measurement
-        texts = sorted((name, value) for name, value in m.conditions.items() if isinstance(value, str))
-        return cls(m.protocol, check.bearing, m.set, tuple(texts))
-
-
 def _numbers_of(m: Measurement) -> dict[str, float]:
     """The numbers among the conditions of a measurement, and those of its parameters that protocols choose."""
     numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
@@ -212,12 +171,14 @@ def _numbers_of(m: Measurement) -> dict[str, float]:
 
 def _sequences_by_step(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) -> Iterator[list[Step]]:
     """For each check with the finest step of its protocol: those of the same with coarser steps, and itself last."""
-    groups: dict[int, dict[Alike, list[Check]]] = {n: {} for n in sorted(found)}
+    groups: dict[int, dict[Any, list[Check]]] = {n: {} for n in sorted(found)}
     for n, group in groups.items():
-        for check in found[n]:
-            group.setdefault(Alike.of(check), []).append(check)
+        for check in found[n]:  # those of one thing share all but the numbers among their conditions
+            m = check.measurement
+            texts = sorted((name, value) for name, value in m.conditions.items() if isinstance(value, str))
+            group.setdefault((m.protocol, check.bearing, m.set, *texts), []).append(check)
     for n, kind, last in [(n, kind, own) for n, group in groups.items() for kind, own in group.items()]:
-        if n == finest[kind.protocol]:
+        if n == finest[last[0].measurement.protocol]:
             steps: list[list[Step]] = [[] for _ in last]
             for coarser, others in [(m, group[kind]) for m, group in groups.items() if m < n and kind in group]:
                 for i, k in _pair_nearest(last, others):

@@ -36,9 +36,14 @@ def flow(args: argparse.Namespace) -> Flow | None:
 
 
 def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
-    """Settings of the engine that the options of `add_engine` choose, for a ball."""
+    """Settings of the engine that the options of `add_engine` choose, for a ball; `InputError` for one of others."""
     chosen: engines.Engine = args.engine
-    return chosen.configured(given_options(args, ("timestep", "rtol", "restitution")), p)
+    given = given_options(args, ("timestep", "rtol", "restitution"))
+    for name in given:
+        if name not in chosen.options:
+            own = " and ".join(f"--{option}" for option in chosen.options)
+            raise InputError(f"--{name} is not for {chosen.name}, which takes {own}")
+    return chosen.configure(given, p)
 
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:

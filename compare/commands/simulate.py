@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.commands import options, running, signals
-from compare.kit import campaign, collection, sweep
+from compare.kit import collection, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.view import motions
 from mjsim import ContactSettings
@@ -62,7 +62,11 @@ def run_sweep(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
     p, axes = options.parameters(args), sweep.Axis.several(args.vary)
     if args.direction != "held":
-        omegas = sweep.levels(axes, args.direction)
+        if len(axes) != 1 or axes[0].name != "omega_0":
+            why = f"direction = {args.direction!r} sweeps omega_0 within one run"
+            raise InputError(f"{why}: vary omega_0 and nothing else")
+        up = sorted(axes[0].points)
+        omegas = {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[args.direction]
         flow, lasts = Flow.staircase(omegas, args.time), args.time * len(omegas)
         tasks = [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
     else:
@@ -75,7 +79,7 @@ def run_sweep(args: argparse.Namespace) -> int:
     whole = len(tasks) - len(failures)
     if args.json:
         summary = {"directory": str(args.output), "runs": len(tasks), "whole": whole}
-        options.show(summary | {"failures": campaign.failures_as_data(failures)}, args.json)
+        options.show(summary | {"failures": [failure.described() for failure in failures]}, args.json)
     else:
         print(f"{whole} of {len(tasks)} runs are whole, in {args.output}; gather them with: ", end="")
         print(f"dualball collect {args.output}")

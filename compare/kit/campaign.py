@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import copy
 import hashlib
-import itertools
 import json
 import math
 import os
@@ -46,6 +45,7 @@ FAILURES = "failures.json"
 Save = Callable[[Mapping[str, Trajectory], Path], None]
 Ended = tuple[str, Path | None, Trajectory | None]
 """Why a run is not whole, empty if it is; the file of what there is of it, if any; the run, if it is handed out."""
+_BROKEN = ".failed.h5"
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
 
@@ -76,6 +76,10 @@ class Failure:
 
     task: Task
     reason: str
+
+    def described(self) -> dict[str, Any]:
+        """The key, the reason, and the task, to try it again; JSON-able."""
+        return {"key": self.task.key, "reason": self.reason, "task": self.task.describe()}
 
 
 @dataclass
@@ -108,7 +112,7 @@ class Campaign:
     passing: bool = False
 
     def __post_init__(self) -> None:
-        self._workers = processes(self.workers) if isinstance(self.workers, int) else self.workers
+        self.fleet = processes(self.workers) if isinstance(self.workers, int) else self.workers
         check_number("batch", self.batch, "runs", Range(1, whole=True))
         if self.limit != math.inf:
             check_number("limit", self.limit, "s", POSITIVE)
@@ -117,17 +121,34 @@ class Campaign:
         make_directory(self.directory)
         self._owned = Lock(self.directory)
         remove_leftovers(self.directory)
-        self._files: dict[str, Path] = dict(_stored(self.directory))
+        self._files: dict[str, Path] = {}
         self._failed: dict[str, Failure] = {}
         self._lock = threading.Lock()
         self._read: dict[str, Trajectory] = {}
         self._samples = 0
+        # A file that was cut or changed is set aside; those of other versions of the program are left alone.
+        others, ours = 0, current_versions()["dualball"]
+        for file in sorted(self.directory.glob("*.h5")):
+            if not (name := _NAME.fullmatch(file.name)):
+                continue
+            try:
+                version, keys = storage.contents(file) if name[1] else ("", [])
+            except StorageError as error:
+                file.replace(file.with_suffix(".damaged"))
+                print(f"dualball: {error}; it is set aside, its runs are carried out again", file=sys.stderr)
+                continue
+            others += version != ours
+            if version == ours:
+                self._files |= dict.fromkeys(keys or [name[2]], file)
+        if others:
+            left = f"{others} files of runs of other versions are left alone in {self.directory}"
+            print(f"dualball: {left}", file=sys.stderr)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
-        self._workers.close(at_once=kind is not None)
+        self.fleet.close(at_once=kind is not None)
         remove_leftovers(self.directory)
         self._owned.release()
         if self._made and not any(self.directory.iterdir()):
@@ -139,16 +160,6 @@ class Campaign:
         part.label, part.doing, part._read, part._samples = label, doing, {}, 0
         part._files = {key: f for key, f in self._files.items() if label in (f.stem, f.name.rpartition("-")[0])}
         return part
-
-    @property
-    def at_once(self) -> int:
-        """How many parts to carry out at once: two more than workers, as some parts wait for a single long run."""
-        count = self._workers.count
-        return count + 2 if count > 1 else 1
-
-    def give_up(self) -> None:
-        """Stop all that is under way, in whatever thread."""
-        self._workers.close(at_once=True)
 
     def load(self, key: str) -> Trajectory:
         """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
@@ -178,9 +189,6 @@ class Campaign:
         brief = SOON_DONE if self.passing else 0.0
         return Storing(self.directory, self.label, self.save, self.looked_at, brief)
 
-    def _has_run(self, key: str) -> bool:
-        return key in self._files or key in self._read
-
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
 
@@ -200,12 +208,12 @@ class Campaign:
         The directory's `FAILURES` lists all that have failed in this campaign, for programs.
         """
         unique = {task.key: task for task in tasks}
-        todo = [task for key, task in unique.items() if not self._has_run(key)]
-        earlier = [key for key in unique if key in self._files and _broke_down(self._files[key])]
+        todo = [task for key, task in unique.items() if key not in self._files and key not in self._read]
+        earlier = [key for key in unique if key in self._files and self._files[key].name.endswith(_BROKEN)]
         failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
-        for batch, outcomes in self._carry_out(_batches(todo, self.batch, self._workers.count)):
+        for batch, outcomes in self._carry_out(todo):
             for task, (reason, file, run) in zip(batch, outcomes, strict=True):
                 failures += [Failure(task, reason)] if reason else []
                 done += not reason
@@ -217,7 +225,8 @@ class Campaign:
         with self._lock:  # the parts of a campaign share the list
             if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
                 self._failed |= new
-                write_text(self.directory / FAILURES, json.dumps(failures_as_data(self._failed.values()), indent=1))
+                failed = [failure.described() for failure in self._failed.values()]
+                write_text(self.directory / FAILURES, json.dumps(failed, indent=1))
         return failures
 
     def keep(self, keys: Collection[str]) -> None:
@@ -229,31 +238,41 @@ class Campaign:
 
     def reduce(self) -> None:
         """Remove all runs of the label but those kept and those that broke down: what was measured is stored."""
-        gone = {f for f in self._files.values() if f.name.rpartition("-")[0] == self.label and not _broke_down(f)}
+        own = {file for file in self._files.values() if file.name.rpartition("-")[0] == self.label}
+        gone = {file for file in own if not file.name.endswith(_BROKEN)}
         for file in gone:
             file.unlink(missing_ok=True)
         self._read, self._samples = {}, 0
         self._files = {key: file for key, file in self._files.items() if file not in gone}
 
-    def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Ended]]]:
-        """Yield each batch that ends, with what became of its tasks.
+    def _carry_out(self, todo: Iterable[Task]) -> Iterator[tuple[Sequence[Task], Sequence[Ended]]]:
+        """Yield each batch of tasks that ends, with what became of them.
 
+        Tasks that can run together are shared out evenly among the workers, the longest first: then all end together.
         A worker that dies takes all batches under way with it. Their tasks are tried again at the end, one at a time;
         one that then loses its worker twice has failed.
         """
-        pending: dict[Future[list[Ended]], tuple[Task, ...]] = {}
+        groups: dict[str, list[Task]] = {}
+        for task in todo:
+            groups.setdefault(task.batch_key, []).append(task)
+        fresh = deque[Sequence[Task]]()
+        for group in sorted(groups.values(), key=lambda group: -group[0].steps * len(group)):
+            most = min(self.batch, math.ceil(len(group) / self.fleet.count), int(HELD / group[0].samples))
+            share = 1 if group[0].long else max(1, most)
+            fresh += [group[start : start + share] for start in range(0, len(group), share)]
+        pending: dict[Future[list[Ended]], Sequence[Task]] = {}
         again: deque[Task] = deque()
         died: Counter[str] = Counter()
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
-            batches = list(itertools.islice(fresh, 2 * self._workers.count - len(pending)))
-            alone = not batches and not pending
+            alone = not fresh and not pending
             if alone:
                 if not again:
                     return
-                batches = [(again.popleft(),)]
-            for batch in batches:
-                pending[self._workers.submit(run_batch, batch, self._storing, self.limit)] = batch
+                fresh.append([again.popleft()])
+            while fresh and len(pending) < 2 * self.fleet.count:
+                batch = fresh.popleft()
+                pending[self.fleet.submit(run_batch, batch, self._storing, self.limit)] = batch
             if not any(future.done() for future in pending):  # `wait` waits for cancelled ones that nobody told of it
                 wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
@@ -263,18 +282,13 @@ class Campaign:
                 error = future.exception()
                 if error is None:
                     yield batch, future.result()
-                elif not isinstance(error, self._workers.lost):
+                elif not isinstance(error, self.fleet.lost):
                     raise error
                 elif alone and died[batch[0].key]:
                     yield batch, [("its worker died (killed, or out of memory)", None, None)]
                 else:  # a task alone may have died by one of another part of the campaign
                     died.update(task.key for task in batch if alone)
                     again.extend(batch)
-
-
-def failures_as_data(failures: Iterable[Failure]) -> list[dict[str, Any]]:
-    """Failures as JSON-able data: the key, the reason, and the task, to try it again."""
-    return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 
 def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[Ended]:
@@ -304,44 +318,3 @@ def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[End
             storage.save(run, failed_path(path))
         outcomes.append((run.header.failure, file, run if storing.looked_at else None))
     return outcomes
-
-
-def _stored(directory: Path) -> Iterator[tuple[str, Path]]:
-    """The runs that the files of a directory hold, by key.
-
-    A file that was cut or changed is set aside, so that its runs are carried out again; those of other versions of the
-    program are left alone. Both are said on standard error.
-    """
-    others, ours = 0, current_versions()["dualball"]
-    for file in sorted(directory.glob("*.h5")):
-        name = _NAME.fullmatch(file.name)
-        if name and name[1] is None:
-            others += 1
-        elif name:
-            try:
-                version, keys = storage.contents(file)
-            except StorageError as error:
-                file.replace(file.with_suffix(".damaged"))
-                print(f"dualball: {error}; it is set aside, its runs are carried out again", file=sys.stderr)
-                continue
-            others += version != ours
-            if version == ours:
-                yield from ((key, file) for key in keys or [name[2]])
-    if others:
-        print(f"dualball: {others} files of runs of other versions are left alone in {directory}", file=sys.stderr)
-
-
-def _broke_down(file: Path) -> bool:
-    return file.name.endswith(".failed.h5")
-
-
-def _batches(tasks: Iterable[Task], size: int, workers: int) -> Iterator[tuple[Task, ...]]:
-    """Tasks that can run together, shared out evenly among the workers: the longest first, so that all end together."""
-    groups: dict[str, list[Task]] = {}
-    for task in tasks:
-        groups.setdefault(task.batch_key, []).append(task)
-    for group in sorted(groups.values(), key=lambda group: -group[0].steps * len(group)):
-        most = min(size, math.ceil(len(group) / workers), int(HELD / group[0].samples))
-        share = 1 if group[0].long else max(1, most)
-        for start in range(0, len(group), share):
-            yield tuple(group[start : start + share])

@@ -17,7 +17,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 from rich.table import Table
@@ -61,13 +60,14 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     if not directory.is_dir():
         why = "it is no directory" if directory.exists() else "there is no such directory"
         raise StorageError(f"cannot read {directory}: {why}")
-    files = [
-        file for file in sorted(directory.rglob("*.h5")) if file.parent.suffix != ".journal"
-    ]  # of a run that goes on
-    before = [file for file in files if output.exists() and file.samefile(output)]
-    if before:
-        _check_collection(output)
-        files.remove(before[0])
+    files = []
+    for file in sorted(directory.rglob("*.h5")):
+        if output.exists() and file.samefile(output):
+            with reading(output) as before:  # what is to be overwritten must be the collection of the last time
+                if before.attrs.get("schema") != SCHEMA:
+                    raise StorageError("it holds runs to be gathered, and can't be the output, too")
+        elif file.parent.suffix != ".journal":  # of a run that goes on
+            files.append(file)
     shares = [files[k : k + SHARE] for k in range(0, len(files), SHARE)]
     parts, problems = [], list[str]()
     with processes(workers) as work:
@@ -91,7 +91,13 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     coordinates, about = varied_parameters(collected), _attributes()
     order = np.lexsort([collected[name] for name in ("run", *reversed(coordinates))])
     collected = {name: values[order] for name, values in collected.items()}
-    dimensions, collected = _as_grid(collected, coordinates)
+    dimensions, axes = ["run"], {name: np.unique(collected[name]) for name in coordinates}
+    shape = [len(values) for values in axes.values()]
+    if axes and math.prod(shape) == len(rows):
+        places = [np.searchsorted(values, collected[name]) for name, values in axes.items()]
+        if np.array_equal(np.ravel_multi_index(places, shape), np.arange(len(rows))):  # each point of a grid once
+            dimensions = coordinates
+            collected = axes | {name: v.reshape(shape) for name, v in collected.items() if name not in axes}
     with WholeFile(output) as whole:
         title = f"What {len(rows)} balls settled to, measured over the last part of each run"
         whole.file.attrs.update(Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION)
@@ -101,27 +107,6 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
     return len(rows)
-
-
-def _as_grid(of: Columns, coordinates: list[str]) -> tuple[list[str], Columns]:
-    """Names of dimensions, and columns shaped by them: those of a grid if each point has one run, else one of runs."""
-    axes = {name: np.unique(of[name]) for name in coordinates}
-    shape = [len(values) for values in axes.values()]
-    if not axes or math.prod(shape) != len(of["run"]):
-        return ["run"], of
-    points = np.ravel_multi_index([np.searchsorted(values, of[name]) for name, values in axes.items()], shape)
-    if not np.array_equal(points, np.arange(len(points))):
-        return ["run"], of
-    return coordinates, axes | {name: values.reshape(shape) for name, values in of.items() if name not in axes}
-
-
-def _one_entry_a_run(file: h5py.File) -> Columns:
-    """The columns of a collection, an entry a run."""
-    of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
-    if not run.is_scale:
-        names = [next(iter(dimension.keys())) for dimension in run.dims]
-        of |= dict(zip(names, np.meshgrid(*(of[name] for name in names), indexing="ij"), strict=True))
-    return {name: values.ravel() for name, values in of.items()}
 
 
 def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
@@ -149,8 +134,15 @@ def _rows(path: Path, shown: Path) -> Columns:
     of = [
         dict(zip(found, row, strict=True)) for row in zip(*(values.tolist() for values in found.values()), strict=True)
     ]
-    theory = [_solution_of(row) for row in of]
-    found |= {f"{name}_theory": np.array([each[name] for each in theory]) for name in VARIABLES}
+    theory = np.full((len(VARIABLES), len(of)), math.nan)
+    for k, row in enumerate(of):
+        if row["case"] >= 0 and row["steady"]:
+            p = Parameters(**{f.name: row[f.name] for f in dataclasses.fields(Parameters)})
+            with suppress(InputError):  # the case has no stable stationary solution, or not one
+                solution = analytic.solution(p, Case(row["case"]))
+                known = [name not in solution.family for name in VARIABLES]
+                theory[:, k] = np.where(known, solution.state, math.nan)
+    found |= {f"{name}_theory": values for name, values in zip(VARIABLES, theory, strict=True)}
     return found | {"run": np.array([str(shown / name) for name in found["run"].tolist()])}
 
 
@@ -176,36 +168,11 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
             row |= {variable: mean, f"{variable}_uncertainty": drift}
         row |= {"case": int(settled_case(run)) if len(run.case) else -1, "steady": run.header.flow.is_steady}
         about = run.header.attributes() | {"mjcf": run.header.mjcf, "created": "", "failure": ""}
-        row["identity"] = _digest(json.dumps(about, sort_keys=True).encode())
-        row["numbers"] = _digest(*(getattr(run, each).tobytes() for each in columns(Trajectory)))
+        numbers = b"".join(getattr(run, each).tobytes() for each in columns(Trajectory))
+        for each, data in (("identity", json.dumps(about, sort_keys=True).encode()), ("numbers", numbers)):
+            row[each] = hashlib.sha256(data).hexdigest()[:32]
         rows.append(row)
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
-
-
-def _solution_of(row: Mapping[str, Any]) -> dict[str, float]:
-    """The stable stationary solution of a run's case by theory; nan where it has none, and in unsteady flow."""
-    found = dict.fromkeys(VARIABLES, math.nan)
-    if row["case"] >= 0 and row["steady"]:
-        p = Parameters(**{f.name: row[f.name] for f in dataclasses.fields(Parameters)})
-        with suppress(InputError):  # the case has no stable stationary solution, or not one
-            of = analytic.solution(p, Case(row["case"]))
-            found |= {name: float(x) for name, x in of.state._asdict().items() if name not in of.family}
-    return found
-
-
-def _digest(*parts: bytes) -> str:
-    """A hash of bytes, 32 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(part)
-    return digest.hexdigest()[:32]
-
-
-def _check_collection(output: Path) -> None:
-    """Raise `StorageError` if what is to be overwritten isn't the collection of the last time."""
-    with reading(output) as file:
-        if file.attrs.get("schema") != SCHEMA:
-            raise StorageError("it holds runs to be gathered, and can't be the output, too")
 
 
 def _attributes() -> dict[str, dict[str, Any]]:
@@ -243,7 +210,11 @@ def describe(path: Path) -> dict[str, Any]:
         if schema == SCHEMA:
             if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
                 raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
-            return described(_one_entry_a_run(file))
+            of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
+            if not run.is_scale:  # a grid
+                names = [next(iter(dimension.keys())) for dimension in run.dims]
+                of |= dict(zip(names, np.meshgrid(*(of[name] for name in names), indexing="ij"), strict=True))
+            return described({name: values.ravel() for name, values in of.items()})
     if schema not in (MEANS, storage.BATCH):
         return {}
     return described({name: values for name, values in _rows(path, path).items() if name not in _HELD})

@@ -96,14 +96,6 @@ class Engine:
             return self.configure({}, p)
         return self.study(step, p) if self.study else self.configure({"timestep": step}, p)
 
-    def configured(self, given: Mapping[str, float], p: Parameters) -> AnySettings:
-        """Settings from given options, as `configure`; `InputError` for an option of other engines."""
-        for name in given:
-            if name not in self.options:
-                own = " and ".join(f"--{option}" for option in self.options)
-                raise InputError(f"--{name} is not for {self.name}, which takes {own}")
-        return self.configure(given, p)
-
 
 STUDY_SLIP = 2.0
 """Slip speed in m/s for which contact in the studies' settings is continuous, under the load of gravity, at mu = 1."""

@@ -165,13 +165,6 @@ WITNESS_ABOVE_QUICK = replace(WITNESS, thresholds_loose=1e3, thresholds_rounds=(
 """At the levels above quick, on whose rarer sets motions die out more slowly."""
 
 
-def effort(level: Level, witness: bool = False) -> Effort:
-    """How much an engine measures at a level; less if it is a `witness` beside the engine on trial."""
-    if witness:
-        return WITNESS if level is Level.QUICK else WITNESS_ABOVE_QUICK
-    return (AT_QUICK, AT_DEFAULT, AT_FULL)[level]
-
-
 COUNT = {Level.DEFAULT: 24, Level.FULL: 96}
 SEED = 20161
 LOW = {"mu": 0.05, "eta": 0.05, "j": 0.2, "r/R": 0.1, "kappa": 0.05, "R": 0.04, "g": 6.0, "m": 0.01}

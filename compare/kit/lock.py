@@ -22,40 +22,34 @@ class Lock:
 
     def __init__(self, directory: Path) -> None:
         self._path = directory / ".lock"
-        while sys.platform != "win32" and not self._take():  # its last owner has just removed the file
-            pass
-
-    def _take(self) -> bool:
-        """Lock the file, and say whether it still has its name."""
-        directory = self._path.parent
-        try:
-            self._file = self._path.open("a+b", buffering=0)
-        except OSError as error:
-            raise StorageError(f"cannot write to {directory}: {error.strerror}") from error
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            self._file.seek(0)
-            owner = self._file.read().decode() or "another program"
-            self._file.close()
-            how = "wait for it, or choose another directory with --output"
-            raise StorageError(f"{directory} is in use by {owner}: {how}") from error
-        except OSError as error:  # a file system that has no locks
-            why = f"{directory} can't be locked ({error.strerror})"
-            print(f"dualball: {why}: start no second program there", file=sys.stderr)
-        try:
-            if self._path.stat().st_ino != os.fstat(self._file.fileno()).st_ino:
-                raise FileNotFoundError
-            owner = f"process {os.getpid()} on {platform.node()}, since {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
-            self._file.truncate(0)
-            self._file.write(owner.encode())
-        except FileNotFoundError:
-            self._file.close()
-            return False
-        except OSError as error:
-            self.release()
-            raise StorageError(f"cannot write to {directory}: {error.strerror}") from error
-        return True
+        while sys.platform != "win32":
+            try:
+                self._file = self._path.open("a+b", buffering=0)
+            except OSError as error:
+                raise StorageError(f"cannot write to {directory}: {error.strerror}") from error
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                self._file.seek(0)
+                owner = self._file.read().decode() or "another program"
+                self._file.close()
+                how = "wait for it, or choose another directory with --output"
+                raise StorageError(f"{directory} is in use by {owner}: {how}") from error
+            except OSError as error:  # a file system that has no locks
+                why = f"{directory} can't be locked ({error.strerror})"
+                print(f"dualball: {why}: start no second program there", file=sys.stderr)
+            try:
+                if self._path.stat().st_ino == os.fstat(self._file.fileno()).st_ino:
+                    owner = f"process {os.getpid()} on {platform.node()}, since {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+                    self._file.truncate(0)
+                    self._file.write(owner.encode())
+                    return
+            except FileNotFoundError:
+                pass
+            except OSError as error:
+                self.release()
+                raise StorageError(f"cannot write to {directory}: {error.strerror}") from error
+            self._file.close()  # its last owner has just removed the file
 
     def release(self) -> None:
         """Release the lock: others may have the directory."""

@@ -11,7 +11,6 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import KW_ONLY, asdict, dataclass, replace
-from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -84,22 +83,16 @@ Job = tuple[Protocol, Lab]
 def measurements_file(protocol: Protocol, results: Path, lab: Lab, chosen: Mapping[str, Parameters] | None) -> Path:
     """The file of a protocol's measurements: another one for each engine, step, level, choice of sets, and program."""
     engine, sets = protocol.engine or lab.engine, protocol.measures(lab) if chosen is None else chosen
+    subject, measure, _ = protocol.measure.__module__.partition(".measure")
     identity = [
         engine.name,
         lab.refine,
         lab.level.name,
         {name: asdict(p) for name, p in sets.items()},
-        _program(engine, protocol.measure.__module__),
+        sources(*engine.sources, "compare.kit", *([subject + measure] if measure else [])),
     ]
     apart = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
     return results / DIRECTORY / apart / f"{protocol.name}.h5"
-
-
-@cache
-def _program(engine: Engine, module: str) -> str:
-    """Digest of the sources of an engine, of what all protocols share, and of those of a subject."""
-    subject, measure, _ = module.partition(".measure")
-    return sources(*engine.sources, "compare.kit", *([subject + measure] if measure else []))
 
 
 def job_name(protocol: str, lab: Lab) -> str:
@@ -135,6 +128,8 @@ def run(
     would be kept, and taken for whole the next time.
     The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
     """
+    if not jobs:
+        return
     known = {job_name(protocol.name, lab): (protocol, lab) for protocol, lab in jobs}
     needs = {
         name: [other if other in known else job_name(other, lab) for other in protocol.needs]
@@ -146,8 +141,9 @@ def run(
     found: dict[str, Records] = {}
     broken: dict[str, Exception] = {}
     running: dict[Future[Records], str] = {}
-    campaign = jobs[0][1].campaign if jobs else None
-    with threads(campaign.at_once if campaign else 1) as pool:
+    workers = jobs[0][1].campaign.fleet
+    # Two jobs more than workers at once, as some wait for a single long run.
+    with threads(workers.count + 2 if workers.count > 1 else 1) as pool:
         try:
             while order.is_active():
                 for name in sorted(order.get_ready(), key=lambda name: (not known[name][0].first, -cost(known[name]))):
@@ -170,8 +166,7 @@ def run(
                         broken[name] = error
                         yield known[name], error
         except BaseException:
-            assert campaign
-            campaign.give_up()  # else the threads would wait for runs that nobody wants any more
+            workers.close(at_once=True)  # else the threads would wait for runs that nobody wants any more
             raise
 
 
@@ -189,10 +184,16 @@ def carry_out(
     campaign = lab.campaign.part(label, job_name(protocol.name, lab))
     lab = replace(lab, engine=protocol.engine or lab.engine, campaign=campaign)
     if not path.exists():
-        sets = protocol.measures(lab) if chosen is None else chosen
-        weak = {name: why for name, p in sets.items() if (why := _why_drag_too_weak(p, protocol))}
-        strong = {name: p for name, p in sets.items() if name not in weak}
-        rows: list[Measurement | Missing] = [Missing(protocol.name, name, why) for name, why in weak.items()]
+        rows: list[Measurement | Missing] = []
+        strong = dict(protocol.measures(lab) if chosen is None else chosen)
+        for name, p in list(strong.items()):
+            weak = UNDAMPED if p.c == 0 else ""
+            if p.c and protocol.waits and (steps := 1 / (p.c * coarse_step(p))) > LONGEST_WAIT:
+                weak = f"drag is so weak (1/c = {1 / p.c:.3g} s, {steps:.2g} time steps)"
+                weak += " that motions take too long to settle"
+            if weak:
+                rows.append(Missing(protocol.name, name, weak))
+                del strong[name]
         if protocol.alone and "reference" not in strong:
             rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone, 0))
         else:
@@ -208,12 +209,3 @@ def carry_out(
         record.save(records, path, about)
     campaign.reduce()
     return record.load(path)
-
-
-def _why_drag_too_weak(p: Parameters, protocol: Protocol) -> str:
-    """Why drag is too weak for a protocol; empty if it isn't."""
-    if p.c == 0:
-        return UNDAMPED
-    steps = 1 / (p.c * coarse_step(p))
-    weak = f"drag is so weak (1/c = {1 / p.c:.3g} s, {steps:.2g} time steps) that motions take too long to settle"
-    return weak if protocol.waits and steps > LONGEST_WAIT else ""

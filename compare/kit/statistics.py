@@ -121,14 +121,6 @@ FAR = 10.0
 maximum is one of round-off."""
 
 
-def value_and_slope(x: Array, y: Array, degree: int, at: float = 0.0) -> tuple[Array, Array]:
-    """Value and slope at a place of the polynomial through points x (n,), y (n,) or (n, k), by least squares: (k,)."""
-    unit = float(np.ptp(x)) / 2
-    powers = np.vander((x - at) / unit, degree + 1, increasing=True)
-    fit = np.linalg.lstsq(powers, y, rcond=None)[0]
-    return fit[0], fit[1] / unit
-
-
 def slope_error(x: Array, degree: int) -> float:
     """Standard uncertainty of the slope at 0 of the polynomial through points x (n,), if that of each y is 1."""
     return float(np.linalg.norm(np.linalg.pinv(np.vander(x, degree + 1, increasing=True))[1]))

@@ -97,11 +97,3 @@ def sobol(dimensions: int, count: int, seed: int) -> Array:
 
     unit = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(2 ** math.ceil(math.log2(count)))
     return np.asarray(unit[:count])
-
-
-def levels(axes: Sequence[Axis], direction: str) -> list[float]:
-    """omega_0 as one run visits it: up, down, or up and down again."""
-    if len(axes) != 1 or axes[0].name != "omega_0":
-        raise InputError(f"direction = {direction!r} sweeps omega_0 within one run: vary omega_0 and nothing else")
-    up = sorted(axes[0].points)
-    return {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[direction]

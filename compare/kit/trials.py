@@ -15,7 +15,7 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Condition, Measurement, Missing, measurement
-from compare.kit.statistics import Measured, value_and_slope
+from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
@@ -122,10 +122,14 @@ def lag_error(p: Parameters, refine: int = 1) -> float:
 
 
 def polynomials(time: Array, values: Array, degrees: tuple[int, int], at: float = 0.0) -> tuple[Array, Array]:
-    """Values and slopes at a time, each (2, ...), of polynomials of two degrees through values (n, ...)."""
-    fits = [value_and_slope(time, values, degree, at) for degree in degrees]
-    value, slope = (np.array(each) for each in zip(*fits, strict=True))
-    return value, slope
+    """Values and slopes at a time, each (2, ...), of polynomials of two degrees through values (n, ...).
+
+    By least squares.
+    """
+    unit = float(np.ptp(time)) / 2
+    powers = [np.vander((time - at) / unit, degree + 1, increasing=True) for degree in degrees]
+    fits = [np.linalg.lstsq(each, values, rcond=None)[0] for each in powers]
+    return np.array([fit[0] for fit in fits]), np.array([fit[1] / unit for fit in fits])
 
 
 def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
