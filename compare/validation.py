@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -95,10 +95,11 @@ def validate(
             judging.take(protocol, lab, found, [*(sets or protocol.measures(lab))])
             judging.judge(jobs)
     verdicts = {name: future.result() for name, future in judging.judged.items()}
-    files = {
-        each.name: {refine: _files(output, Lab(campaign, each, level, refine), sets) for refine in each.refine}
-        for each in engines
-    }
+    files: dict[str, dict[int, list[str]]] = {each.name: {} for each in engines}
+    for lab in labs:
+        paths = [programme.measurements_file(each, output, lab, sets) for each in PROTOCOLS if each.measures(lab)]
+        there = [path.relative_to(output).as_posix() for path in paths if path.exists()]
+        files[lab.engine.name][lab.refine] = there
     count = workers if isinstance(workers, int) else workers.count
     with processes(min(count, os.cpu_count() or 1)) as work:
         draw = far.drawing(work.map) if report else None
@@ -106,31 +107,30 @@ def validate(
     return [verdicts[claim.id] for claim in chosen]
 
 
+@dataclass
 class _Judging:
     """Claims that are judged as soon as all that they need is measured."""
 
-    def __init__(
-        self,
-        claims: Sequence[Claim],
-        engines: Sequence[Engine],
-        submit: Callable[..., Future[Verdict]],
-        done: Callable[[], None],
-    ) -> None:
-        self.claims, self.trial, self.submit, self.done = claims, engines[0], submit, done
-        self.measured = {each.name: dict.fromkeys(each.refine, Records()) for each in engines}
+    claims: Sequence[Claim]
+    engines: Sequence[Engine]
+    """The one on trial first."""
+    submit: Callable[..., Future[Verdict]]
+    done: Callable[[], None]
+
+    def __post_init__(self) -> None:
+        self.measured = {each.name: dict.fromkeys(each.refine, Records()) for each in self.engines}
         self.broken, self.judged = dict[str, str](), dict[str, Future[Verdict]]()
 
     def take(self, protocol: Protocol, lab: Lab, found: Records | Exception, sets: Sequence[str]) -> None:
         """Take in what a protocol has measured, or its error, which takes its own claims with it, and no others."""
-        if isinstance(found, Records):
-            records = found
-        elif lab.engine is self.trial:
-            self.broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
-            return
-        else:
-            why = f"{programme.job_name(protocol.name, lab)}: {type(found).__name__}: {found}"
-            records = Records(missing=tuple(Missing(protocol.name, each, why) for each in sets))
-        self.measured[lab.engine.name][lab.refine] += records
+        if isinstance(found, Exception):
+            why = f"{type(found).__name__}: {found}"
+            if lab.engine is self.engines[0]:
+                self.broken[protocol.name] = f"{protocol.name}: {why}"
+                return
+            why = f"{programme.job_name(protocol.name, lab)}: {why}"
+            found = Records(missing=tuple(Missing(protocol.name, each, why) for each in sets))
+        self.measured[lab.engine.name][lab.refine] += found
 
     def judge(self, jobs: Sequence[programme.Job]) -> None:
         """Begin to judge all claims that wait for none of these protocols."""
@@ -142,12 +142,6 @@ class _Judging:
                 heard = {name: dict(steps) for name, steps in self.measured.items()}
                 self.judged[claim.id] = self.submit(claim, heard, dict(self.broken))
                 self.judged[claim.id].add_done_callback(lambda _: self.done())
-
-
-def _files(output: Path, lab: Lab, sets: Mapping[str, Parameters] | None) -> list[str]:
-    """The files of what was measured, relative to the results directory."""
-    paths = [programme.measurements_file(each, output, lab, sets) for each in PROTOCOLS if each.measures(lab)]
-    return [path.relative_to(output).as_posix() for path in paths if path.exists()]
 
 
 def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0) -> list[Verdict]:

@@ -8,7 +8,6 @@ import json
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 from compare.commands import options, running, signals
 from compare.kit import collection, sweep
@@ -72,8 +71,8 @@ def run_sweep(args: argparse.Namespace) -> int:
     else:
         sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
-    how: dict[str, Any] = {"looked_at": False, "save": collection.save_means if args.means_only else storage.save_batch}
-    with running.campaign(args, "sweep", batch=args.batch, **how) as work:
+    save = collection.save_means if args.means_only else storage.save_batch
+    with running.campaign(args, "sweep", batch=args.batch, save=save) as work:
         _check_no_other_sweep(args, p)
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)

@@ -38,13 +38,13 @@ BATCH = 64
 HELD = 2**16
 """Most samples of a batch, some 11 MB, three times that while it is stored; a run with more is written as it comes."""
 READ = 2**18
-"""Samples of new runs, and of those read last, that are held in memory, some 45 MB: most are looked at soon after."""
+"""Samples of runs read last, or not stored, that are held in memory, some 45 MB: most are looked at soon after."""
 SOON_DONE = 10.0
 """Processor time of a batch, s, that isn't worth a file where runs are removed as soon as they are measured."""
 FAILURES = "failures.json"
 Save = Callable[[Mapping[str, Trajectory], Path], None]
 Ended = tuple[str, Path | None, Trajectory | None]
-"""Why a run is not whole, empty if it is; the file of what there is of it, if any; the run, if it is handed out."""
+"""Why a run is not whole, empty if it is; the file of what there is of it, if any; the run, if it has no file."""
 _BROKEN = ".failed.h5"
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
@@ -52,16 +52,14 @@ _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 
 @dataclass(frozen=True)
 class Storing:
-    """Where and how the runs of a batch are stored, and whether they are handed out."""
+    """Where and how the runs of a batch are stored."""
 
     directory: Path
     label: str
     """What the names of files begin with."""
     save: Save = storage.save_batch
-    looked_at: bool = True
-    """Whether whole runs are handed out, too."""
-    brief: float = 0.0
-    """Processor time, s, below which whole runs of a batch are handed out only."""
+    passing: bool = False
+    """Whether whole runs of a batch of less than `SOON_DONE` are handed out instead."""
 
     def store(self, runs: Mapping[str, Trajectory]) -> Path:
         """Write whole runs, by key, into a file named by all of them."""
@@ -96,7 +94,6 @@ class Campaign:
     doing : what the campaign is about
     label : what the names of new files begin with, see `reduce`
     save : writes the whole runs of a batch, by key, to a file
-    looked_at : whether runs are: new ones are then in memory at first
     passing : whether `reduce` removes most: batches of less than `SOON_DONE` are then stored only if memory is short
     """
 
@@ -108,7 +105,6 @@ class Campaign:
     doing: str = ""
     label: str = "runs"
     save: Save = storage.save_batch
-    looked_at: bool = True
     passing: bool = False
 
     def __post_init__(self) -> None:
@@ -186,8 +182,7 @@ class Campaign:
 
     @property
     def _storing(self) -> Storing:
-        brief = SOON_DONE if self.passing else 0.0
-        return Storing(self.directory, self.label, self.save, self.looked_at, brief)
+        return Storing(self.directory, self.label, self.save, self.passing)
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -309,12 +304,13 @@ def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[End
             return [outcome for task in tasks for outcome in run_batch([task], storing, limit)]
         return [(str(error) or "out of memory", None, None)]
     whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
-    handed_only = storing.looked_at and time.process_time() - begun < storing.brief
-    together = storing.store(whole) if whole and not handed_only else None
+    handed_out = storing.passing and time.process_time() - begun < SOON_DONE
+    together = storing.store(whole) if whole and not handed_out else None
     outcomes: list[Ended] = []
     for run, path in zip(runs, paths, strict=True):
-        file = together if run.complete else failed_path(path)
-        if not run.complete:
+        if run.complete:
+            outcomes.append(("", together, run if handed_out else None))
+        else:
             storage.save(run, failed_path(path))
-        outcomes.append((run.header.failure, file, run if storing.looked_at else None))
+            outcomes.append((run.header.failure, failed_path(path), None))
     return outcomes

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from compare.kit import levels
 from compare.kit.campaign import Campaign
 from compare.kit.engines import Engine
-from compare.kit.levels import AT_DEFAULT, AT_FULL, AT_QUICK, WITNESS, WITNESS_ABOVE_QUICK, Effort, Level
+from compare.kit.levels import Effort, Level
 from compare.kit.tasks import Task
 from model import Flow, Parameters, Trajectory
 from model.drag import STOKES
@@ -31,8 +32,8 @@ class Lab:
     def effort(self) -> Effort:
         """How much is measured at this level by this engine."""
         if self.is_witness:
-            return WITNESS if self.level is Level.QUICK else WITNESS_ABOVE_QUICK
-        return (AT_QUICK, AT_DEFAULT, AT_FULL)[self.level]
+            return levels.WITNESS if self.level is Level.QUICK else levels.WITNESS_ABOVE_QUICK
+        return (levels.AT_QUICK, levels.AT_DEFAULT, levels.AT_FULL)[self.level]
 
     @property
     def is_witness(self) -> bool:

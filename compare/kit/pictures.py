@@ -12,7 +12,7 @@ import functools
 import io
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 from xml.etree import ElementTree
 
@@ -44,7 +44,16 @@ for _prefix, _uri in (("", _SVG), ("xlink", _XLINK)):
 
 def svg(figure: Figure) -> str:
     """A figure as SVG; equal figures give equal text."""
-    parts = {f"part-{k}": part for k, part in enumerate(_named_artists(figure))}
+    # All axes, and each artist in them that bears a label, with that label in HTML.
+    parts: dict[str, tuple[Artist, str]] = {}
+    for axes in figure.axes:
+        boxes = [each for each in axes.containers if isinstance(each, Container)]
+        artists: list[tuple[Any, Any]] = [(part, box.get_label()) for box in boxes for part in box.get_children()]
+        artists += [(each, each.get_label()) for each in axes.get_children()]
+        parts[f"part-{len(parts)}"] = axes, ""
+        for artist, label in artists:
+            if isinstance(label, str) and not _UNNAMED.fullmatch(label):
+                parts[f"part-{len(parts)}"] = artist, str(typeset(plain(label.removeprefix("_"))))
     for gid, (artist, _) in parts.items():
         artist.set_gid(gid)
     out = io.BytesIO()
@@ -63,7 +72,11 @@ def svg(figure: Figure) -> str:
                 group.set("data-series", name)
         _join_marks(group)
     _renumber(root)
-    return _rounded(ElementTree.tostring(root, encoding="unicode"))
+    text = ElementTree.tostring(root, encoding="unicode")
+    # Places rounded to hundredths of a point, and no superfluous spaces: half as long.
+    short = functools.partial(re.sub, r" +(?=[ \"])|(?<=\.\d\d)\d+", "")
+    text = re.sub(r' (?:d|x|y)="[^"]*"|translate\([^)]*\)', lambda places: short(places[0]), text)
+    return re.sub(r' style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
 
 
 def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
@@ -71,21 +84,16 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
     letters: dict[str, str] = {}
     made = {}
     for k, (name, picture) in enumerate(pictures.items()):
-
-        def collect_letter(found: re.Match[str]) -> str:
-            letters[found[1]] = found[0]
-            return ""
-
-        text = re.sub(r'<path id="(\w+-[\w-]+)"[^>]*/>', collect_letter, picture).replace("<defs></defs>", "")
+        letter = r'<path id="(\w+-[\w-]+)"[^>]*/>'
+        letters |= {found[1]: found[0] for found in re.finditer(letter, picture)}
+        text = re.sub(letter, "", picture).replace("<defs></defs>", "")
         text = re.sub(r"<style.*?</style>", "", text)  # for all lines of a picture: pages have it, too
         text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace("xlink:href", "href")
-        made[name] = re.sub(r'^<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', _svg_start, text)
+        start = re.match(r'<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', text)
+        assert start
+        least = 0.64 * float(start[2])  # letters of 10 points are at least 6.4 pixels high on a phone
+        made[name] = f'<svg {start[1]} role="img" style="--least:{least:.0f}px">' + text[start.end() :]
     return made, f'<svg width="0" height="0" style="position:absolute"><defs>{"".join(letters.values())}</defs></svg>'
-
-
-def _svg_start(found: re.Match[str]) -> str:
-    """The opening tag of a picture on a page; letters of 10 points are at least 6.4 pixels high on a phone."""
-    return f'<svg {found[1]} role="img" style="--least:{0.64 * float(found[2]):.0f}px">'
 
 
 def plain(label: str) -> str:
@@ -94,23 +102,6 @@ def plain(label: str) -> str:
         label = label.replace(tex, text)
     label = re.sub(r"\\tilde(?:\{(\w)\}| ?(\w))", lambda found: f"{found[1] or found[2]}\u0303", label)
     return re.sub(r"[${}]|\\", "", label).replace("\n", " ")
-
-
-def _named_artists(figure: Figure) -> Iterator[tuple[Artist, str]]:
-    """All axes of a figure, and each artist in them that bears a label, with that label in HTML."""
-    for axes in figure.axes:
-        yield axes, ""
-        boxes = ((part, box.get_label()) for box in axes.containers if isinstance(box, Container)
-                 for part in _flat(box.get_children()))  # fmt: skip
-        for artist, label in (*boxes, *((each, each.get_label()) for each in axes.get_children())):
-            if isinstance(label, str) and not _UNNAMED.fullmatch(label):
-                yield artist, str(typeset(plain(label.removeprefix("_"))))
-
-
-def _flat(artists: Any) -> Iterator[Artist]:
-    """All artists in nested sequences."""
-    for each in artists:
-        yield from [each] if isinstance(each, Artist) else _flat(each)
 
 
 def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
@@ -175,13 +166,3 @@ def _renumber(root: ElementTree.Element) -> None:
             name = each.attrib.pop("id")
             if name in names:
                 each.set("id", names[name])
-
-
-def _rounded(text: str) -> str:
-    """SVG text with places rounded to hundredths of a point, and without superfluous spaces: half as long."""
-
-    def rounded(found: re.Match[str]) -> str:
-        return re.sub(r" +(?=[ \"])", "", re.sub(r"(\.\d\d)\d+", r"\1", found[0]))
-
-    text = re.sub(r' (?:d|x|y)="[^"]*"|translate\([^)]*\)', rounded, text)
-    return re.sub(r' style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
