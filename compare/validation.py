@@ -20,7 +20,7 @@ from compare.kit.drawing import Evidence
 from compare.kit.engines import WITNESSES, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.programme import Protocol
+from compare.kit.programme import Job
 from compare.kit.progress import Show, ValidationProgress, show_nothing
 from compare.kit.record import Missing, Records, RecordsByEngine
 from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes, threads
@@ -84,22 +84,21 @@ def validate(
         Campaign(output / results.RUNS, workers, limit=limit, report=far.measuring, passing=True) as campaign,
     ):
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
-        jobs = [(protocol, lab) for lab in labs for protocol in todo if protocol.measures(lab)]
-        far.costs = {programme.job_name(protocol.name, lab): programme.cost((protocol, lab)) for protocol, lab in jobs}
+        known = [Job(each, lab, output, sets) for lab in labs for each in PROTOCOLS if each.measures(lab)]
+        jobs = [job for job in known if job.protocol in todo]
+        far.costs = {job.name: job.cost for job in jobs}
         judging = _Judging(chosen, engines, lambda *of: bench.submit(_announced, announce, *of), far.judged)
         judging.judge(jobs)
-        for job, found in programme.run(tuple(jobs), sets, output):
-            protocol, lab = job
+        for job, found in programme.run(tuple(jobs)):
             jobs.remove(job)
-            far.measured(programme.job_name(protocol.name, lab))
-            judging.take(protocol, lab, found, [*(sets or protocol.measures(lab))])
+            far.measured(job.name)
+            judging.take(job, found)
             judging.judge(jobs)
     verdicts = {name: future.result() for name, future in judging.judged.items()}
-    files: dict[str, dict[int, list[str]]] = {each.name: {} for each in engines}
-    for lab in labs:
-        paths = [programme.measurements_file(each, output, lab, sets) for each in PROTOCOLS if each.measures(lab)]
-        there = [path.relative_to(output).as_posix() for path in paths if path.exists()]
-        files[lab.engine.name][lab.refine] = there
+    files: dict[str, dict[int, list[str]]] = {each.name: {n: [] for n in each.refine} for each in engines}
+    for job in known:
+        if job.file.exists():
+            files[job.lab.engine.name][job.lab.refine].append(job.file.relative_to(output).as_posix())
     count = workers if isinstance(workers, int) else workers.count
     with processes(min(count, os.cpu_count() or 1)) as work:
         draw = far.drawing(work.map) if report else None
@@ -121,20 +120,20 @@ class _Judging:
         self.measured = {each.name: dict.fromkeys(each.refine, Records()) for each in self.engines}
         self.broken, self.judged = dict[str, str](), dict[str, Future[Verdict]]()
 
-    def take(self, protocol: Protocol, lab: Lab, found: Records | Exception, sets: Sequence[str]) -> None:
+    def take(self, job: Job, found: Records | Exception) -> None:
         """Take in what a protocol has measured, or its error, which takes its own claims with it, and no others."""
         if isinstance(found, Exception):
             why = f"{type(found).__name__}: {found}"
-            if lab.engine is self.engines[0]:
-                self.broken[protocol.name] = f"{protocol.name}: {why}"
+            name = job.protocol.name
+            if job.lab.engine is self.engines[0]:
+                self.broken[name] = f"{name}: {why}"
                 return
-            why = f"{programme.job_name(protocol.name, lab)}: {why}"
-            found = Records(missing=tuple(Missing(protocol.name, each, why) for each in sets))
-        self.measured[lab.engine.name][lab.refine] += found
+            found = Records(missing=tuple(Missing(name, each, f"{job.name}: {why}") for each in job.sets))
+        self.measured[job.lab.engine.name][job.lab.refine] += found
 
-    def judge(self, jobs: Sequence[programme.Job]) -> None:
+    def judge(self, jobs: Sequence[Job]) -> None:
         """Begin to judge all claims that wait for none of these protocols."""
-        waiting = {protocol.name for protocol, _ in jobs}
+        waiting = {job.protocol.name for job in jobs}
         for claim in self.claims:
             # Next to a threshold a settled state has no limit: see `witnesses.MARGIN`.
             needed = claim.protocols | ({"thresholds"} if "settled" in claim.protocols else set())

@@ -20,7 +20,6 @@ import numpy as np
 from matplotlib import textpath
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
 from matplotlib.container import Container
 from matplotlib.figure import Figure
@@ -105,31 +104,26 @@ def plain(label: str) -> str:
 
 
 def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
-    """The box of axes, and the scale of each axis as in `_scale`: panels in a row or column share one label."""
+    """The box of axes, and of each axis its label, its kind, and (a, b): panels in a row or column share one label.
+
+    a + b times the place is the value, or its logarithm.
+    """
     width, height = 72 * figure.get_size_inches()
     box = axes.get_position()
-    x, y = (box.x0 * width, box.x1 * width), (height * (1 - box.y0), height * (1 - box.y1))
-    columns, rows = axes.get_shared_x_axes().get_siblings(axes), axes.get_shared_y_axes().get_siblings(axes)
-    return {
-        "box": [round(float(v), 2) for v in (*x, *reversed(y))],
-        "x": _scale("x", axes.xaxis, axes.get_xlim(), x, [axes, *columns]),
-        "y": _scale("y", axes.yaxis, axes.get_ylim(), y, [axes, *rows]),
-    }
-
-
-def _scale(
-    name: str, axis: Axis, limits: tuple[float, float], places: tuple[float, float], alike: list[Axes]
-) -> dict[str, Any]:
-    """Label and kind of an axis, and (a, b) for a page: a + b times the place is the value, or its logarithm."""
-    label = next(filter(None, (getattr(each, f"get_{name}label")() for each in alike)), name)
-    about: dict[str, Any] = {"label": str(typeset(plain(label))), "kind": axis.get_scale()}
-    low, high = np.log10(limits) if about["kind"] == "log" else limits
-    slope = (high - low) / (places[1] - places[0])
-    about |= {"a": float(f"{low - slope * places[0]:.8g}"), "b": float(f"{slope:.8g}")}
-    if isinstance(formatter := axis.get_major_formatter(), FixedFormatter):
-        names = zip(axis.get_majorticklocs().tolist(), formatter.seq, strict=False)
-        about["names"] = [[at, str(typeset(plain(name)))] for at, name in names]
-    return about
+    places = {"x": (box.x0 * width, box.x1 * width), "y": (height * (1 - box.y0), height * (1 - box.y1))}
+    scales: dict[str, Any] = {"box": [round(float(v), 2) for v in (*places["x"], *reversed(places["y"]))]}
+    for name, (first, last) in places.items():
+        axis, limits = getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")()
+        alike = axes, *getattr(axes, f"get_shared_{name}_axes")().get_siblings(axes)
+        label = next(filter(None, (getattr(each, f"get_{name}label")() for each in alike)), name)
+        low, high = np.log10(limits) if axis.get_scale() == "log" else limits
+        b = (high - low) / (last - first)
+        about = {"label": str(typeset(plain(label))), "kind": axis.get_scale()}
+        scales[name] = about | {"a": float(f"{low - b * first:.8g}"), "b": float(f"{b:.8g}")}
+        if isinstance(formatter := axis.get_major_formatter(), FixedFormatter):
+            marks = zip(axis.get_majorticklocs().tolist(), formatter.seq, strict=False)
+            scales[name]["names"] = [[at, str(typeset(plain(text)))] for at, text in marks]
+    return scales
 
 
 def _join_marks(group: ElementTree.Element) -> None:

@@ -76,35 +76,53 @@ class Protocol:
         return {name: p for name, p in known.items() if name in names and not (lab.is_witness and self.engine)}
 
 
-Job = tuple[Protocol, Lab]
-"""A protocol, and where it is carried out."""
+@dataclass(frozen=True)
+class Job:
+    """A protocol, and by whom, on which sets, and where it is carried out."""
 
+    protocol: Protocol
+    lab: Lab
+    results: Path
+    """The results directory."""
+    chosen: Mapping[str, Parameters] | None = None
+    """Sets in the place of the protocol's own."""
 
-def measurements_file(protocol: Protocol, results: Path, lab: Lab, chosen: Mapping[str, Parameters] | None) -> Path:
-    """The file of a protocol's measurements: another one for each engine, step, level, choice of sets, and program."""
-    engine, sets = protocol.engine or lab.engine, protocol.measures(lab) if chosen is None else chosen
-    subject, measure, _ = protocol.measure.__module__.partition(".measure")
-    identity = [
-        engine.name,
-        lab.refine,
-        lab.level.name,
-        {name: asdict(p) for name, p in sets.items()},
-        sources(*engine.sources, "compare.kit", *([subject + measure] if measure else [])),
-    ]
-    apart = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
-    return results / DIRECTORY / apart / f"{protocol.name}.h5"
+    @property
+    def name(self) -> str:
+        """The name of the protocol, and of the engine and its step where these are not those on trial."""
+        return self.beside(self.protocol.name) if self.lab.is_witness else self.protocol.name
 
+    def beside(self, protocol: str) -> str:
+        """The name of another protocol by the same engine with the same step."""
+        return f"{protocol} by {self.lab.engine.name}, step/{self.lab.refine}"
 
-def job_name(protocol: str, lab: Lab) -> str:
-    """The name of a protocol, and of the engine and its step where these are not those on trial."""
-    return f"{protocol} by {lab.engine.name}, step/{lab.refine}" if lab.is_witness else protocol
+    @property
+    def sets(self) -> Mapping[str, Parameters]:
+        """What is measured, by name."""
+        return self.protocol.measures(self.lab) if self.chosen is None else self.chosen
 
+    @property
+    def cost(self) -> float:
+        """About its processor time at the quick level, relative to others."""
+        if not self.lab.is_witness:
+            return self.protocol.cost
+        asked = len(self.protocol.measures(replace(self.lab, level=Level.QUICK)))
+        return self.protocol.cost * asked / max(len(self.protocol.assignment.quick), 1) * self.lab.refine
 
-def cost(job: Job) -> float:
-    """About the processor time of a protocol at the quick level, relative to others."""
-    protocol, lab = job
-    asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.assignment.quick), 1)
-    return protocol.cost * asked * lab.refine if lab.is_witness else protocol.cost
+    @property
+    def file(self) -> Path:
+        """Where its measurements are kept: elsewhere for each engine, step, level, choice of sets, and program."""
+        engine = self.protocol.engine or self.lab.engine
+        subject, measure, _ = self.protocol.measure.__module__.partition(".measure")
+        identity = [
+            engine.name,
+            self.lab.refine,
+            self.lab.level.name,
+            {name: asdict(p) for name, p in self.sets.items()},
+            sources(*engine.sources, "compare.kit", *([subject + measure] if measure else [])),
+        ]
+        apart = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
+        return self.results / DIRECTORY / apart / f"{self.protocol.name}.h5"
 
 
 def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
@@ -119,41 +137,38 @@ def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Pro
     return [protocol for name, protocol in known.items() if name in wanted]
 
 
-def run(
-    jobs: Sequence[Job], chosen: Mapping[str, Parameters] | None, results: Path
-) -> Iterator[tuple[Job, Records | Exception]]:
+def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
     """Carry out protocols, some at once if they need nothing of each other; yield each as it ends, with its records.
 
     A protocol that breaks down comes with its exception, and so do those that need it: what they measured without it
-    would be kept, and taken for whole the next time.
-    The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
+    would be kept, and taken for whole the next time. Raises `StorageError` where files can't be read or written.
     """
     if not jobs:
         return
-    known = {job_name(protocol.name, lab): (protocol, lab) for protocol, lab in jobs}
-    needs = {
-        name: [other if other in known else job_name(other, lab) for other in protocol.needs]
-        + [protocol.name] * (protocol.follows and name != protocol.name)
-        for name, (protocol, lab) in known.items()
-    }
+    known = {job.name: job for job in jobs}
+    needs = {}
+    for name, job in known.items():
+        needs[name] = [other if other in known else job.beside(other) for other in job.protocol.needs]
+        needs[name] += [job.protocol.name] * (job.protocol.follows and name != job.protocol.name)
     order = TopologicalSorter({name: [each for each in those if each in known] for name, those in needs.items()})
     order.prepare()
     found: dict[str, Records] = {}
     broken: dict[str, Exception] = {}
     running: dict[Future[Records], str] = {}
-    workers = jobs[0][1].campaign.fleet
+    workers = jobs[0].lab.campaign.fleet
     # Two jobs more than workers at once, as some wait for a single long run.
     with threads(workers.count + 2 if workers.count > 1 else 1) as pool:
         try:
             while order.is_active():
-                for name in sorted(order.get_ready(), key=lambda name: (not known[name][0].first, -cost(known[name]))):
-                    if lost := [broken[other] for other in needs[name] if other in broken]:
+                ready = [known[name] for name in order.get_ready()]
+                for job in sorted(ready, key=lambda job: (not job.protocol.first, -job.cost)):
+                    if lost := [broken[other] for other in needs[job.name] if other in broken]:
                         future = Future[Records]()
                         future.set_exception(lost[0])
                     else:
-                        before = sum((found[other] for other in needs[name] if other in found), Records())
-                        future = pool.submit(carry_out, *known[name], chosen, before, results)
-                    running[future] = name
+                        before = sum((found[other] for other in needs[job.name] if other in found), Records())
+                        future = pool.submit(carry_out, job, before)
+                    running[future] = job.name
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     name, error = running.pop(future), future.exception()
                     order.done(name)
@@ -170,23 +185,20 @@ def run(
             raise
 
 
-def carry_out(
-    protocol: Protocol, lab: Lab, chosen: Mapping[str, Parameters] | None, before: Records, results: Path
-) -> Records:
-    """What a protocol measures after others, on the sets `chosen` or its own; what is kept is not measured again.
+def carry_out(job: Job, before: Records) -> Records:
+    """What a protocol measures after others; what is kept is not measured again.
 
     Its measurement file is the record of what is done: once it is there, only the runs that a figure draws are kept.
 
     Raises `StorageError` where measurements can't be read or written.
     """
-    path = measurements_file(protocol, results, lab, chosen)
+    path, protocol = job.file, job.protocol
     label = f"{protocol.name}-{path.parent.name}"
-    campaign = lab.campaign.part(label, job_name(protocol.name, lab))
-    lab = replace(lab, engine=protocol.engine or lab.engine, campaign=campaign)
+    campaign = job.lab.campaign.part(label, job.name)
     if not path.exists():
-        rows: list[Measurement | Missing] = []
-        strong = dict(protocol.measures(lab) if chosen is None else chosen)
-        for name, p in list(strong.items()):
+        lab = replace(job.lab, engine=protocol.engine or job.lab.engine, campaign=campaign)
+        strong, rows = dict(job.sets), list[Measurement | Missing]()
+        for name, p in job.sets.items():
             weak = UNDAMPED if p.c == 0 else ""
             if p.c and protocol.waits and (steps := 1 / (p.c * coarse_step(p))) > LONGEST_WAIT:
                 weak = f"drag is so weak (1/c = {1 / p.c:.3g} s, {steps:.2g} time steps)"

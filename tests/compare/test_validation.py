@@ -11,7 +11,7 @@ from compare.claim import Bearing, Outcome, Verdict
 from compare.kit import programme
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
-from compare.kit.programme import UNDAMPED, Protocol
+from compare.kit.programme import UNDAMPED, Job, Protocol
 from compare.kit.record import Check, Missing, Records
 from compare.report import results
 from model import Parameters, StorageError
@@ -141,7 +141,7 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab):
     named = {name: Parameters.named(name) for name in ("air", "steel-in-water")}
     for waits in (True, False):
         protocol = Protocol(f"waits-{waits}", measure, waits=waits)
-        missing = programme.carry_out(protocol, lab, named, Records(), tmp_path).missing
+        missing = programme.carry_out(Job(protocol, lab, tmp_path, named), Records()).missing
         assert [m.set for m in missing] == ["air"] * waits
         assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
     assert seen == ["steel-in-water", "air", "steel-in-water"]
@@ -150,11 +150,11 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab):
 def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(tmp_path, lab):
     for engine in (None, MUJOCO):  # what one measured is not taken for the other's
         protocol = Protocol("round", going_round, engine=engine)
-        (row,) = programme.carry_out(protocol, lab, {"mine": SETS["mine"]}, Records(), tmp_path).measurements
+        (row,) = programme.carry_out(Job(protocol, lab, tmp_path, {"mine": SETS["mine"]}), Records()).measurements
         assert row.engine == (engine or EVENT).name
     for name, count in (("mine", 1), ("reference", 0)):
         protocol = Protocol(f"of-{name}", lambda lab, sets, records: (), alone="it is that of the reference")
-        missing = programme.carry_out(protocol, lab, {name: SETS["mine"]}, Records(), tmp_path).missing
+        missing = programme.carry_out(Job(protocol, lab, tmp_path, {name: SETS["mine"]}), Records()).missing
         assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
 
 
