@@ -13,8 +13,7 @@ __all__ = ["Check", "Claim", "Level", "Outcome", "Verdict", "validate"]
 
 pytest_plugins = ("compare.plugin",)
 """Pytest's entry point is this package, not that module: a foreign ``compare`` has no such line, and breaks no run."""
-_CLAIM = "compare.claim"
-_MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), _CLAIM) | {
+_MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), "compare.claim") | {
     "Check": "compare.kit.record",
     "Level": "compare.kit.levels",
     "validate": "compare.validation",

@@ -77,11 +77,6 @@ class Bearing:
     def __post_init__(self) -> None:
         quantity(self.quantity)
 
-    @property
-    def number(self) -> bool:
-        """Whether it predicts a number rather than a case, a count, or on which side of a bound something is."""
-        return quantity(self.quantity).resolves > 0 and self.relation is Relation.EQUAL
-
 
 @dataclass(frozen=True)
 class Claim:

@@ -13,7 +13,7 @@ import analytic
 from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.quantities import quantity
-from compare.kit.record import Check, Measurement, Missing, Records
+from compare.kit.record import Check, Measurement, Missing, Records, Relation
 from compare.kit.settling import ERROR_GROUPS, scale
 from compare.kit.statistics import COVERAGE, Measured
 from compare.kit.trials import slip_unit
@@ -91,7 +91,8 @@ def outcome(claim: Claim, checks: Sequence[Check], wanted: Counter[int]) -> Outc
         return Outcome.REFUTED
     if undecided_bearings(checks, wanted):
         return Outcome.INCONCLUSIVE
-    numbers = {n for n, bearing in enumerate(claim.bearings) if bearing.number}
+    equal = {n: each.quantity for n, each in enumerate(claim.bearings) if each.relation is Relation.EQUAL}
+    numbers = {n for n, name in equal.items() if quantity(name).resolves > 0}  # no case, no count, no bound
     if not checks or (numbers and numbers.isdisjoint(per_bearing(checks))):
         return Outcome.NOT_RUN
     return Outcome.CONFIRMED

@@ -169,16 +169,11 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
     return rows
 
 
-def undecided_claims(ran: Sequence[Verdict]) -> list[str]:
-    """Ids of the claims that were expected to be decided, but can't be from what was measured."""
-    return [verdict.claim.id for verdict in ran if verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed]
-
-
 def headline(ran: Sequence[Verdict]) -> str:
     """All verdicts in a sentence: the claims that failed or are undecided, or that the engine agrees."""
-    undecided = undecided_claims(ran)
-    failed = [verdict.claim.id for verdict in ran if not verdict.passed and verdict.claim.id not in undecided]
-    parts = []
+    parts, bad = [], [verdict for verdict in ran if not verdict.passed]
+    undecided = [verdict.claim.id for verdict in bad if verdict.outcome is Outcome.INCONCLUSIVE]
+    failed = [verdict.claim.id for verdict in bad if verdict.outcome is not Outcome.INCONCLUSIVE]
     for what, ids in (("did not come out as expected", failed), ("can't be told from what was measured", undecided)):
         more = f" and {len(ids) - 4} more" if len(ids) > 4 else ""
         parts += [f"{len(ids)} of {len(ran)} claims {what}: {', '.join(ids[:4])}{more}"] * bool(ids)
@@ -193,7 +188,7 @@ def headline(ran: Sequence[Verdict]) -> str:
 def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims came out as expected, by kind, and how many didn't: counts with what they count."""
     passed = [verdict for verdict in ran if verdict.passed]
-    left = len(undecided_claims(ran))
+    left = sum(verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed for verdict in ran)
     counts = {
         "confirmed by measurement": sum(v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed),
         "refuted as expected": sum(v.outcome is Outcome.REFUTED for v in passed),

@@ -72,7 +72,8 @@ def draw_plane(plane: Plane) -> tuple[Figure, str]:
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3",
                   transform=axes.get_xaxis_transform())  # fmt: skip
-    for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
+    for engine in dict.fromkeys(check.measurement.engine for check in plane.checks):
+        own = [check for check in plane.checks if check.measurement.engine == engine]
         axes.plot(*_places_of(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
     if failed := [check for check in plane.checks if not check.agrees]:
         axes.plot(*_places_of(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
