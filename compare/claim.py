@@ -8,7 +8,7 @@ the paper's text had to be corrected, or holds formally only, is another matter:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 from statistics import median
@@ -124,15 +124,39 @@ def claim(id: str, source: str, statement: str, *bearings: Bearing, **more: Any)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Witness:
-    """What one engine says of a claim."""
+class Judged:
+    """What numbers say of a claim."""
+
+    outcome: Outcome
+    checks: tuple[Check, ...] = ()
+
+    @property
+    def worst(self) -> float:
+        """Largest deviation divided by its tolerance; inf where theory knows no such state, nan without numbers."""
+        return max((check.share for check in self.checks), default=math.nan)
+
+    @property
+    def resolving_power(self) -> dict[str, float]:
+        """By quantity, the smallest relative error of theory that every conclusive check would notice.
+
+        That of all checks where none is conclusive.
+        """
+        power: dict[str, float] = {}
+        fine = {check.measurement.quantity for check in self.checks if check.conclusive}
+        for check in self.checks:
+            name = check.measurement.quantity
+            if name not in ("case", "cases") and (check.conclusive or name not in fine):
+                power[name] = max(power.get(name, 0.0), check.resolves)
+        return power
+
+
+@dataclass(frozen=True, kw_only=True)
+class Witness(Judged):
+    """What one engine says of a claim: by checks in the limit of no time step, where it is judged so."""
 
     engine: str
-    outcome: Outcome
     reason: str = ""
     """Why it was not asked, or leaves the claim undecided."""
-    checks: tuple[Check, ...] = ()
-    """In the limit of no time step, where the engine is judged so."""
     order: float = math.nan
     """Median of the orders in the time step with which the numbers converge; nan where the step shows nothing."""
     deviations: tuple[float, ...] = ()
@@ -147,23 +171,16 @@ class Witness:
         return median(self.deviations) if self.deviations else math.nan
 
     @property
-    def worst(self) -> float:
+    def farthest(self) -> float:
         """The largest deviation; nan where there are none."""
         return max(self.deviations, default=math.nan)
 
-    @property
-    def resolving_power(self) -> Mapping[str, float]:
-        """By quantity, the smallest relative error of theory that every conclusive check would notice."""
-        return resolving_power(self.checks)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """What the numbers say of a claim."""
+class Verdict(Judged):
+    """What the numbers of the engine on trial say of a claim."""
 
     claim: Claim
-    outcome: Outcome
-    checks: tuple[Check, ...] = ()
     error: str = ""
     """Why it could not be judged."""
     missing: tuple[Missing, ...] = ()
@@ -185,27 +202,3 @@ class Verdict:
     def left_out(self) -> int:
         """How many measurements its protocols left out."""
         return sum(each.rows for each in self.missing)
-
-    @property
-    def resolving_power(self) -> Mapping[str, float]:
-        """By quantity, the smallest relative error of theory that every conclusive check would notice."""
-        return resolving_power(self.checks)
-
-    @property
-    def worst(self) -> float:
-        """Largest deviation divided by its tolerance; inf where theory knows no such state."""
-        return max((check.share for check in self.checks), default=math.nan)
-
-
-def resolving_power(checks: Sequence[Check]) -> dict[str, float]:
-    """By quantity, the smallest relative error of theory that every conclusive check would notice.
-
-    That of all checks where none is conclusive.
-    """
-    power: dict[str, float] = {}
-    fine = {check.measurement.quantity for check in checks if check.conclusive}
-    for check in checks:
-        name = check.measurement.quantity
-        if name not in ("case", "cases") and (check.conclusive or name not in fine):
-            power[name] = max(power.get(name, 0.0), check.resolves)
-    return power

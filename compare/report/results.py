@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
@@ -81,13 +80,12 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
     counts = {name: sum(getattr(check, name) for check in verdict.checks) for name in ("agrees", "conclusive")}
     counts["left_out"] = verdict.left_out
-    power = {"resolving_power": dict(verdict.resolving_power), "worst": verdict.worst}
+    power = {"resolving_power": verdict.resolving_power, "worst": verdict.worst}
     less = {"expected": verdict.claim.expected, "missing": [*map(str, verdict.missing)], "error": verdict.error}
     about["witnesses"] = {
         each.engine: {name: getattr(each, name) for name in ("outcome", "reason", "order", "left_out")}
-        | {"checks": len(each.checks), "worst": max((check.share for check in each.checks), default=math.nan)}
-        | {"resolving_power": dict(each.resolving_power)}
-        | {"deviation_at_2ms": {"typical": each.typical, "worst": each.worst}}
+        | {"checks": len(each.checks), "worst": each.worst, "resolving_power": each.resolving_power}
+        | {"deviation_at_2ms": {"typical": each.typical, "worst": each.farthest}}
         for each in verdict.witnesses
     }
     told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)

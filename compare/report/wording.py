@@ -127,12 +127,12 @@ def witness_sentence(witness: Witness) -> str:
     if witness.outcome in (Outcome.NOT_ASKED, Outcome.ERROR):
         return f"{witness.outcome}: {witness.reason}"
     order = f", converging with order {witness.order:.1f}" if math.isfinite(witness.order) else ""
-    at = f"; at 2 ms typically off by {percent(witness.typical)}, at most {percent(witness.worst)}"
+    at = f"; at 2 ms typically off by {percent(witness.typical)}, at most {percent(witness.farthest)}"
     left_out = f"; {witness.left_out} not measured" if witness.left_out else ""
     count = len(witness.checks)
     numbers = f" on {count} number{'s' if count > 1 else ''}" if count else ""
     errors = f"; would notice {found}" if (found := noticed_errors(witness.resolving_power)) else ""
-    off, why = at if math.isfinite(witness.worst) else "", f"; {witness.reason}" if witness.reason else ""
+    off, why = at if math.isfinite(witness.farthest) else "", f"; {witness.reason}" if witness.reason else ""
     return f"{witness.outcome}{numbers}{order}{errors}{off}{left_out}{why}"
 
 
@@ -163,7 +163,7 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
             "refuted": refuted,
             "open": str(counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]),
             "typical": percent(median(each.typical for each in off)) if off else "–",
-            "worst": percent(max(each.worst for each in off)) if off else "–",
+            "worst": percent(max(each.farthest for each in off)) if off else "–",
         }
         rows.append(row)
     return rows

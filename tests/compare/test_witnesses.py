@@ -94,7 +94,7 @@ def test_a_claim_is_judged_in_the_limit_of_no_step(left, least, steps, near, out
     assert plain.outcome is outcome
     for check in plain.checks:
         assert (plain.left_out, plain.order) == (0, pytest.approx(1.0, abs=1e-6))
-        assert plain.typical == plain.worst == pytest.approx(left + least / 2)
+        assert plain.typical == plain.farthest == pytest.approx(left + least / 2)
         resolves = quantity("omega_c").resolves
         assert check.ceiling == max(resolves, min(CEILING * resolves, COARSEST))
 
@@ -119,7 +119,7 @@ def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
 @pytest.mark.parametrize(("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)])
 def test_an_engine_as_it_comes_may_be_off_by_its_allowance(error, outcome):
     defaults = said({2: seen(error)}, witness="mujoco-defaults")
-    assert (defaults.outcome, defaults.worst) == (outcome, pytest.approx(error))
+    assert (defaults.outcome, defaults.farthest) == (outcome, pytest.approx(error))
 
 
 def test_who_was_asked_and_measured_nothing_is_undecided_and_says_why():
