@@ -121,7 +121,6 @@ class Campaign:
         self._failed: dict[str, Failure] = {}
         self._lock = threading.Lock()
         self._read: dict[str, Trajectory] = {}
-        self._samples = 0
         # A file that was cut or changed is set aside; those of other versions of the program are left alone.
         others, ours = 0, current_versions()["dualball"]
         for file in sorted(self.directory.glob("*.h5")):
@@ -153,7 +152,7 @@ class Campaign:
     def part(self, label: str, doing: str) -> Campaign:
         """A part of the campaign with a label and runs of its own, which another thread may carry out."""
         part = copy.copy(self)
-        part.label, part.doing, part._read, part._samples = label, doing, {}, 0
+        part.label, part.doing, part._read = label, doing, {}
         part._files = {key: f for key, f in self._files.items() if label in (f.stem, f.name.rpartition("-")[0])}
         return part
 
@@ -169,16 +168,15 @@ class Campaign:
 
         What isn't stored is before it is forgotten, all at once.
         """
-        for key, run in runs.items():
-            before = self._read.pop(key, None)
-            self._samples += len(run.time) - (len(before.time) if before else 0)
-            self._read[key] = run
-        while self._samples > READ and len(self._read) > len(runs):
-            first = next(iter(self._read))
+        others = [key for key in self._read if key not in runs]
+        self._read = {key: self._read[key] for key in others} | dict(runs)
+        samples = sum(len(run.time) for run in self._read.values())
+        while samples > READ and others:
+            first = others.pop(0)
             if first not in self._files:
                 loose = {key: run for key, run in self._read.items() if key not in self._files}
                 self._files |= dict.fromkeys(loose, self._storing.store(loose))
-            self._samples -= len(self._read.pop(first).time)
+            samples -= len(self._read.pop(first).time)
 
     @property
     def _storing(self) -> Storing:
@@ -209,13 +207,12 @@ class Campaign:
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
         for batch, outcomes in self._carry_out(todo):
-            for task, (reason, file, run) in zip(batch, outcomes, strict=True):
+            for task, (reason, file, _) in zip(batch, outcomes, strict=True):
                 failures += [Failure(task, reason)] if reason else []
                 done += not reason
                 if file:
                     self._files[task.key] = file
-                if run:
-                    self._keep_in_memory({task.key: run})
+            self._keep_in_memory({task.key: run for task, (*_, run) in zip(batch, outcomes, strict=True) if run})
             self.report(self.doing, done, len(unique), len(failures))
         with self._lock:  # the parts of a campaign share the list
             if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
@@ -237,7 +234,7 @@ class Campaign:
         gone = {file for file in own if not file.name.endswith(_BROKEN)}
         for file in gone:
             file.unlink(missing_ok=True)
-        self._read, self._samples = {}, 0
+        self._read = {}
         self._files = {key: file for key, file in self._files.items() if file not in gone}
 
     def _carry_out(self, todo: Iterable[Task]) -> Iterator[tuple[Sequence[Task], Sequence[Ended]]]:
