@@ -21,9 +21,9 @@ EXCEPTIONS = {
     *("mjsim/engine.py:__init__", "mjsim/engine.py:simulate", "mjsim/engine.py:simulate_many"),
     *("compare/validation.py:validate", "compare/view/render.py:write"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
-    *("analytic/simulation/equations.py:forces", "analytic/simulation/equations.py:is_straight"),
+    "analytic/simulation/equations.py:forces",
     *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_interpolant", "_first_fall")),
-    *(f"analytic/simulation/solvers.py:_{name}" for name in ("extrapolation_step", "explicit_steps", "implicit_steps")),
+    *("analytic/simulation/solvers.py:_explicit_steps", "analytic/simulation/solvers.py:_implicit_steps"),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
     *("mjsim/corrections.py:corrections", "mjsim/free.py:through"),
     *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_hand_on", "_holds", "_put_back")),
@@ -37,7 +37,6 @@ SAME = {
     # what every subject, file format, adapter or page has
     *("CAPTION", "CLAIMS", "DEFAULTS", "FIGURES", "PROTOCOL", "PROTOCOLS", "SCHEMA", "SCHEMA_VERSION", "SECTIONS"),
     *("Scene", "Settings", "best", "defaults", "free"),
-    "TEXT",  # what is compiled
     # the same, with another value: degrees of polynomials, records, random numbers, units and symbols of other names
     *("DEGREES", "EPS", "FEWEST", "G", "LEAST", "LISTED", "PATIENCE", "PUSH", "REFINED", "RTOL", "SEED", "SET"),
     *("SKIPPED", "STARTS", "STEPS", "SYMBOLS", "T", "UNITS"),

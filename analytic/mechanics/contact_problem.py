@@ -252,10 +252,3 @@ def solve_pair(
         at_B = Impulse(at_B.n + pace * step.n, at_B.s + pace * step.s, at_B.t + pace * step.t)
         count += 1
     return at_A, at_B, change
-
-
-TEXT = (
-    solve_pair, project, _implicit_step, _contact_state, _cross, _dot, _sweep_rate, _need, _project_rate, _share_met,
-    solve,
-)  # fmt: skip
-"""What is compiled where numba is installed."""

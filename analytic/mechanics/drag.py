@@ -164,7 +164,3 @@ def ramp_lag(s: Any) -> Any:
     small = np.abs(s) < 1e-2
     safe = np.where(small, 1.0, s)
     return np.where(small, series, (safe + np.expm1(-safe)) / safe**2)
-
-
-TEXT = (rate, ramp_lag, fall_speed, fall, fall_time)
-"""What `simulation` compiles where numba is installed."""

@@ -88,7 +88,3 @@ def mean(a: Velocities, b: Velocities) -> Velocities:
     """The mean of two velocities."""
     o_x, o_y, o_z = (a.o_x + b.o_x) / 2, (a.o_y + b.o_y) / 2, (a.o_z + b.o_z) / 2
     return Velocities((a.v_h + b.v_h) / 2, (a.v_y + b.v_y) / 2, (a.v_k + b.v_k) / 2, o_x, o_y, o_z)
-
-
-TEXT = (velocities, state, slip_at_A, slip_at_B, apply, contact_work, mean)
-"""What is compiled where numba is installed."""

@@ -220,10 +220,3 @@ def arm_guards(values: Any, k: Motion, arm: Any, level: Any) -> bool:
         level[guard] = 0.0 if values[guard] > arm[guard] else -k.rtol
         opens = opens or (gap and values[guard] == 0)
     return opens
-
-
-TEXT = (
-    count_guards, begin, _begin_on_wall, _begin_off_wall, moment, _moment_off_wall, least_slip, rebound_time,
-    arm_guards,
-)  # fmt: skip
-"""What is compiled where numba is installed."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import gc
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any, TypeVar
 
 try:
@@ -19,61 +19,62 @@ except ImportError:
 F = TypeVar("F", bound=Callable[..., Any])
 _CALLED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _registered = set[Callable[..., Any]]()
+"""Functions that compiled ones may call."""
 
 
-def register(*modules: ModuleType) -> str:
-    """Let compiled functions call the functions that modules list as `TEXT`; return a digest of their sources."""
-    for function in (each for module in modules for each in module.TEXT):
-        if numba is not None and function not in _registered:
-            _registered.add(register_jitable(**_CALLED)(function))
-    return hashlib.sha256(b"".join(Path(str(module.__file__)).read_bytes() for module in modules)).hexdigest()[:16]
+def compiled(function: F, replaced: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({})) -> F:
+    """Compile a function at its first call, for threads to run it at once; without numba it stays as it is.
 
-
-def compiled(digest: str) -> Callable[[F], F]:
-    """A decorator: compiles a function at its first call, for threads to run it at once; without numba leaves it as is.
+    So are the functions of `analytic` that it calls, or those by which some of them are `replaced`.
 
     Numba keeps what it compiles on disk by name and compiles it again when its own file has changed, but not when that
-    of a function has which it calls: the name contains the digest of those.
+    of a function has which it calls: the name contains the digest of those. Of processes that need it at once one
+    compiles, the others take what it keeps.
     """
-
-    def compile_(function: F) -> F:
-        if numba is None or numba.config.DISABLE_JIT:
-            return function
-        own: Any = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
-        own.__qualname__, own.__doc__ = f"{function.__qualname__}_{digest}", function.__doc__
-        try:
-            return _compiled_by_one_process(numba.njit(cache=True, nogil=True, error_model="numpy")(own))  # type: ignore[no-any-return]
-        except RuntimeError:  # no place for a cache
-            return numba.njit(nogil=True, error_model="numpy")(own)  # type: ignore[no-any-return]
-
-    return compile_
-
-
-def _compiled_by_one_process(function: Any) -> Any:
-    """A compiled function: of processes that need it at once one compiles, the others take what it keeps on disk."""
-    compile_ = function._compile_for_args
+    if numba is None or numba.config.DISABLE_JIT:
+        return function
+    for each, other in replaced.items():
+        overload(each, strict=False, jit_options=_CALLED)(lambda *types, other=other: other)
+    called = _called(function, replaced)
+    for each in called - _registered - {*replaced}:
+        _registered.add(register_jitable(**_CALLED)(each))
+    files = sorted({each.__code__.co_filename for each in called})
+    digest = hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()
+    own: Any = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
+    own.__qualname__, own.__doc__ = f"{function.__qualname__}_{digest[:16]}", function.__doc__
+    try:
+        dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(own)
+    except RuntimeError:  # no place for a cache
+        return numba.njit(nogil=True, error_model="numpy")(own)  # type: ignore[no-any-return]
+    compile_ = dispatcher._compile_for_args
 
     def compile_alone(*given: Any, **named: Any) -> Any:
         with ExitStack() as stack:
             with suppress(ImportError, OSError):  # no such locks here
                 import fcntl
 
-                file = stack.enter_context((Path(function.stats.cache_path) / "compiling").open("w"))
+                file = stack.enter_context((Path(dispatcher.stats.cache_path) / "compiling").open("w"))
                 fcntl.flock(file, fcntl.LOCK_EX)
             if gc.isenabled():  # looking for garbage among all that compiling makes takes a tenth of it
                 gc.disable()
                 stack.callback(gc.enable)
             return compile_(*given, **named)
 
-    function._compile_for_args = compile_alone
-    return function
+    dispatcher._compile_for_args = compile_alone
+    return dispatcher  # type: ignore[no-any-return]
 
 
-def in_place_of(function: Callable[..., Any]) -> Callable[[F], F]:
-    """A decorator: where compiled functions call `function`, the decorated one is compiled in its place."""
-
-    def register(other: F) -> F:
-        overload(function, strict=False, jit_options=_CALLED)(lambda *types: other)
-        return other
-
-    return register
+def _called(
+    function: Callable[..., Any], replaced: Mapping[Callable[..., Any], Callable[..., Any]]
+) -> set[Callable[..., Any]]:
+    """The functions of `analytic` that a function calls, by their names or as those of a module; and so on."""
+    found, todo = set[Callable[..., Any]](), [function]
+    while todo:
+        code, known = (one := todo.pop()).__code__, one.__globals__
+        places = [known, *(vars(known[name]) for name in code.co_names if isinstance(known.get(name), ModuleType))]
+        for each in (place.get(name) for place in places for name in code.co_names):
+            each = replaced.get(each, each) if isinstance(each, FunctionType) else None
+            if each and each.__module__.startswith("analytic.") and each not in found:
+                found.add(each)
+                todo.append(each)
+    return found

@@ -1,16 +1,16 @@
 """Event-driven simulation: each case by its own equations, from one change of case to the next.
 
 `follow` goes along the coordinates of `charts` up to the guard that turns negative first, and `transitions` says how to
-go on. One text: where numba is installed `whole_runs` compiles it with the steps of `solvers`, so that a run is one
-call, which threads can make at once; else, and where those steps become too short, it is plain Python with the steps
-of `integrator`.
+go on. One text: where numba is installed it is compiled with the steps of `solvers`, so that a run is one call, which
+threads can make at once; else, and where those steps become too short, it is plain Python with the steps of
+`integrator`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
 
@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import Forces
-from analytic.simulation import charts, equations, motion, transitions
+from analytic.simulation import charts, compiling, equations, motion, solvers, transitions
 from analytic.simulation.charts import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
 from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, Stretch, first_pace, stretch
@@ -185,6 +185,16 @@ def keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
     return near
 
 
+def _keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
+    """`keep_samples` in a form that numba compiles."""
+    near = at.theta
+    for row in range(run.taken[0], taken):
+        m = _with_nearest_azimuth(charts.moment(run.times[row], of.samples[row], at, of.k), of.k, near)
+        near = m.theta
+        _keep_sample(m, of.k, run)
+    return near
+
+
 def _keep_sample(at: Moment, k: Motion, run: Record) -> None:
     """Store a moment as the next sample."""
     row = run.taken[0]
@@ -217,22 +227,7 @@ def _quiet_from(landed: float, times: Array, quiet: float) -> float:
     return float(times[row]) if row < len(times) else math.inf
 
 
-TEXT = (follow, _moment_parts, _with_nearest_azimuth, _keep_sample, _keep_event, _quiet_from)
-"""What is compiled beside `run_through_flow`."""
-
-
-@cache
-def compiled() -> Callable[..., Any] | None:
-    """`run_through_flow`, compiled; None where numba isn't installed."""
-    try:
-        import numba
-
-        if numba.config.DISABLE_JIT:
-            return None
-        from analytic.simulation.whole_runs import go_through as whole
-    except ImportError:
-        return None
-    return whole
+run_compiled = compiling.compiled(run_through_flow, {stretch: solvers.stretch, keep_samples: _keep_samples})
 
 
 @lru_cache
@@ -253,14 +248,14 @@ def carry_out(
     In plain Python where the compiled text isn't there or can't go on.
     """
     failure: Exception | None = None
-    for way, waves in ((compiled(), np.array(k.waves, dtype=float).reshape(-1, 3)), (run_through_flow, k.waves)):
-        if not way:
-            continue
-        k = k._replace(waves=waves)
+    for way in dict.fromkeys((run_compiled, run_through_flow)):
+        waves = k.waves if way is run_through_flow else np.array(k.waves, dtype=float).reshape(-1, 3)
         run, stage, done = rows(), Stage(start), False
         try:
             while not done:
-                done, (time, theta, x, *rest), *far = way(stage, k, pieces, run, STRIDES if look else ENDLESS, STEPS)
+                done, (time, theta, x, *rest), *far = way(
+                    stage, k._replace(waves=waves), pieces, run, STRIDES if look else ENDLESS, STEPS
+                )
                 stage = Stage(Moment(time, theta, State(*x), *rest), *far)
                 if look:
                     look(run)

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from analytic.simulation import equations
 from analytic.simulation.charts import TURNING, least_slip
-from analytic.simulation.equations import FINER, LOCAL, ONSET_SLIP, PATIENCE, SMALL_SLIP, Motion, is_straight
+from analytic.simulation.equations import FINER, LOCAL, ONSET_SLIP, PATIENCE, SMALL_SLIP, Motion
 from model.arrays import Array
 
 DONE, FIRED, STUCK, PAUSED = range(4)
@@ -60,8 +60,43 @@ def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, fir
     return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 
 
-TEXT = (first_pace,)
-"""What is compiled where numba is installed."""
+def finish_straight(t: float, of: Stretch, taken: int) -> bool:
+    """Whether a straight line solves the equations for the rest of a stretch and no guard fires; it is then filled in.
+
+    What moves by less than the tolerance is taken to rest.
+    """
+    k, until, z, scale, times, samples, arm, _ = of
+    if len(k.waves) > 0 or k.line.slope != 0:
+        return False
+    rate, there, other, values, left = (
+        np.empty(len(z)),
+        np.empty(len(z)),
+        np.empty(len(z)),
+        np.empty(len(arm)),
+        until - t,
+    )
+    equations.rates(t, z, k, rate)
+    for i in range(len(z)):
+        if left * abs(rate[i]) < k.rtol * scale[i]:
+            rate[i] = 0.0
+    for ahead in (left / 2, left):
+        for i in range(len(z)):
+            there[i] = z[i] + ahead * rate[i]
+        equations.rates(t + ahead, there, k, other)
+        for i in range(len(z)):
+            if left * abs(other[i] - rate[i]) > k.rtol * scale[i]:
+                return False
+        equations.guards(t + ahead, there, k, values)
+        for value in values:
+            if value < 0:
+                return False
+    while taken < len(times) and times[taken] <= until:
+        for i in range(len(z)):
+            samples[taken, i] = z[i] + (times[taken] - t) * rate[i]
+        taken += 1
+    for i in range(len(z)):
+        z[i] = there[i]
+    return True
 
 
 def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
@@ -72,7 +107,7 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
     """
     start, tau, first, small, slow = pace
     t, steps, failures = start + tau, 0, 0
-    if slow and _finish_straight(t, of, taken):
+    if slow and finish_straight(t, of, taken):
         return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
     while t < of.until:
         slow, method = 0, BDF if small else LSODA
@@ -83,7 +118,7 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
                     return FIRED, (t, 0.0, 0.0, small, 0), guard, taken
                 grown = least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP
                 slow = 0 if grown else slow + 1
-                if slow % PATIENCE == PATIENCE - 1 and _finish_straight(t, of, taken):
+                if slow % PATIENCE == PATIENCE - 1 and finish_straight(t, of, taken):
                     return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
                 if steps >= most and t < of.until:
                     return PAUSED, (t, 0.0, 0.0, small, 0), -1, taken
@@ -95,18 +130,6 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
                 return STUCK, (t, 0.0, 0.0, small, 0), -1, taken
         small = not small
     return DONE, pace, -1, taken
-
-
-def _finish_straight(t: float, of: Stretch, taken: int) -> bool:
-    """Whether a straight line solves the equations for the rest of a stretch, which is then filled in."""
-    k, until, z, scale, times, samples, arm, _ = of
-    rate, there, other, values = (np.zeros(len(z)) for _ in range(4))
-    if len(k.waves) or k.line.slope or not is_straight(t, until, z, scale, k, rate, values[: len(arm)], there, other):
-        return False
-    due = slice(taken, int(np.searchsorted(times, until, side="right")))
-    samples[due] = z + np.outer(times[due] - t, rate)
-    z[:] = there
-    return True
 
 
 def _steps(method: Any, start: float, of: Stretch, taken: int, first: float) -> Iterator[tuple[float, int, int]]:

@@ -16,7 +16,7 @@ from scipy.integrate import DOP853
 
 from analytic.simulation import charts, equations
 from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, Motion
-from analytic.simulation.integrator import DONE, EPS, FIRED, PAUSED, STUCK, Pace, Stretch
+from analytic.simulation.integrator import DONE, EPS, FIRED, PAUSED, STUCK, Pace, Stretch, finish_straight
 from model.arrays import Array
 
 A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
@@ -95,16 +95,6 @@ def _root(
     return high
 
 
-def _fallen_guard(guard_values: Array, arm: Array, level: Array) -> int:
-    """The first guard that has fallen through its level, or -1; guards that have risen are armed."""
-    for guard in range(len(arm)):
-        if guard_values[guard] > arm[guard]:
-            level[guard] = 0.0
-        elif guard_values[guard] < level[guard]:
-            return guard
-    return -1
-
-
 def _weighted_sum(weights: Array, count: int, K: Array, out: Array) -> None:
     """The sum of the first `count` rows of K (s, n), each times its weight."""
     for i in range(len(out)):
@@ -168,13 +158,21 @@ def _first_fall(
     return fired, end
 
 
-def _time_to_stop(z: Array, rate: Array, slips: range, scale: Array, rtol: float) -> float:
+def _first_length(share: float, rate: Array, left: float, of: Stretch) -> float:
+    """Length of a first step, in which rates would change coordinates by a share of their size, s."""
+    fastest = 0.0
+    for i in range(len(rate)):
+        fastest = max(fastest, abs(rate[i]) / (of.scale[i] / FINER + abs(of.z[i])))
+    return min(left, share / fastest if fastest > 0 else left)
+
+
+def _time_to_stop(rate: Array, rtol: float, of: Stretch) -> float:
     """The time that a slip which dies has left, along a straight line; inf if a direction turns too much for it."""
-    left = math.inf
-    for i in slips:
-        if z[i] < DYING * scale[i] and rate[i] < 0:
-            left = min(left, -z[i] / rate[i])
-    for i in slips:
+    left, (first, end) = math.inf, charts.TURNING[of.k.case]
+    for i in range(first, end, 2):
+        if of.z[i] < DYING * of.scale[i] and rate[i] < 0:
+            left = min(left, -of.z[i] / rate[i])
+    for i in range(first, end, 2):
         if left < math.inf and (rate[i + 1] * left) ** 2 > rtol:
             return math.inf
     return left
@@ -186,25 +184,22 @@ def _is_past(time: float, start: float, tau: float) -> bool:
 
 
 def _explicit_steps(
-    k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
-    rtol: float, scale: Array, arm: Array, level: Array, slips: range, most: int,
-) -> tuple[int, float, float, int, int]:  # fmt: skip
-    """Up to `most` explicit steps from start + tau towards start + span: why they end, tau, h, guard, samples taken.
+    of: Stretch, start: float, tau: float, h: float, taken: int, most: int
+) -> tuple[int, float, float, int, int]:
+    """Up to `most` explicit steps from start + tau on: why they end, tau, h, guard, samples taken.
 
-    A slip (coordinates `slips`) below `SMALL_SLIP` for more than `PATIENCE` steps is for the other method.
-    A step is interpolated where a sample is due, or a guard not `CLEAR`.
+    A slip below `SMALL_SLIP` for more than `PATIENCE` steps is for the other method. A step is interpolated where a
+    sample is due, or a guard not `CLEAR`.
     """
-    n, slow, rejected = len(z), 0, False
+    k, until, z, scale, times, samples, arm, level = of
+    n, span, rtol, slow, rejected = len(z), until - start, max(LOCAL * k.rtol, FINEST), 0, False
     K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
     new, now, values, seen = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty((LOOKS_A_STEP + 1, len(arm)))
     five, three = np.empty(n), np.empty(n)
     equations.rates(start + tau, z, k, K[0])
     equations.guards(start + tau, z, k, seen[0])
-    if h <= 0:  # by the size of the rates
-        rate = 0.0
-        for i in range(n):
-            rate = max(rate, abs(K[0, i]) / (scale[i] / FINER + abs(z[i])))
-        h = min(span - tau, 0.01 / rate if rate > 0 else span)
+    if h <= 0:
+        h = _first_length(0.01, K[0], span - tau, of)
     for _ in range(most):
         if tau >= span:
             return DONE, tau, h, -1, taken
@@ -267,23 +262,15 @@ def _explicit_steps(
         rejected = False
         least = charts.least_slip(z, scale, k.case)
         slow = slow + 1 if least <= SMALL_SLIP else 0
-        left = _time_to_stop(z, K[0], slips, scale, rtol) if least < DYING else math.inf
+        left = _time_to_stop(K[0], rtol, of) if least < DYING else math.inf
         if tau + left <= span and (taken == len(times) or not _is_past(times[taken], start, tau + left)):
             for i in range(n):
                 z[i] += left * K[0, i]
             equations.guards(start + tau + left, z, k, values)
-            return FIRED, tau + left, h, _index_of_least(values), taken
+            return FIRED, tau + left, h, int(values.argmin()), taken
         if slow > PATIENCE:
             return OTHER, tau, h, -1, taken
     return PAUSED, tau, h, -1, taken
-
-
-def _index_of_least(values: Array) -> int:
-    lowest = 0
-    for i in range(1, len(values)):
-        if values[i] < values[lowest]:
-            lowest = i
-    return lowest
 
 
 def _lu_factor(M: Array, order: npt.NDArray[np.int64]) -> None:
@@ -317,12 +304,10 @@ def _lu_solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
         b[i] /= M[i, i]
 
 
-def _extrapolation_step(
-    t: float, h: float, k: Motion, z: Array, J: Array, rtol: float, scale: Array, table: Array, M: Array,
-    order: npt.NDArray[np.int64], rate: Array,
-) -> tuple[float, int]:  # fmt: skip
+def _extrapolation_step(of: Stretch, t: float, h: float, J: Array, table: Array) -> tuple[float, int]:
     """A step extrapolated from 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error, and columns taken."""
-    n, error = len(z), math.inf
+    k, z, n, error, rtol = of.k, of.z, len(J), math.inf, max(LOCAL * of.k.rtol, FINEST_STIFF)
+    M, order, rate = np.empty((n, n)), np.empty(n, np.int64), np.empty(n)
     for column in range(COLUMNS):
         steps = column + 1
         part, y = h / steps, table[column]
@@ -344,70 +329,68 @@ def _extrapolation_step(
             for i in range(n):
                 more = (table[q + 1, i] - table[q, i]) / (steps / (q + 1) - 1)
                 table[q, i] = table[q + 1, i] + more
-                square += (more / (rtol * (scale[i] / FINER + max(abs(z[i]), abs(table[q, i]))))) ** 2
+                square += (more / (rtol * (of.scale[i] / FINER + max(abs(z[i]), abs(table[q, i]))))) ** 2
         error = math.sqrt(square / n) if column > 0 else math.inf
         if error <= 1 or (not error < 1e10 and column > 0):
             return error, steps
     return error, COLUMNS
 
 
-def _implicit_steps(
-    k: Motion, start: float, tau: float, h: float, span: float, z: Array, times: Array, taken: int, samples: Array,
-    rtol: float, scale: Array, arm: Array, level: Array, slips: range,
-) -> tuple[int, float, float, int, int]:  # fmt: skip
+def _implicit_steps(of: Stretch, start: float, tau: float, h: float, taken: int) -> tuple[int, float, float, int, int]:
     """As `_explicit_steps`, by implicit ones: for `PATIENCE` steps, or until all slips are `GROWN_SLIP`.
 
-    A Jacobian shifts z by a share of it, or at least of its natural size, or of `rtol` of that for a slip.
+    A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times that for a slip.
     """
-    n = len(z)
-    table, J, M, order = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n, np.int64)
-    here, rate, values, now = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty(n)
+    k, until, z, scale, times, samples, arm, level = of
+    n, span, (first, end) = len(z), until - start, charts.TURNING[k.case]
+    table, J, here, rate = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty(n), np.empty(n)
+    now, values = np.empty(n), np.empty(len(arm))
     for _ in range(PATIENCE):
         if tau >= span:
             return DONE, tau, h, -1, taken
         equations.rates(start + tau, z, k, here)
         for c in range(n):
-            shift = math.sqrt(EPS) * max(abs(z[c]), scale[c] * (k.rtol if c in slips else 1.0))
             _copy(z, now)
-            now[c] += shift
+            now[c] += math.sqrt(EPS) * max(abs(z[c]), scale[c] * (k.rtol if c in range(first, end, 2) else 1.0))
             equations.rates(start + tau, now, k, rate)
             for i in range(n):
                 J[i, c] = (rate[i] - here[i]) / (now[c] - z[c])
         if h <= 0:
-            size = 0.0
-            for i in range(n):
-                size = max(size, abs(here[i]) / (scale[i] / FINER + abs(z[i])))
-            h = min(span - tau, 1e-3 / size if size > 0 else span)
+            h = _first_length(1e-3, here, span - tau, of)
         stop = min(span, times[taken] - start) if taken < len(times) else span
         while True:
             length = min(h, stop - tau)
             if length <= 4 * EPS * tau or length < 1e-300:
                 return STUCK, tau, h, -1, taken
-            error, columns = _extrapolation_step(start + tau, length, k, z, J, rtol, scale, table, M, order, rate)
+            error, columns = _extrapolation_step(of, start + tau, length, J, table)
             if error <= 1:
                 break
             h = length / 4
         after = stop if length == stop - tau else tau + length
         _copy(table[0], now)
         equations.guards(start + after, now, k, values)
-        guard = _fallen_guard(values, arm, level)
-        if guard >= 0:  # halve the step until it ends at the guard
+        fired = -1
+        for guard in range(len(arm)):
+            if values[guard] > arm[guard]:
+                level[guard] = 0.0
+            elif values[guard] < level[guard]:
+                fired = guard
+                break
+        if fired >= 0:  # halve the step until it ends at the guard
             low, high = 0.0, length
             while high - low > 4 * EPS * max(tau, length):
-                middle = (low + high) / 2
-                _extrapolation_step(start + tau, middle, k, z, J, rtol, scale, table, M, order, rate)
+                middle, fell = (low + high) / 2, -1
+                _extrapolation_step(of, start + tau, middle, J, table)
                 equations.guards(start + (tau + middle), table[0], k, values)
-                fell = -1
-                for each in range(len(arm)):
-                    if values[each] < level[each]:
-                        fell = each
+                for guard in range(len(arm)):
+                    fell = guard if values[guard] < level[guard] else fell
                 if fell >= 0:
-                    high, guard = middle, fell
+                    high, fired = middle, fell
                     _copy(table[0], now)
                 else:
                     low = middle
             _copy(now, z)
-            return FIRED, tau + high, h, guard, taken
+            return FIRED, tau + high, h, fired, taken
         _copy(now, z)
         tau = after
         while taken < len(times) and _is_past(times[taken], start, tau):
@@ -415,54 +398,29 @@ def _implicit_steps(
             taken += 1
         if length == h or error < 0.01:
             h = length * min(4.0, 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns))
-        least = charts.least_slip(z, scale, k.case)
-        if least > GROWN_SLIP:
+        if charts.least_slip(z, scale, k.case) > GROWN_SLIP:
             return OTHER, tau, 0.0, -1, taken
     return PAUSED, tau, h, -1, taken
 
 
 def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
     """Integrate a case as `integrator.stretch` does, in a form that numba compiles."""
-    k, until, z, scale, times, samples, arm, level = of
-    n, steady = len(z), len(k.waves) == 0 and k.line.slope == 0
-    slips = range(charts.TURNING[k.case][0], charts.TURNING[k.case][1], 2)
-    rate, values, there, other = np.empty(n), np.empty(len(arm)), np.empty(n), np.empty(n)
     start, tau, h, small, slow = pace
     why, left = OTHER, most
     while why == OTHER or (why == PAUSED and left > 0):
         left -= PATIENCE if small else most
-        now = start + tau
-        if steady and slow % 2 == 1 and equations.is_straight(now, until, z, scale, k, rate, values, there, other):
-            while taken < len(times) and times[taken] <= until:
-                for i in range(n):
-                    samples[taken, i] = z[i] + (times[taken] - now) * rate[i]
-                taken += 1
-            _copy(there, z)
-            return DONE, (start, tau, h, small, slow), -1, taken
-        span = until - start
+        if slow % 2 == 1 and finish_straight(start + tau, of, taken):
+            return DONE, (start, tau, h, small, slow), -1, int(np.searchsorted(of.times, of.until, side="right"))
         if small:
-            rtol = max(LOCAL * k.rtol, FINEST_STIFF)
-            why, tau, h, guard, taken = _implicit_steps(
-                k, start, tau, h, span, z, times, taken, samples, rtol, scale, arm, level, slips
-            )
+            why, tau, h, guard, taken = _implicit_steps(of, start, tau, h, taken)
         else:
-            rtol = max(LOCAL * k.rtol, FINEST)
-            why, tau, h, guard, taken = _explicit_steps(
-                k, start, tau, h, span, z, times, taken, samples, rtol, scale, arm, level, slips, most
-            )
+            why, tau, h, guard, taken = _explicit_steps(of, start, tau, h, taken, most)
         total = 0.0
-        for value in z:
+        for value in of.z:
             total += value
         if not abs(total) < math.inf:
             why = STUCK
-        slow = 0 if charts.least_slip(z, scale, k.case) > SMALL_SLIP else slow + 1
+        slow = 0 if charts.least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP else slow + 1
         if why == OTHER:
             start, tau, h, small = start + tau, 0.0, 0.0, not small
     return why, (start, tau, h, small, slow), guard, taken
-
-
-TEXT = (
-    _copy, _interpolate, _root, _fallen_guard, _weighted_sum, _interpolant, _first_fall, _time_to_stop, _is_past,
-    _explicit_steps, _index_of_least, _lu_factor, _lu_solve, _extrapolation_step, _implicit_steps,
-)  # fmt: skip
-"""What is compiled."""

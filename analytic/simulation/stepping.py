@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from analytic.mechanics import contact_problem, drag, rigid_body
+from analytic.mechanics import drag, rigid_body
 from analytic.mechanics.contact_problem import Friction, Impulse, project, solve_pair
 from analytic.mechanics.rigid_body import Forces, Velocities, mean
 from analytic.simulation import compiling
@@ -354,15 +353,7 @@ def _flow_at(flow: FlowArrays, time: float) -> float:
     return float(omega_0)
 
 
-TEXT = (
-    solve, _old_slip, _first_guess, _length, _sum, _moved, _crossing, _step_to_landing, step, _impact,
-    _case_of, _larger_or_nan, _flow_at,
-)  # fmt: skip
-"""What is compiled where numba is installed, with the two loops below."""
-compiled = compiling.compiled(compiling.register(contact_problem, drag, rigid_body, sys.modules[__name__]))
-
-
-@compiled
+@compiling.compiled
 def advance(ball: Ball, steps: Steps, flow: FlowArrays, p: Constants, events: Array) -> tuple[Any, int, int]:
     """Go on through steps; return the ball, the next step, and events noted.
 
@@ -384,7 +375,7 @@ def advance(ball: Ball, steps: Steps, flow: FlowArrays, p: Constants, events: Ar
     return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), k, noted
 
 
-@compiled
+@compiling.compiled
 def follow(ball: Ball, stretches: Stretches, quiet: float, flow: FlowArrays, p: Constants, rows: Rows) -> float:
     """One run through stretches of steps, into rows; return its end, less than 0 if it failed.
 

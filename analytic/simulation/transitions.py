@@ -234,10 +234,3 @@ def _speed(u: Velocities, k: Motion) -> float:
     """Root of the sum of squares of velocities, those of spin times r, m s-1."""
     spin = k.r * k.r * (u.o_x * u.o_x + u.o_y * u.o_y + u.o_z * u.o_z)
     return math.sqrt(u.v_h * u.v_h + u.v_y * u.v_y + u.v_k * u.v_k + spin)
-
-
-TEXT = (
-    react, settle, with_directions, _slip_directions, choose, leave, _contact, _by_accelerations, _contact_after,
-    collide, _speed,
-)  # fmt: skip
-"""What is compiled where numba is installed."""

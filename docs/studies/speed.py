@@ -83,7 +83,7 @@ def run(motion: Motion, rtol: float = 1e-9) -> Any:
 
 def plainly(motion: Motion, rtol: float = 1e-9) -> Any:
     """By the study where numba isn't installed."""
-    with mock.patch.object(hybrid, "compiled", return_value=None):
+    with mock.patch.object(hybrid, "run_compiled", hybrid.run_through_flow):
         return run(motion, rtol)
 
 
@@ -191,7 +191,7 @@ def states() -> Rows:
             return x
 
         def by_lsoda(rtol: float, own: Callable[[float], Array] = compiled) -> Array:
-            plain = mock.patch.object(hybrid, "compiled", return_value=None)
+            plain = mock.patch.object(hybrid, "run_compiled", hybrid.run_through_flow)
             with plain, mock.patch.object(hybrid, "stretch", partial(_solved, "LSODA")):
                 return own(rtol)
 
@@ -261,8 +261,8 @@ def many() -> Rows:
         ("simulate_many, one thread, time stepping", lambda: at_once(method="time-stepping")),
     )}  # fmt: skip
     _, whole, *_ = each.values()
-    inside, carry_out = list[float](), hybrid.compiled()
-    if not carry_out:
+    inside, carry_out = list[float](), hybrid.run_compiled
+    if carry_out is hybrid.run_through_flow:
         sys.exit("numba isn't installed")
 
     def timed(*given: Any) -> Any:
@@ -271,7 +271,7 @@ def many() -> Rows:
         inside.append(1e3 * (time.thread_time() - begin))
         return done
 
-    with mock.patch.object(hybrid, "compiled", return_value=timed):
+    with mock.patch.object(hybrid, "run_compiled", timed):
         spent = 1e3 * seconds(at_once, 1) / RUNS
     share = statistics.fmean(inside) / spent
     ratio, limit = two_against_one(lambda number: clocked(partial(at_once, number)))

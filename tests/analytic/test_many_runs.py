@@ -33,7 +33,7 @@ BALLS = [P.replace(drag=LAWS[k % len(LAWS)]) for k in range(len(FLOWS))]
 
 
 def in_plain_python(monkeypatch):
-    monkeypatch.setattr(hybrid, "compiled", lambda: None)
+    monkeypatch.setattr(hybrid, "run_compiled", hybrid.run_through_flow)
     for loop in ("advance", "follow"):
         monkeypatch.setattr(stepping, loop, getattr(stepping, loop).py_func)
 
@@ -112,7 +112,7 @@ def test_where_compiled_steps_become_too_short_plain_python_takes_over(monkeypat
         rows.x[:2], rows.landings[:], rows.taken[:] = 7.0, 7, (2, len(rows.events) > 0)
         raise StalledError
 
-    monkeypatch.setattr(hybrid, "compiled", lambda: breaks_off)
+    monkeypatch.setattr(hybrid, "run_compiled", breaks_off)
     plain, single = simulate_many(P, x0, 0.5, threads=1, **given), simulate(P, x0[0], 0.5, **given)
     np.testing.assert_allclose(plain.x, many.x, rtol=0, atol=1e-7 * np.abs(many.x).max())
     np.testing.assert_array_equal(plain.landings, many.landings)
@@ -124,7 +124,7 @@ def test_of_processes_one_compiles(monkeypatch):
     asked = []
     monkeypatch.setattr(fcntl, "flock", lambda file, how: asked.append(how))
 
-    @compiling.compiled("of_a_test")
+    @compiling.compiled
     def more(x):
         return x + 1
 

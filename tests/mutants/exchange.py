@@ -53,7 +53,7 @@ def believed(*wrongs: WrongTheory) -> Iterator[None]:
     rights = [getattr(importlib.import_module(each.module), each.function) for each in wrongs]
     puts = [_with(right, each.wrong) for each, right in zip(wrongs, rights, strict=True)]
     _exchange(dict(zip(map(id, rights), puts, strict=True)))
-    plainly = mock.patch.object(hybrid, "compiled", return_value=None)
+    plainly = mock.patch.object(hybrid, "run_compiled", hybrid.run_through_flow)
     # Compiled runs would believe what they believed when they were compiled.
     with plainly if any(each.module.startswith(COMPILED) for each in wrongs) else nullcontext():
         try:
