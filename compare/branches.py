@@ -26,18 +26,18 @@ def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
     return np.asarray(bifurcation.wall_spin(State(omega_c=omega_c, slip_x=slip_x), p))
 
 
-def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
-    """The spin on the wall omega_x^0 of a stationary solution at flows, rad s-1, also where it is formal."""
-    sets = [p.replace(omega_0=float(flow)) for flow in np.ravel(flows)]
-    return [float(bifurcation.wall_spin(analytic.solution(q, case, formal=True).state, q)) for q in sets]
+def spin_of(case: Case, omega_0: float, p: Parameters) -> float:
+    """The spin on the wall omega_x^0 of a stationary solution at a flow, rad s-1, also where it is formal."""
+    p = p.replace(omega_0=float(omega_0))
+    return float(bifurcation.wall_spin(analytic.solution(p, case, formal=True).state, p))
 
 
 def round_with_fluid(p: Parameters, case: Case, begin: float, end: float) -> tuple[Array, Array]:
     """slip_x and omega_c (n,) from one flow to another of RR, SR, NR or NS: the ball goes round with the fluid."""
     flows = np.linspace(begin, end, 200)
-    rolls = p.R / p.r * flows
-    spun = rolls if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)
-    return np.asarray(spun) - rolls, flows
+    rolls, alike = p.R / p.r * flows, Case.NR if case is Case.SR else case
+    spun = rolls if case is Case.RR else np.array([spin_of(alike, flow, p) for flow in flows])
+    return spun - rolls, flows
 
 
 def stable_ends(p: Parameters) -> tuple[float, float]:
@@ -70,11 +70,6 @@ def slipping(
     for part, line, text, place in ((~grows, "-", "SS", stable), (grows, UNSTABLE, "SS, unstable", unstable)):
         if part.any():
             style.curve(axes, Case.SS, omega_0, np.where(part, values, np.nan), (text, place), line)
-
-
-def spin_off_floor(omega_0: float, p: Parameters) -> float:
-    """The spin on the wall of NR at a flow, rad s-1."""
-    return spins(Case.NR, omega_0, p)[0]
 
 
 def fold_state(p: Parameters, released: bool = False) -> State:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -53,11 +53,13 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Diagram:
-    """A figure by its name, a parameter set, and what was measured with it."""
+    """What most figures show, by the name of the figure: a parameter set, what was measured with it, and its runs."""
 
     figure: str
     p: Parameters
     states: tuple[Measurement, ...] = ()
+    motions: tuple[Motion, ...] = ()
+    checks: tuple[Check, ...] = ()
 
 
 class GapError(Exception):
@@ -82,7 +84,29 @@ class Drawing:
     claims: tuple[str, ...] = ()
     """The claims beside which it stands."""
     of_set: Callable[[Parameters], Any] | None = None
-    """What theory alone has of a set, as `select` gives it; raises `GapError` where the set has no such thing."""
+    """The same of another set, by theory alone: `draw` raises `GapError` where the set has no such thing."""
+
+
+Measured = Callable[[Evidence], Iterable[Measurement]]
+"""What a figure shows of what was measured, by all engines on all sets."""
+
+
+def diagram(
+    name: str,
+    title: str,
+    set: str,
+    draw: Callable[[Diagram], tuple[Figure, str]],
+    claims: tuple[str, ...],
+    measured: Measured | None = None,
+) -> Drawing:
+    """The figure of a `Diagram`: of one set with what was measured with it, or of any other set without."""
+    return Drawing(title, partial(select, name, set, measured), draw, claims, partial(Diagram, name))
+
+
+def select(name: str, set: str, measured: Measured | None, evidence: Evidence) -> Diagram:
+    """What a figure shows of one set: what was measured with it, and the runs that are there."""
+    states = tuple(m for m in measured(evidence) if m.set == set) if measured else ()
+    return Diagram(name, Parameters.named(set), states, tuple(run for m in states for run in evidence.motions(m)))
 
 
 SUFFIXES = (".svg", ".pdf", ".png")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,10 +16,11 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
-from analytic.orbits.orbit_branch import Bifurcation, OrbitBranch
-from compare.branches import Drawn, check_thresholds, round_with_fluid, slipping, spin, spin_off_floor
+from analytic.orbits.orbit_branch import Bifurcation
+from compare.branches import Drawn, check_thresholds, round_with_fluid, slipping, spin, spin_of
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, Evidence, GapError
+from compare.kit.drawing import Diagram, Evidence, GapError, diagram
+from compare.kit.record import Measurement
 from compare.subjects.attractors.basins import FATES, Basins
 from model import Case, Contact, Parameters, State
 
@@ -30,19 +32,6 @@ LEAST_WALL, MOST_WALL = 0.4, 2.0
 _SHORT, _UNNAMED = {Bifurcation.BIRTH: "birth"}, Bifurcation.PERSISTENCE
 STARTS = 20
 """Random starts from which hops of one's own set are looked for."""
-
-
-def select(evidence: Evidence, quantity: str) -> Diagram:
-    """The measurements of the hopping ball for a figure; the orbits are theory's."""
-    return Diagram(quantity, SET, tuple(evidence.select(quantity, "period")))
-
-
-def of_set(p: Parameters, quantity: str) -> Diagram:
-    """The figure's data of a set: the orbits are found when it is drawn."""
-    if quantity == "orbit_death" and p.eta == 0:
-        raise GapError("its wall has no friction that could grow")
-    _orbit_or_gap(p)
-    return Diagram(quantity, p)
 
 
 @functools.cache
@@ -61,23 +50,13 @@ def _orbit_or_gap(p: Parameters) -> orbits.Orbit:
     raise GapError(f"no ball hops for ever that starts in one of {STARTS} random states at ω₀ = {p.omega_0:g} rad/s")
 
 
-def _fastest(p: Parameters) -> float:
-    """The fastest flow shown, rad s-1."""
-    check_thresholds(p)
-    return max(HIGHEST_FLOW * bifurcation.thresholds(p).omega_02, 1.05 * p.omega_0)
-
-
-@functools.cache
-def _branch(p: Parameters) -> OrbitBranch:
-    """The branch of hops over the flow."""
-    edge = bifurcation.thresholds(p).omega_02
-    return orbit_branch.follow(_orbit_or_gap(p), "omega_0", LOWEST_FLOW * edge, _fastest(p))
-
-
 def draw_branch(of: Diagram) -> tuple[Figure, str]:
     """A figure of hops over the flow: omega_c and the spin on the wall; and its caption."""
-    p, top, branch = of.p, _fastest(of.p), _branch(of.p)
+    p, hop = of.p, _orbit_or_gap(of.p)
+    check_thresholds(p)
     edge = bifurcation.thresholds(p).omega_02
+    top = max(HIGHEST_FLOW * edge, 1.05 * p.omega_0)
+    branch = orbit_branch.follow(hop, "omega_0", LOWEST_FLOW * edge, top)
     figure, (orbit, wall) = style.panels(9.0, 4.2, 1, 2)
     fast = p.replace(omega_0=0.95 * top)  # the branch of SS goes on far beyond the frame
     means = State(*np.transpose([each.mean for each in branch.orbits]))
@@ -110,7 +89,7 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
         axes.set(xlim=(LOWEST_FLOW * edge, top), xlabel=style.OMEGA_0)
         style.guides(axes, {"omega_02": edge})
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * top))
-    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * spin_off_floor(edge, p)))
+    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * spin_of(Case.NR, edge, p)))
     style.points(orbit, of.states)
     style.legend(orbit, loc="center right")
     factors = np.abs([each.multipliers[0] for each in branch.orbits])
@@ -146,32 +125,38 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     )
 
 
-def _orbit_data(orbit: orbits.Orbit) -> dict[str, float]:
-    """What is drawn of an orbit: eta, the height of the hops in m, mean omega_c in rad/s, and whether it is stable."""
-    height, omega_c = float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c)
-    return {"eta": orbit.p.eta, "height": height, "omega_c": omega_c, "stable": orbit.stable}
+class _Hop(NamedTuple):
+    """What is drawn of an orbit over the friction of the wall: the height of the hops in m, mean omega_c in rad/s."""
+
+    eta: float
+    height: float
+    omega_c: float
+    stable: bool
 
 
-@functools.cache
-def _wall_branch(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifurcation, dict[str, float]]]]:
+def _wall_branch(p: Parameters) -> tuple[list[_Hop], list[tuple[Bifurcation, _Hop]]]:
     """The branch of hops over the friction of the wall, and what happens on it: both lie on the line.
 
     Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
     """
+
+    def hop(orbit: orbits.Orbit, eta: float) -> _Hop:
+        return _Hop(eta, float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c), orbit.stable)
+
     branch = orbit_branch.follow(_orbit_or_gap(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
-    rows, places = [_orbit_data(orbit) for orbit in branch.orbits], list[tuple[Bifurcation, dict[str, float]]]()
+    rows, places = [hop(orbit, orbit.p.eta) for orbit in branch.orbits], list[tuple[Bifurcation, _Hop]]()
     for place in branch.places:
         if place.kind is Bifurcation.BIRTH:
             at, (one, two) = (len(rows), rows[:-3:-1]) if place is branch.places[-1] else (0, rows[:2])
-            share = (place.value - one["eta"]) / (two["eta"] - one["eta"])
-            row = {name: one[name] + share * (two[name] - one[name]) for name in ("eta", "height", "omega_c")}
-            row["stable"] = one["stable"]
+            share = (place.value - one.eta) / (two.eta - one.eta)
+            eta, height, omega_c = (a + share * (b - a) for a, b in zip(one[:3], two[:3], strict=True))
+            row = _Hop(eta, height, omega_c, one.stable)
         else:  # where the line is bent least by it
-            row = _orbit_data(place.orbit) | {"eta": place.value}
-            x = np.array([(r["eta"] / p.eta, r["height"] / p.r) for r in (*rows, row)])
+            row = hop(place.orbit, place.value)
+            x = np.array([(r.eta / p.eta, r.height / p.r) for r in (*rows, row)])
             detour = np.hypot(*(x[:-1] - x[-1]).T)
             at = 1 + int(np.argmin(detour[:-1] + detour[1:] - np.hypot(*np.diff(x[:-1], axis=0).T)))
-            row["stable"] = rows[at - 1]["stable"]
+            row = row._replace(stable=rows[at - 1].stable)
         if place.kind is not Bifurcation.RANGE:
             rows.insert(at, row)
             places.append((place.kind, row))
@@ -180,22 +165,23 @@ def _wall_branch(p: Parameters) -> tuple[list[dict[str, float]], list[tuple[Bifu
 
 def draw_walls(of: Diagram) -> tuple[Figure, str]:
     """A figure of height and mean omega_c of hops over the friction of the wall; and its caption."""
+    if of.p.eta == 0:
+        raise GapError("its wall has no friction that could grow")
     rows, places = _wall_branch(of.p)
     figure, panels = style.panels(9.0, 3.8, 1, 2)
     shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
-    eta, stable = np.array([row["eta"] for row in rows]), np.array([row["stable"] for row in rows], dtype=bool)
-    text = {Bifurcation.TORUS: (0, -20), Bifurcation.FOLD: (8, 4), Bifurcation.BIRTH: (-8, 5)}
+    eta, stable = np.array([row.eta for row in rows]), np.array([row.stable for row in rows])
+    offsets = {Bifurcation.TORUS: (0, -20), Bifurcation.FOLD: (8, 4), Bifurcation.BIRTH: (-8, 5)}
     for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
-        values = unit * np.array([row[quantity] for row in rows])
+        values = unit * np.array([getattr(row, quantity) for row in rows])
         for part, line in ((np.ones_like(stable), style.UNSTABLE), (stable, style.STABLE)):
             axes.plot(eta, np.where(part, values, np.nan), color=style.HOPPING, ls=line, lw=2)
-        named = set[Bifurcation]()
+        named = {_UNNAMED}
         for kind, row in places:
-            axes.plot(row["eta"], unit * row[quantity], **style.POINT)
-            if kind not in named | {_UNNAMED}:
-                style.beside(
-                    axes, row["eta"], unit * row[quantity], _SHORT.get(kind, str(kind)), text.get(kind, (8, 4))
-                )
+            at = row.eta, unit * getattr(row, quantity)
+            axes.plot(*at, **style.POINT)
+            if kind not in named:
+                style.beside(axes, *at, _SHORT.get(kind, str(kind)), offsets.get(kind, (8, 4)))
             named.add(kind)
         for m in of.states:
             low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
@@ -204,7 +190,7 @@ def draw_walls(of: Diagram) -> tuple[Figure, str]:
         axes.margins(0.2, 0.1)
     style.legend(panels[0], loc="upper left")
     mark = " Shaded: the least wall friction at which hops don't last, as measured." if of.states else ""
-    told = ", ".join(f"{_SHORT.get(kind, kind)} η = {row['eta']:.4g}" for kind, row in places if kind is not _UNNAMED)
+    told = ", ".join(f"{_SHORT.get(kind, kind)} η = {row.eta:.4g}" for kind, row in places if kind is not _UNNAMED)
     return figure, (
         f"Height and mean ω_c of the hopping ball against the friction of the wall, from {LEAST_WALL:g} to "
         f"{MOST_WALL:g} times its own. Named along the branch: {told or 'nothing'}. At a birth hops have no height; at "
@@ -255,18 +241,15 @@ def fill_basins(axes: Axes, basins: Basins) -> None:
     )
 
 
-_RECORDS = (
-    ("hopping-orbit", "a ball that hops for ever", "omega_c", draw_orbit, "hopping"),
-    ("hopping-branch", "Figs. 9, 10 and 13 with hopping", "omega_c", draw_branch, "hopping-birth"),
-    ("hopping-walls", "hops along rougher walls", "death", draw_walls, "hopping-death"),
-)
+def _measured(quantity: str, evidence: Evidence) -> Iterator[Measurement]:
+    return evidence.select(quantity, "period")
+
+
 FIGURES = {
-    name: Drawing(
-        f"Beyond the paper: {title}",
-        functools.partial(select, quantity=f"orbit_{what}"),
-        draw,
-        (claim,),
-        functools.partial(of_set, quantity=f"orbit_{what}"),
+    name: diagram(name, f"Beyond the paper: {title}", "hopping", draw, (claim,), functools.partial(_measured, quantity))
+    for name, title, quantity, draw, claim in (
+        ("hopping-orbit", "a ball that hops for ever", "orbit_omega_c", draw_orbit, "hopping"),
+        ("hopping-branch", "Figs. 9, 10 and 13 with hopping", "orbit_omega_c", draw_branch, "hopping-birth"),
+        ("hopping-walls", "hops along rougher walls", "orbit_death", draw_walls, "hopping-death"),
     )
-    for name, title, what, draw, claim in _RECORDS
 }

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -27,20 +27,29 @@ from compare.kit.settling import settled_readings
 from compare.kit.statistics import Measured, hops, peaks, top
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, TrialResult, carry_out, constrained, with_step_error
+from compare.kit.trials import Start, Trial, carry_out, constrained, with_step_error
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
 SET = "hopping"
 TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)
 """A state near the top of a hop of the set."""
-HOLD, LAST, LATER = 12.0, 3.0, 2.0
-"""How long each flow is held, the last part of it that is measured, and the first part, in which disturbances are not
-yet linear, s."""
-REFINED, MARGINAL = (8, 16), (16, 32)
-"""Time steps in one of `coarse_step`: of hops that attract, and of those that hardly do."""
-SAMPLE = 1e-3
-"""Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
+
+
+@dataclass(frozen=True)
+class Hopping:
+    """How balls that hop, or swing, are run; times in s."""
+
+    hold: float = 12.0  # how long each flow is held
+    last: float = 3.0  # the last part of it that is measured
+    later: float = 2.0  # the first part, in which disturbances are not yet linear
+    refined: tuple[int, int] = (8, 16)  # time steps in a coarse one, of hops that attract
+    marginal: tuple[int, int] = (16, 32)  # and of those that hardly do
+    sample: float = 1e-3  # s: a parabola through three samples then gives a top to 1e-6 of the height
+    followed: float = 10.0  # how long a hop is followed at a wall
+    alone: float = 60.0  # and then left alone
+    swinging: float = 24.0  # how long a ball swings
+    swung: float = 4.0  # the last part of it that is measured
 
 
 def hopping(
@@ -48,7 +57,7 @@ def hopping(
     sets: Mapping[str, Parameters],
     records: Records,
     protocol: str = "recurrent",
-    refine: tuple[int, int] = REFINED,
+    refine: tuple[int, int] = Hopping.refined,
 ) -> Iterator[Measurement | Missing]:
     """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin.
 
@@ -57,16 +66,16 @@ def hopping(
     """
     p = Parameters.named(SET)
     flows = [share * p.omega_0 for share in (lab.effort.recurrent_flows if protocol == "recurrent" else (1.0,))]
-    lasts, flow = HOLD * len(flows), Flow.staircase(flows, HOLD)
-    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / SAMPLE), flow=flow)
+    lasts, flow = Hopping.hold * len(flows), Flow.staircase(flows, Hopping.hold)
+    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / Hopping.sample), flow=flow)
     (result,) = carry_out(lab, protocol, [trial])
     if isinstance(result, Missing):
         yield result
         return
     heights = []
     for k, omega_0 in enumerate(flows):
-        q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
-        coarse, fine = (tops(run, end - LAST, end) for run in (result.coarse, result.fine))
+        q, end = p.replace(omega_0=omega_0), (k + 1) * Hopping.hold
+        coarse, fine = (tops(run, end - Hopping.last, end) for run in (result.coarse, result.fine))
         if min(len(coarse.time), len(fine.time)) < 6:
             yield Missing(protocol, SET, f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more")
             break
@@ -74,7 +83,11 @@ def hopping(
         for quantity, value in fine.values.items():
             yield row(quantity=quantity, value=with_step_error(coarse.values[quantity].value, value))
         if k:
-            factor = row(quantity="orbit_multiplier", value=_multiplier(result, k * HOLD, end - LAST, q))
+            parts = (result.coarse, Hopping.later), (result.fine, Hopping.later), (result.fine, 2 * Hopping.later)
+            slow, fast, later = (
+                hop_map(tops(run, k * Hopping.hold + after, end - Hopping.last).x, q)[0] for run, after in parts
+            )
+            factor = row(quantity="orbit_multiplier", value=with_step_error(slow, Measured(fast, abs(fast - later))))
             yield if_found(factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s")
         heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
     if len(heights) >= 3:
@@ -111,13 +124,6 @@ class Hops(NamedTuple):
     def conditions(self, p: Parameters) -> dict[str, Any]:
         """Conditions of a measurement: a state at a top, and the period, near a closed orbit."""
         return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
-
-
-def _multiplier(result: TrialResult, begin: float, end: float, p: Parameters) -> Measured:
-    """The factor by which disturbances shrink from hop to hop, between two times; its uncertainty by a later part."""
-    parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
-    slow, fast, later = (hop_map(tops(run, begin + after, end).x, p)[0] for run, after in parts)
-    return with_step_error(slow, Measured(fast, abs(fast - later)))
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
@@ -157,8 +163,6 @@ def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
 """eta of the walls along which the hop is followed, in units of that of the set. The first steps are short: their
 starts are extrapolated from one or two hops, which attract from nearby only."""
-FOLLOWED_FOR, ALONE_FOR = 10.0, 60.0
-"""How long a hop is followed at a wall, and then left alone, s."""
 
 
 def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -168,7 +172,7 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     etas = [q.eta for q in walls]
 
     def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
-        return lab.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / SAMPLE))
+        return lab.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / Hopping.sample))
 
     steady = [np.array([TOP.stacked()] * 2)]  # fixed points of the map from hop to hop, with both steps (2, 8)
     factors, tasks = [], []
@@ -176,21 +180,23 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         ahead = steady[-1]
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
-        tasks.append([task(q, x, FOLLOWED_FOR, refined) for x, refined in zip(ahead, MARGINAL, strict=True)])
+        tasks.append(
+            [task(q, x, Hopping.followed, refined) for x, refined in zip(ahead, Hopping.marginal, strict=True)]
+        )
         (runs,) = lab.groups(tasks[-1:])
-        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED_FOR) for run in runs]
+        parts = [] if isinstance(runs, str) else [tops(run, Hopping.later, Hopping.followed) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED_FOR))]
+        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * Hopping.later, Hopping.followed))]
         factors.append([factor for factor, _ in maps])
         steady.append(np.array([state for _, state in maps[:2]]))
         if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
             near = parts[1].conditions(q)
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
-    again = [task(walls[k], np.array(tasks[k][1].x0), ALONE_FOR, MARGINAL[0]) for k in (-4, -1)]
+    again = [task(walls[k], np.array(tasks[k][1].x0), Hopping.alone, Hopping.marginal[0]) for k in (-4, -1)]
     yield from _hops_at_end(lab, "followed", SET, again)
 
 
@@ -212,12 +218,12 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
     def task(x: Array, lasts: float, restitution: float) -> Task:
         step = coarse_step(p) / 40
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
-        return replace(lab.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings)
+        return replace(lab.task(p, x, lasts, step, samples=round(lasts / Hopping.sample)), settings=settings)
 
     for e in RESTITUTIONS:
-        (run,) = lab.campaign.run([task(x, LAST, e)])
+        (run,) = lab.campaign.run([task(x, Hopping.last, e)])
         if hops(run):
-            last = tops(run, 0.0, LAST)
+            last = tops(run, 0.0, Hopping.last)
             x = last.x[-8:].mean(axis=0)  # the hops swing about their mean, and attract from nearby only
         elif not e:
             yield Missing("rebounding", SET, "the ball does not hop")
@@ -239,10 +245,6 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured
     return with_step_error(slow, Measured(fast, abs(fast - later)))
 
 
-SWINGING, SWUNG = 24.0, 4.0
-"""How long a ball swings, and the last part of it that is measured, s."""
-
-
 def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Period, mean and size of the swing of omega_c, from its turning points, on a very rough floor.
 
@@ -250,8 +252,8 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     """
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
-    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)])
-    end = SWINGING - SWUNG
+    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, Hopping.swinging, (60, 80), 12_000)])
+    end = Hopping.swinging - Hopping.swung
     if isinstance(result, Missing):
         yield result
         return
@@ -259,7 +261,8 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         yield Missing("swing", "reference", "the ball does not slip at both points for ever")
         return
     parts = [
-        _swing(run, start) for run, start in ((result.coarse, end), (result.fine, end), (result.fine, end - SWUNG))
+        _swing(run, start)
+        for run, start in ((result.coarse, end), (result.fine, end), (result.fine, end - Hopping.swung))
     ]
     conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
     for name, coarse, fine, before in zip(("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True):
@@ -268,7 +271,7 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
 
 def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
     """Period, mean and size of the swing of omega_c in the part of a run after a time."""
-    inside = (run.time > start) & (run.time <= start + SWUNG)
+    inside = (run.time > start) & (run.time <= start + Hopping.swung)
     time, omega_c = run.time[inside], run.omega_c[inside]
     (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
     at = time[k] + late * (time[1] - time[0])

@@ -92,14 +92,9 @@ def _simulated(m: Measurement) -> Trajectory:
     return simulated(m.parameters, state(m), m.at("duration"), 2000, rtol=RTOL)
 
 
-def _end_cases(*starts: str) -> tuple[Bearing, ...]:
-    """Bearings on the case in which motions end that start in one of these ways."""
-
-    def end_case(m: Measurement) -> float:
-        return physical_case(Case(_simulated(m).case[-1]))
-
-    ends = (given(start=start) for start in starts)
-    return tuple(Bearing("unloading", "case", end_case, when=when, by=_SIMULATED) for when in ends)
+def _end_case(m: Measurement) -> Case:
+    """The case in which theory's motion ends."""
+    return physical_case(Case(_simulated(m).case[-1]))
 
 
 def _at_event(m: Measurement) -> Measured:
@@ -258,14 +253,17 @@ CLAIMS = (
         "Fig. 13, right; section 5.3",
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
         "rolling at both points.",
-        *_end_cases(UNLOADED),
+        Bearing("unloading", "case", _end_case, when=given(start=UNLOADED), by=_SIMULATED),
         *bearings("unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED),
     ),
     claim(
         "push",
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
-        *_end_cases(UPWARDS, BY_SPIN),
+        *(
+            Bearing("unloading", "case", _end_case, when=given(start=start), by=_SIMULATED)
+            for start in (UPWARDS, BY_SPIN)
+        ),
         Bearing("unloading", "lift", _at_event, by=_SIMULATED),
     ),
     claim(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from analytic.flowmeter.design import THRESHOLDS, Design
 from analytic.simulation import simulator
 from compare.branches import check_thresholds, fold_state, slipping, stable_ends
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, Motion, only_where
+from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where
 from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
 from model import Case, Contact, Parameters
@@ -23,8 +23,6 @@ from model import Case, Contact, Parameters
 SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}
 """The parameter set of each panel, eta < j and eta > j."""
 _WAYS = {"up": ("^", ", flow raised"), "down": ("v", ", flow lowered")}
-_SETTLED = frozenset({"settled", "hysteresis"})
-"""Protocols whose omega_c is that of a settled state."""
 
 
 def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
@@ -32,14 +30,15 @@ def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
     settled = [
         m
         for m in evidence.select("omega_c", "case")
-        if m.protocol in _SETTLED and m.parameters.omega_0 > 0 and m.conditions["case"] != "NS"
+        if m.protocol in ("settled", "hysteresis") and m.parameters.omega_0 > 0 and m.conditions["case"] != "NS"
     ]
-    if not any(m.set in SETS.values() for m in settled):
-        raise GapError("no settled states were measured with its parameter sets")
-    return tuple(
+    curves = tuple(
         Diagram(figure, Parameters.named(name), tuple(m for m in settled if m.set == name))
         for figure, name in SETS.items()
     )
+    if not any(curve.states for curve in curves):
+        raise GapError("no settled states were measured with its parameter sets")
+    return curves
 
 
 def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
@@ -72,34 +71,18 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
     )
 
 
-def select_figure_13(evidence: Evidence, figure: str) -> Diagram:
-    """The settled states of a panel: left, those of a flow that is raised and lowered in held steps."""
-    if figure == "fig-13-left":
-        rows = [m for m in evidence.select("omega_c", "side") if m.conditions["side"] in _WAYS]
-        rows += evidence.select("edge_omega_c")
-    else:
-        rows = [m for m in evidence.select("omega_c", "case") if m.protocol == "settled"]
-    name = SETS[figure]
-    return Diagram(figure, Parameters.named(name), tuple(m for m in rows if m.set == name))
-
-
-def curve_of_set(figure: str, p: Parameters) -> Diagram:
-    """The characteristic curve of a set, without measured states."""
-    only_where(p, figure == "fig-13-left")
-    check_thresholds(p)
-    return Diagram(figure, p)
-
-
 def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     """A panel of Fig. 13: the characteristic curve and measured states, with both scales; and its caption."""
-    p, top = of.p, top_flow(of.p)
+    p, rises = of.p, of.figure == "fig-13-left"
+    only_where(p, folds=rises)
     figure, axes = style.panels(6.0, 4.3)
-    if p.eta < p.j:
+    top = top_flow(p)
+    t = theory(axes, p, top)
+    if rises:
         said = (
             "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
             "(arrows). Dashed: unstable."
         )
-        t = theory(axes, p, top)
         slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
         look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
         jumps = (t.omega_04, fold_state(p).omega_c, t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)
@@ -114,7 +97,6 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
             "and unstable. "
             "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
         )
-        t = theory(axes, p, top)
         axes.plot([t.omega_02], [t.omega_02], **style.POINT)
         style.points(axes, [m for m in of.states if m.conditions["case"] in ("RR", "SR", "NR")], ms=4)
     axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
@@ -148,25 +130,15 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     return t
 
 
-def select_fall(evidence: Evidence) -> Motion:
-    """A measured fall, if its run file is there, else that of the event-driven simulation."""
-    for m in evidence.records.select("unloading", where=lambda m: m.set == SETS["fig-13-right"]):
-        if m.conditions["start"] == "unloading" and (motions := evidence.motions(m)):
-            return motions[-1]  # with the finest step
-    return fall_of_set(Parameters.named(SETS["fig-13-right"]))
+def draw_fall(of: Diagram) -> tuple[Figure, str]:
+    """A figure of a fall from the wall: height, velocities and slip, and 20 ms about the landing; and its caption.
 
-
-def fall_of_set(p: Parameters) -> Motion:
-    """The fall of a ball whose wall no longer carries it, by the event-driven simulation."""
-    only_where(p, folds=False)
-    check_thresholds(p)
-    # Flows held for no longer than 5 s each: longer ones are sampled less densely.
-    return Motion("held", EVENT.name, p, partial(simulator.unloading, p, 5.0))
-
-
-def draw_fall(fall: Motion) -> tuple[Figure, str]:
-    """A figure of a fall from the wall: height, velocities and slip, and 20 ms about the landing; and its caption."""
-    run = fall.load()
+    The measured one with the finest step, if its file is there, else that of the event-driven simulation, whose flows
+    are held for 5 s each: longer ones are sampled less densely.
+    """
+    only_where(of.p, folds=False)
+    check_thresholds(of.p)
+    run = of.motions[-1].load() if of.motions else simulator.unloading(of.p, 5.0)
     landings = [t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N]
     if not landings:
         raise GapError("the ball never landed")
@@ -210,31 +182,38 @@ def draw_fall(fall: Motion) -> tuple[Figure, str]:
             if column is whole:
                 style.legend(axes, frameon=False)
     return figure, style.caption(
-        fall.p,
+        of.p,
         "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the wall (NS), sinks, "
         "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact at t = 0, "
         "magnified in time and height (dots: samples): it stops the sinking at once; a hop would show as a gap, "
         "a depth as a negative one. "
-        f"Background: the case, by name above; engine: {fall.engine}.",
+        f"Background: the case, by name above; engine: {of.motions[-1].engine if of.motions else EVENT.name}.",
     )
 
 
-FIGURES = {
-    "characteristic": Drawing("Characteristic curves", select_curves, draw_curves),
-    **{
-        name: Drawing(
-            title,
-            partial(select_figure_13, figure=name),
-            draw_figure_13,
-            (name,),
-            partial(curve_of_set, name),
-        )
-        for name, title in (
-            ("fig-13-left", "Fig. 13, left: hysteresis, η < j"),
-            ("fig-13-right", "Fig. 13, right: η > j"),
-        )
-    },
-    "unloading": Drawing("Section 5.3: the fall at unloading", select_fall, draw_fall, ("fig-13-right",), fall_of_set),
+def _loop(evidence: Evidence) -> Iterator[Measurement]:
+    """Settled states of a flow that is raised and lowered in held steps, and those on the edge between two motions."""
+    yield from (m for m in evidence.select("omega_c", "side") if m.conditions["side"] in _WAYS)
+    yield from evidence.select("edge_omega_c")
+
+
+def _settled(evidence: Evidence) -> Iterator[Measurement]:
+    """Settled states from fixed starts."""
+    return (m for m in evidence.select("omega_c", "case") if m.protocol == "settled")
+
+
+def _falls(evidence: Evidence) -> Iterator[Measurement]:
+    """What was measured of the fall that is kept."""
+    return evidence.records.select("unloading", where=lambda m: m.conditions["start"] == "unloading")
+
+
+FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, draw_curves)} | {
+    name: diagram(name, title, SETS[claim], draw, (claim,), measured)
+    for name, title, claim, draw, measured in (
+        ("fig-13-left", "Fig. 13, left: hysteresis, η < j", "fig-13-left", draw_figure_13, _loop),
+        ("fig-13-right", "Fig. 13, right: η > j", "fig-13-right", draw_figure_13, _settled),
+        ("unloading", "Section 5.3: the fall at unloading", "fig-13-right", draw_fall, _falls),
+    )
 }
 
 
@@ -242,8 +221,6 @@ FIGURES = {
 
 
 _LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f")} | {"gravity": "gravity"}
-_FINE = 51
-"""Points of the plane of friction along each axis."""
 
 
 def draw_readings(made: Design) -> tuple[Figure, str]:
@@ -293,7 +270,7 @@ def draw_friction(made: Design) -> tuple[Figure, str]:
     """A map of the operating limit of the chosen ball and vessel over both frictions; and its caption."""
     chosen = made.choice
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
-    mu, eta = (np.linspace(top[name] / 50, top[name], _FINE) for name in ("mu", "eta"))
+    mu, eta = (np.linspace(top[name] / 50, top[name], 51) for name in ("mu", "eta"))
     limits = [[analytic.operating_range(chosen.p.replace(mu=float(m), eta=float(e))) for e in eta] for m in mu]
     figure, axes = style.panels(7.0, 4.3)
     shown = axes.contourf(eta, mu, limits, levels=14, cmap="cividis")

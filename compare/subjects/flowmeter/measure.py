@@ -22,44 +22,35 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from compare.kit import settling
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import Protocol
 from compare.kit.record import Condition, Measurement, Missing, Records, if_found, measurement, state_of
-from compare.kit.settling import (
-    STEPS_A_SAMPLE,
-    Patience,
-    Settled,
-    duration,
-    judge_run,
-    named_start,
-    physical_case,
-    rounded_duration,
-    safe_height,
-    settle_groups,
-    settled_cases,
-)
+from compare.kit.settling import Patience, Settled
 from compare.kit.statistics import Measured, settled_case
-from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 
-NEIGHBOUR = 1e-3
-"""Relative distance of neighbouring flows; half of it shows the effect of curvature."""
-ACROSS = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
-"""Distances from the flow at which slipping sets in, relative to it."""
-SHARPNESS = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
-"""Factor on the drift limit of settled states, by what is measured: for the jump the states lie close together."""
+
+@dataclass(frozen=True)
+class Slopes:
+    """Flows at which states settle for a slope, as relative distances."""
+
+    across: tuple[float, ...] = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)  # from where slipping sets in
+    neighbours: tuple[float, ...] = (-1e-3, -5e-4, 5e-4, 1e-3)  # the nearer ones show the effect of curvature
 
 
 def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there to unloading."""
     most = lab.effort.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
-    for by, sharp in SHARPNESS.items():
+    # With a factor on the drift limit of settled states: for the jump they lie close together.
+    for by, sharp in ("neighbours", 0.3), ("jump", 0.1), ("mean", 1.0):
         own = [curve for curve in curves if curve.by == by]
         starts = [[Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own]
-        for curve, states in zip(own, settle_groups(lab, starts, Patience(span=24.0, sharp=sharp)), strict=True):
+        settled = settling.settle_groups(lab, starts, Patience(span=24.0, sharp=sharp))
+        for curve, states in zip(own, settled, strict=True):
             where = f"{by} at omega_0 = {curve.p.omega_0:.4g} rad/s"
             if failure := next((each.failure for each in states if each.failure), ""):
                 yield Missing("slope", curve.set, f"{where}: {failure}")
@@ -78,12 +69,10 @@ class Curve:
 
     by: str
     set: str
-    p: Parameters
-    """With the flow at which the slope is wanted."""
+    p: Parameters  # with the flow at which the slope is wanted
     flows: tuple[float, ...]
     x0: tuple[float, ...] = (0.0,) * 8
-    noise: float = 0.0
-    """Standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1."""
+    noise: float = 0.0  # standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1
 
 
 def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
@@ -95,7 +84,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
     states: dict[Case, dict[float, dict[str, Measurement]]] = {case: {} for case in Case}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity != "case"):
         if m.parameters.omega_0:
-            at = states[physical_case(Case[str(m.conditions["case"])])].setdefault(m.parameters.omega_0, {})
+            at = states[settling.physical_case(Case[str(m.conditions["case"])])].setdefault(m.parameters.omega_0, {})
             at[m.quantity] = m
     for case in (Case.RR, Case.SS, Case.NR):
         alike = sorted(states[case].items())
@@ -103,13 +92,13 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
         for k in sorted({int(n) for n in few if alike}):
             omega_0, values = alike[k]
             q, moving = values["omega_c"].parameters, ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
-            x0 = (safe_height(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
-            flows = tuple(omega_0 * (1 + d) for d in (-NEIGHBOUR, -NEIGHBOUR / 2, NEIGHBOUR / 2, NEIGHBOUR))
+            x0 = (settling.safe_height(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
+            flows = tuple(omega_0 * (1 + d) for d in Slopes.neighbours)
             yield Curve("neighbours", name, q, flows, x0)
     slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
     if slips is not None:
         q, x0 = p.replace(omega_0=slips.value), (0.0, 0.0, slips.value, 0.0, 0.0, 0.0, 0.0, 0.0)
-        around = tuple(slips.value * (1 + d) for d in ACROSS)
+        around = tuple(slips.value * (1 + d) for d in Slopes.across)
         yield Curve("jump", name, q, around, x0, slips.uncertainty)
         if holds is not None and holds.value > slips.value:
             noise = math.hypot(slips.uncertainty, holds.uncertainty)
@@ -127,7 +116,7 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
     f, onset = np.array(curve.flows), curve.p.omega_0
     w, noises = np.transpose([(v.value, v.uncertainty) for v in (each.values["omega_c"] for each in states)])
     noise, below = float(noises.max()), (w[1] - w[0]) / (f[1] - f[0])
-    if curve.by == "neighbours" and len(set(map(physical_case, cases))) == 1:
+    if curve.by == "neighbours" and len(set(map(settling.physical_case, cases))) == 1:
         wide, near = (w[3] - w[0]) / (f[3] - f[0]), (w[2] - w[1]) / (f[2] - f[1])
         return Measured(near + (near - wide) / 3, math.hypot((near - wide) / 3, 2 * noise / (f[2] - f[1])))
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
@@ -145,11 +134,19 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
 
 def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Case and omega_c at every level of the loop, and the case at the level before."""
-    loops = {name: _loop(name, p, records, lab.effort.hysteresis_parts) for name, p in sets.items()}
-    why = "no flow at which slipping on the floor gives way to riding the wall"
-    yield from (Missing("hysteresis", name, why) for name, loop in loops.items() if not loop)
-    loops = {name: loop for name, loop in loops.items() if loop}
-    tasks = [_loop_task(lab, [level.p for level in loop]) for loop in loops.values()]
+    loops: dict[str, list[Start]] = {}  # starts at all levels of a set, up and down
+    for name, p in sets.items():
+        if rise := _levels(name, records, lab.effort.hysteresis_parts):
+            sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
+            loops[name] = [Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides]
+        else:
+            yield Missing("hysteresis", name, "no flow at which slipping on the floor gives way to riding the wall")
+    tasks = []
+    for loop in loops.values():  # a run through all levels, each held for a time
+        p, flows = loop[0].p, [level.p.omega_0 for level in loop]
+        step, hold = coarse_step(p), settling.duration(p, lab.effort.hysteresis_hold)
+        samples, flow = round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows), Flow.staircase(flows, hold)
+        tasks.append(lab.task(p, State(omega_c=flows[0]), hold * len(flows), step, flow=flow, samples=samples))
     for (name, loop), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
             yield Missing("hysteresis", name, f"the run {run}")
@@ -161,7 +158,7 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
         for k, level in enumerate(loop):
             held = slice(k * count, (k + 1) * count)
             part = replace(run, **{column: getattr(run, column)[held] for column in columns(Trajectory)})
-            ended = judge_run(replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose)
+            ended = settling.judge_run(replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose)
             if ended.failure:
                 where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
                 yield Missing("hysteresis", name, f"{where}: {ended.failure}")
@@ -172,23 +169,7 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
                 sure = math.hypot(omega_c.uncertainty, certainty * level.p.omega_0)
                 yield row(quantity="case", value=ended.case)
                 yield row(quantity="omega_c", value=Measured(omega_c.value, sure))
-            before = physical_case(ended.case).name
-
-
-def _loop_task(lab: Lab, levels: Sequence[Parameters]) -> Task:
-    """A run through all levels of the flow, each held for a time."""
-    p, flows = levels[0], [level.omega_0 for level in levels]
-    hold = duration(p, lab.effort.hysteresis_hold)
-    samples = round(hold / (STEPS_A_SAMPLE * coarse_step(p))) * len(flows)
-    flow = Flow.staircase(flows, hold)
-    return lab.task(p, State(omega_c=flows[0]), hold * len(flows), coarse_step(p), flow=flow, samples=samples)
-
-
-def _loop(name: str, p: Parameters, records: Records, parts: int) -> list[Start]:
-    """Starts at all levels of a set's hysteresis loop, up and down, see `_levels`."""
-    rise = _levels(name, records, parts)
-    sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
-    return [Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides]
+            before = settling.physical_case(ended.case).name
 
 
 def _levels(name: str, records: Records, parts: int) -> list[float]:
@@ -196,7 +177,7 @@ def _levels(name: str, records: Records, parts: int) -> list[float]:
 
     Empty unless a ball from rest slips at one flow and rides the wall at the next.
     """
-    floor, wall = (settled_cases(records, name, how) for how in ("rest", "on the wall"))
+    floor, wall = (settling.settled_cases(records, name, how) for how in ("rest", "on the wall"))
     gives_way = [(a, b) for a, b in pairwise(floor) if (floor[a], floor[b]) == (Case.SS, Case.NR)]
     if not gives_way:
         return []
@@ -218,10 +199,15 @@ class Shown:
 
 LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
 """Names of the trials."""
-ABOVE, BELOW = 1.02, 0.95
-"""Flows before and after the unloading, in units of the measured omega_02."""
-PUSH = 1e-2
-"""How hard a ball is pushed: speed in units of sqrt(g R), or more spin in units of its spin on the wall."""
+
+
+@dataclass(frozen=True)
+class Falls:
+    """How a ball on the wall is unloaded, or pushed."""
+
+    above: float = 1.02  # flow before the unloading, in units of the measured omega_02
+    below: float = 0.95  # and after it
+    push: float = 1e-2  # speed in units of sqrt(g R), or more spin in units of its spin on the wall
 
 
 def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -233,9 +219,9 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
             continue
         # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by lifting, too.
         lifts = records.threshold(name, "omega_03") or limit
-        flows = ABOVE * limit.value, 1.1 * max(limit.value, lifts.value)
-        starts.append([named_start(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
-    for states in settle_groups(lab, starts, Patience(loose=lab.effort.thresholds_loose)):
+        flows = Falls.above * limit.value, 1.1 * max(limit.value, lifts.value)
+        starts.append([settling.named_start(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
+    for states in settling.settle_groups(lab, starts, Patience(loose=lab.effort.thresholds_loose)):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
                 yield Missing("unloading", state.start.set, f"no ball to begin with on the wall: {state.failure}")
@@ -270,15 +256,15 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
     p, x = state.start.p, State.of(state.mean)
     x0 = State(omega_c=x.omega_c, slip_x=x.slip_x)
     if name in (LANDING, UNLOADED):
-        p, x0 = p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0._replace(y=0.2 * p.R)
+        p, x0 = p.replace(omega_0=p.omega_0 * Falls.below / Falls.above), x0._replace(y=0.2 * p.R)
     elif name == UPWARDS:
-        x0 = x0._replace(v_y=PUSH * math.sqrt(p.g * p.R))
+        x0 = x0._replace(v_y=Falls.push * math.sqrt(p.g * p.R))
     else:
-        x0 = x0._replace(slip_x=x.slip_x + PUSH * (x.slip_x + p.R / p.r * x.omega_c))
+        x0 = x0._replace(slip_x=x.slip_x + Falls.push * (x.slip_x + p.R / p.r * x.omega_c))
     coarse, fine = (times if name == LANDING else times // 4 for times in lab.effort.unloading_refine)
     # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of many kinds.
     lands = 1.2 + 7 * p.c * time_unit(p)
-    t_end, step = rounded_duration(p, lands if name == LANDING else 6.0), coarse_step(p) / fine
+    t_end, step = settling.rounded_duration(p, lands if name == LANDING else 6.0), coarse_step(p) / fine
 
     def read(run: Trajectory) -> tuple[Case, dict[Shown, Measured]]:
         numbers = {}
@@ -288,7 +274,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
             numbers = {Shown(name, "lift", "first top"): first_top(run)}
         elif name == BY_SPIN:  # it leaves the floor at a whole step, up to one late or early, which changes its height
             numbers = {Shown(name, "lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
-        return physical_case(settled_case(run)), numbers
+        return settling.physical_case(settled_case(run)), numbers
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
     samples = None if name == LANDING else 1000

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,53 +11,33 @@ from analytic.bifurcation.diagram import thresholds
 from analytic.simulation import simulator
 from compare.branches import check_thresholds
 from compare.kit import style
-from compare.kit.drawing import Drawing, Evidence, Motion
-from compare.kit.engines import EVENT
-from model import Case, Parameters, Trajectory
+from compare.kit.drawing import Diagram, diagram
+from model import Case
 
 BETA = 0.9
 """Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that the path bends."""
 PUSHED = 1.0
 """Size of the push, rad s-1."""
-FLOW_OF = {"fig-4": 1.38, "fig-5": 0.88}
-"""Flows above and below omega_02, in units of it."""
-SET = Parameters.named("high-wall-friction")
-_LASTS = 0.17
-"""Time that Fig. 5 shows, in units of sqrt(R/g)."""
+MOTIONS = {"fig-4": (1.38, 3.4), "fig-5": (0.88, 0.17)}
+"""Flows above and below omega_02, in units of it, and times of motions, in units of sqrt(R/g): in Fig. 4 slip ends."""
 
 
-def of_set(p: Parameters, figure: str) -> Motion:
-    """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
-    check_thresholds(p)
-    p = p.replace(omega_0=FLOW_OF[figure] * thresholds(p).omega_02)
-    lasts = _LASTS * math.sqrt(p.R / p.g) * (20 if figure == "fig-4" else 1)  # till slip has ended
-    return Motion(f"{PUSHED}, {BETA}", EVENT.name, p, partial(_pushed, p, lasts))
+def draw(of: Diagram) -> tuple[Figure, str]:
+    """A figure of the slip at the wall over time, and of its path in the orthogonal plane (55); and its caption.
 
-
-def _pushed(p: Parameters, lasts: float) -> Trajectory:
-    """The motion after a push out of NR; where slip ends soon, a short one with samples enough."""
-    run = simulator.slip_perturbation(p, PUSHED, BETA, t_end=lasts)
-    if len(run.events) and run.cases[-1] is Case.NR:
-        return simulator.slip_perturbation(p, PUSHED, BETA, t_end=1.6 * float(run.events.time[-1]))
-    return run
-
-
-def select(_: Evidence, figure: str) -> Motion:
-    """The motion of the set of the paper's kind, whatever was measured."""
-    return of_set(SET, figure)
-
-
-def draw(push: Motion) -> tuple[Figure, str]:
-    """A figure of the slip at the wall over time, and of its path in the orthogonal plane (55); and its caption."""
-    run = push.load()
-    figure = style.figure(8.4, 3.3)
-    time, plane = figure.subplots(1, 2)
-    stops = len(run.events) > 0 and run.cases[-1] is Case.NR
+    The motion is that of the event-driven simulation from the formal stationary state of NR.
+    """
+    check_thresholds(of.p)
+    flow, lasts = MOTIONS[of.figure]
+    p = of.p.replace(omega_0=flow * thresholds(of.p).omega_02)
+    run = simulator.slip_perturbation(p, PUSHED, BETA, t_end=lasts * math.sqrt(p.R / p.g))
+    if stops := len(run.events) > 0 and run.cases[-1] is Case.NR:  # a short one has samples enough
+        run = simulator.slip_perturbation(p, PUSHED, BETA, t_end=1.6 * float(run.events.time[-1]))
+    figure, (time, plane) = style.panels(8.4, 3.3, 1, 2)
     end = float(run.events.time[-1]) if stops else float(run.time[-1])
-    shown = run.time <= (1.6 * end if stops else end)
-    t = 1e3 * run.time[shown]
+    t = 1e3 * run.time
     for name, line in (("y", "--"), ("z", "-")):
-        slip = getattr(run, f"slip_{name}")[shown]
+        slip = getattr(run, f"slip_{name}")
         time.plot(t, slip, color=style.COLOURS[Case.NS], ls=line, label=f"$\\tilde\\omega_{name}$")
     if stops:
         time.axvline(1e3 * end, **style.GUIDE)
@@ -66,7 +45,7 @@ def draw(push: Motion) -> tuple[Figure, str]:
             time.text(1e3 * place * end, 0.93, case.name, ha="center", transform=time.get_xaxis_transform())
     time.set(xlabel="$t$ (ms)", ylabel="slip at the wall (rad/s)")
     time.legend(frameon=False)
-    w_y, w_z = run.slip_y[shown], run.slip_z[shown]
+    w_y, w_z = run.slip_y, run.slip_z
     plane.plot(w_z, w_y, color="black", lw=1.4)
     plane.plot([w_z[0], 0], [w_y[0], 0], **style.GUIDE)
     halfway = int(np.searchsorted(np.hypot(np.diff(w_z), np.diff(w_y)).cumsum(), 0.5 * PUSHED))
@@ -85,11 +64,11 @@ def draw(push: Motion) -> tuple[Figure, str]:
         f"The stationary orbit on the wall (NR), pushed by a slip of {PUSHED:g} rad/s in the direction β = {BETA:g}, "
         f"{dies if stops else grows}. Left: the slip over time. Right: its path in the plane orthogonal to NR, from "
         "the cross; dotted: the straight line. Event-driven simulation; "
-        f"{style.named(push.p)}, Ω₀ = {push.p.Omega_0:.3g}."
+        f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}."
     )
 
 
 FIGURES = {
-    name: Drawing(title, partial(select, figure=name), draw, ("slip-NR-NS",), partial(of_set, figure=name))
+    name: diagram(name, title, "high-wall-friction", draw, ("slip-NR-NS",))
     for name, title in (("fig-4", "Fig. 4: a slip that dies out"), ("fig-5", "Fig. 5: a slip that grows"))
 }

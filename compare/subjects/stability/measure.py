@@ -37,19 +37,26 @@ from model.drag import QUADRATIC, STOKES
 from model.kinematics import SLIP_XYZ, VARIABLES, slip_speeds, state_units
 
 PROTOCOL = "rates"
-RECORD = (64, 256)
-"""Length of a record in coarse steps, which is about 3 sqrt(R/g), and its samples."""
+
+
+@dataclass(frozen=True)
+class Pushes:
+    """How settled states are pushed."""
+
+    record: tuple[int, int] = (64, 256)  # its length in coarse steps, about 3 sqrt(R/g), and samples
+    # Size of a push that isn't extrapolated to zero, under Stokes' law of drag and under others: theirs is in
+    # proportion to a lag only far below a Reynolds number of 1. The run with the coarser step has half of it, and shows
+    # that it doesn't matter.
+    usual: float = 2e-4
+    slight: float = 2e-6
+    slowest: float = 0.04  # least slip speed of a state divided by sqrt(g R): a push is to be small beside it
+    zero_rate: float = 0.05  # measured rates below this share of the drag coefficient c count as zero
+
+
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
 """Size of a push, in the `units`, where it is extrapolated to zero from this and half of it."""
-USUAL_PUSH, SLIGHT_PUSH = 2e-4, 2e-6
-"""Size of a push elsewhere, under Stokes' law of drag and under others: theirs is in proportion to a lag only far below
-a Reynolds number of 1. The run with the coarser step has half of it, and shows that it doesn't matter."""
-SLOWEST = 0.04
-"""Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; more at the others."""
-ZERO_RATE = 0.05
-"""Measured rates below this share of the drag coefficient c count as zero."""
 Exponents = npt.NDArray[np.complex128]
 
 
@@ -98,8 +105,8 @@ class Pushed:
 
     @property
     def record(self) -> tuple[int, int]:
-        """`RECORD`, or a brief one where a large push soon changes the state itself."""
-        return (2, 16) if self.case is Case.RS else RECORD
+        """`record`, or a brief one where a large push soon changes the state itself."""
+        return (2, 16) if self.case is Case.RS else Pushes.record
 
     @property
     def order(self) -> int:
@@ -109,7 +116,7 @@ class Pushed:
     @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
-        size = PUSH.get(self.case, USUAL_PUSH if self.start.p.drag == STOKES else SLIGHT_PUSH)
+        size = PUSH.get(self.case, Pushes.usual if self.start.p.drag == STOKES else Pushes.slight)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
     def steps(self, lab: Lab) -> tuple[float, float]:
@@ -125,7 +132,7 @@ class Pushed:
         not resolved; nor at half the speed, divided by what `STUDY_SLIP` allows for the load, at which they hover.
         """
         p, x = self.start.p, self.start.x0
-        turned = math.sqrt(p.g * p.R) * max(SLOWEST, 2 * PUSH.get(self.case, 0.0))
+        turned = math.sqrt(p.g * p.R) * max(Pushes.slowest, 2 * PUSH.get(self.case, 0.0))
         loads = (p.mu, p.g), (p.eta, p.R * State.of(x).omega_c ** 2)
         return all(
             max(turned, 4 * coarse_step(p) * friction * load) < speed
@@ -161,7 +168,16 @@ def chosen_states(records: Records, name: str, p: Parameters, more: float) -> It
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
     yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
-    states = list(_settled(records, name))
+    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
+    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
+        values.setdefault((m.parameters, physical_case(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
+    states = []
+    for (q, case), value in values.items():  # on the wall alone it is high up, and just touching the floor
+        x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
+        raised = x._replace(y=safe_height(q)) if case.A is Contact.N else x
+        states.append(Pushed(Start(name, q, "settled", raised.stacked()), case))
+        if case is Case.NR:
+            states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.SR))
     if p.drag == QUADRATIC:  # no ball settles to going round with the fluid, but one that starts so goes on so
         q, x = p.replace(omega_0=0.5 / unit), State(omega_c=0.5 / unit)
         states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.RR))
@@ -176,19 +192,6 @@ def chosen_states(records: Records, name: str, p: Parameters, more: float) -> It
         if (lacking := min(count, len(of)) - len(places)) > 0 or not of:
             why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a push"
             yield Missing(PROTOCOL, name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
-
-
-def _settled(records: Records, name: str) -> Iterator[Pushed]:
-    """The settled states of a set as states to push; one on the wall alone high up, and just touching the floor."""
-    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
-    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, physical_case(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
-    for (p, case), value in values.items():
-        x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
-        raised = x._replace(y=safe_height(p)) if case.A is Contact.N else x
-        yield Pushed(Start(name, p, "settled", raised.stacked()), case)
-        if case is Case.NR:
-            yield Pushed(Start(name, p, "settled", x.stacked()), Case.SR)
 
 
 def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
@@ -281,7 +284,7 @@ def _modes(
             parts.append((name, mode, value, natural_size(value, other, p), float(uncertainty[k])))
     # They come from one propagator: where one is too vague for a check, the others aren't to be trusted more.
     vague = max(COVERAGE * sure / size / quantity(name).resolves for name, *_, size, sure in parts)
-    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > ZERO_RATE * p.c]
+    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > Pushes.zero_rate * p.c]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
     for name, mode, value, size, sure in parts:
@@ -311,7 +314,7 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     Its own, or that of the exponent if it is none, or else that of free fall.
     """
     for size in (abs(rate), math.hypot(rate, other)):
-        if size > ZERO_RATE * p.c:
+        if size > Pushes.zero_rate * p.c:
             return size
     return 1 / time_unit(p)
 

@@ -11,28 +11,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
+from compare.kit import settling
 from compare.kit.lab import Lab, time_unit
 from compare.kit.programme import Protocol
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.settling import (
-    ERROR_GROUPS,
-    SPIN,
-    Patience,
-    Settled,
-    duration,
-    named_start,
-    physical_case,
-    scale,
-    settle,
-)
+from compare.kit.settling import Patience, Settled
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
 from model import Case, Parameters, State
 from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
-MIRRORED = ("rest", 0.62), ("rest", 1.4), ("on the wall", 4.2)
-"""Starts and flows, in units of sqrt(g/R), of those that are measured the other way round, too."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -40,7 +29,13 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     sharp, refine = lab.effort.settled_sharp, lab.effort.settled_refine
     alike: dict[Attractor, list[Settled]] = {}
     without: dict[Attractor, Missing] = {}
-    for state in settle(lab, list(_starts(lab, sets)), Patience(sharp=sharp, loose=lab.effort.settled_loose)):
+    starts = []
+    for name, p in sets.items():
+        for how, flows in lab.effort.settled_starts:
+            starts += [settling.named_start(name, p.replace(omega_0=flow / time_unit(p)), how) for flow in flows]
+        spinning = State(slip_y=settling.SPIN / time_unit(p) * p.R / p.r)
+        starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
+    for state in settling.settle(lab, starts, Patience(sharp=sharp, loose=lab.effort.settled_loose)):
         if state.failure:
             yield _unsettled(state, 1)
         else:
@@ -58,7 +53,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         again.append(replace(state.start, x0=x0.stacked()))
     # With several time steps the limit is extrapolated from all of them, and half the step isn't needed here.
     patience = Patience(refine=refine, span=20.0, sharp=sharp)
-    refined = settle(lab, again, patience) if refine > 1 else [state for state, *_ in groups]
+    refined = settling.settle(lab, again, patience) if refine > 1 else [state for state, *_ in groups]
     for same, fine in zip(groups, refined, strict=True):
         yield from _values(lab, same, fine)
 
@@ -74,16 +69,7 @@ class Attractor:
     @classmethod
     def of(cls, state: Settled) -> Self:
         """The attractor of a settled state."""
-        return cls(state.start.set, state.start.p.omega_0, physical_case(state.case))
-
-
-def _starts(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Start]:
-    """Starts of all sets: at rest, with the fluid on the floor and high up on the wall, spinning in a fluid at rest."""
-    for name, p in sets.items():
-        for how, flows in lab.effort.settled_starts:
-            yield from (named_start(name, p.replace(omega_0=flow / time_unit(p)), how) for flow in flows)
-        spinning = State(slip_y=SPIN / time_unit(p) * p.R / p.r)
-        yield Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked())
+        return cls(state.start.set, state.start.p.omega_0, settling.physical_case(state.case))
 
 
 def _why_drag_fades(state: Settled) -> str:
@@ -93,7 +79,11 @@ def _why_drag_fades(state: Settled) -> str:
         return ""
     Re = 2 * p.r / p.nu_f * math.hypot(State.of(state.mean).v_y, p.R * (State.of(state.mean).omega_c - p.omega_0))
     rate = p.c * (p.C_D / 24 * Re)  # at which the fluid would stop a free ball
-    return "" if rate * duration(p) >= 10 else "quadratic drag fades with the lag, so that a small lag hardly dies out"
+    return (
+        ""
+        if rate * settling.duration(p) >= 10
+        else "quadratic drag fades with the lag, so that a small lag hardly dies out"
+    )
 
 
 def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measurement | Missing]:
@@ -101,12 +91,12 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
     p = fine.start.p
     if fine.failure:
         yield _unsettled(fine, len(fine.values))
-    elif physical_case(fine.case) is not physical_case(same[0].case):
+    elif settling.physical_case(fine.case) is not settling.physical_case(same[0].case):
         why = f"{same[0].case.name} at omega_0 = {p.omega_0:.4g} rad/s is {fine.case.name} with half the time step"
         yield Missing(PROTOCOL, fine.start.set, why, len(fine.values))
     else:
-        for group in ERROR_GROUPS:
-            sizes = {n: scale(n, p) for n in group if all(n in each.values for each in (fine, *same))}
+        for group in settling.ERROR_GROUPS:
+            sizes = {n: settling.scale(n, p) for n in group if all(n in each.values for each in (fine, *same))}
             changes = [abs(s.values[n].value - fine.values[n].value) / sizes[n] for s in same for n in sizes]
             for n, size in sizes.items():
                 uncertainty = math.hypot(fine.values[n].uncertainty, max(changes) * size)
@@ -116,11 +106,11 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
 def mirrored(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Case and values to which a ball settles in a flow the other way round."""
     starts = [
-        named_start(name, p.replace(omega_0=-flow / time_unit(p)), how)
+        settling.named_start(name, p.replace(omega_0=-flow / time_unit(p)), how)
         for name, p in sets.items()
-        for how, flow in MIRRORED
+        for how, flow in (("rest", 0.62), ("rest", 1.4), ("on the wall", 4.2))
     ]
-    for state in settle(lab, starts):
+    for state in settling.settle(lab, starts):
         if state.failure:
             yield _unsettled(state, 1 + len(state.values), "mirrored")
             continue

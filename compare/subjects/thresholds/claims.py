@@ -138,10 +138,7 @@ CLAIMS = (
             by=f"{_BY}: omega_01, omega_02",
         ),
         Bearing(
-            "thresholds",
-            "folds",
-            lambda m: bifurcation.number_of_folds(m.parameters),
-            by="diagram.number_of_folds",
+            "thresholds", "folds", lambda m: bifurcation.number_of_folds(m.parameters), by="diagram.number_of_folds"
         ),
     ),
 )

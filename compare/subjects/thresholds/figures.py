@@ -5,8 +5,6 @@ Those show stationary solutions against the flow, by their spin on the wall (91)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -20,18 +18,18 @@ from scipy import ndimage
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
-from compare.branches import check_thresholds, fold_state, round_with_fluid, slipping, spin, spin_off_floor
+from compare.branches import check_thresholds, fold_state, round_with_fluid, slipping, spin, spin_of
 from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, only_where
-from compare.kit.record import Check
-from compare.kit.style import STABLE, UNSTABLE, Line, Name
+from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where
+from compare.kit.record import Measurement
+from compare.kit.style import STABLE, UNSTABLE, Line, Place
 from model import Case, Parameters, State
 from model.arrays import Array
 
 _THEORY = Parameters.named("reference")
 """Shown where nothing was measured."""
-_LEAST, _WIDEST = 0.01, 0.8
-"""Frictions of the wall shown, and the least at which thresholds that meet set the scale."""
+_WIDEST = 0.8
+"""Friction of the wall up to which planes are shown."""
 _SECTIONS = {0.2: "Figs. 9, 10", 0.6: "Figs. 9, 11"}
 """The two typical sections of Fig. 7, by wall friction."""
 _BISTABLE = Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR
@@ -45,43 +43,41 @@ TINTS = {
 """Pale grounds of the regions, by what attracts; lines and names tell them apart without colour."""
 
 
-@dataclass(frozen=True)
-class Plane:
-    """A plane of friction and flow, and the cases in which runs ended at points of it."""
-
-    p: Parameters
-    equal: bool
-    """Whether mu = eta (Fig. 8) or fixed (Fig. 7)."""
-    checks: tuple[Check, ...] = ()
-
-
-def select_plane(evidence: Evidence, figure: str) -> Plane:
+def select_plane(evidence: Evidence, figure: str) -> Diagram:
     """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the first."""
     checks = evidence.checks.get(figure, ())
     chosen = tuple(c for c in checks if c.measurement.set == checks[0].measurement.set)
-    return Plane(chosen[0].measurement.parameters if chosen else _THEORY, figure == "fig-8", chosen)
+    return Diagram(figure, chosen[0].measurement.parameters if chosen else _THEORY, checks=chosen)
 
 
-def draw_plane(plane: Plane) -> tuple[Figure, str]:
-    """A figure of regions with their names, thresholds between them, and measured points; and its caption."""
-    p = plane.p
+def draw_plane(plane: Diagram) -> tuple[Figure, str]:
+    """A figure of regions with their names, thresholds between them, and points at which runs ended; and its caption.
+
+    Friction of floor and wall are equal in Fig. 8; in Fig. 7 that of the floor is fixed.
+    """
+    p, equal = plane.p, plane.figure == "fig-8"
     figure = style.figure(6.4, 4.9)
     axes = figure.add_subplot()
-    regions(axes, p, plane.equal, max((c.measurement.parameters.omega_0 for c in plane.checks), default=0.0))
-    for section, text in _SECTIONS.items() if not plane.equal and p.replace(eta=_THEORY.eta) == _THEORY else ():
+    regions(axes, p, equal, max((c.measurement.parameters.omega_0 for c in plane.checks), default=0.0))
+    for section, text in _SECTIONS.items() if not equal and p.replace(eta=_THEORY.eta) == _THEORY else ():
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3",
                   transform=axes.get_xaxis_transform())  # fmt: skip
-    for engine in dict.fromkeys(check.measurement.engine for check in plane.checks):
-        own = [check for check in plane.checks if check.measurement.engine == engine]
-        axes.plot(*_places_of(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
+    engines = dict.fromkeys(check.measurement.engine for check in plane.checks)
+    marks = [
+        (f"{engine}, as predicted", [c for c in plane.checks if c.measurement.engine == engine], style.mark_of(engine))
+        for engine in engines
+    ]
     if failed := [check for check in plane.checks if not check.agrees]:
-        axes.plot(*_places_of(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
+        marks.append(("not as predicted", failed, {"marker": "x", "color": "#B3261E", "ms": 10, "mew": 2}))
+    for label, checks, look in marks:
+        places = [(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks]
+        axes.plot(*np.transpose(places), ls="none", label=label, **{"ms": 4.5} | look)
     style.legend(figure, loc="outside lower center", ncols=6, handlelength=3.2)
     style.dimensionless(axes, p, y=style.FREE_0)
-    fixed = style.named(p, "j", "kappa") if plane.equal else style.named(p, "mu", "j", "kappa")
+    fixed = style.named(p, "j", "kappa") if equal else style.named(p, "mu", "j", "kappa")
     caption = (
-        f"Which stationary solutions exist over ω₀ and {'η = μ' if plane.equal else 'η'}, for {fixed}. Lines: the "
+        f"Which stationary solutions exist over ω₀ and {'η = μ' if equal else 'η'}, for {fixed}. Lines: the "
         "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two stable motions (SS, "
         "and SR or NR)."
     )
@@ -95,7 +91,9 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
     """Draw which cases exist over friction and flow, up to a flow at least, rad s-1, and the thresholds."""
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if equal else np.full(eta.shape, p.mu)
-    doubles = [point for point in bifurcation.double_points(p, equal) if point.eta > _LEAST]
+    doubles = [
+        point for point in bifurcation.double_points(p, equal) if point.eta > 0.01
+    ]  # lower ones don't set the scale
     fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), highest, *(point.omega_0 for point in doubles)])
     omega_0 = np.linspace(0.0, fastest, 901)
     plane = bifurcation.case_map(p, mu, eta, omega_0).T
@@ -150,18 +148,8 @@ def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, 
             style.beside(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
 
 
-def _places_of(checks: Sequence[Check]) -> Array:
-    return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])
-
-
-RELEASED = Parameters.named("reference").replace(eta=0.43)
+RELEASED = _THEORY.replace(eta=0.43)
 """eta so little above j that the branch of SS, with (12) released, is whole."""
-_SETS = {
-    "fig-9": ("reference", ("NS", "NR")),
-    "fig-10": ("reference", ("RR", "SS", "SR", "NR")),
-    "fig-11": ("high-wall-friction", ("RR", "SR", "NR")),
-}
-"""The parameter set of each figure that shows measured states, and their cases."""
 _SHOWN = {
     "fig-9": "off the floor, where y is free: sinking along the wall (NS) passes over to riding it (NR) at P2",
     "fig-10": "on the floor, for η < j: rolling (RR) passes over to slipping (SS) at P3, SS turns back at the fold "
@@ -172,86 +160,15 @@ _SHOWN = {
 }
 
 
-def select_diagram(evidence: Evidence, figure: str) -> Diagram:
-    """The measured spins on the wall, by case and set."""
-    if figure == "fig-12":
-        return Diagram(figure, RELEASED)
-    name, cases = _SETS[figure]
-    measured = [*evidence.select("wall_spin", "case"), *evidence.select("edge_wall_spin", "case")]
-    own = tuple(m for m in measured if m.set == name and m.conditions["case"] in cases)
-    return Diagram(figure, Parameters.named(name), own)
-
-
-def diagram_of_set(p: Parameters, figure: str) -> Diagram:
-    """The diagram of a set, without measured states."""
-    if figure != "fig-9":
-        only_where(p, figure == "fig-10")
-    check_thresholds(p)
-    if figure == "fig-12" and not np.isfinite(slipping_branch.states(np.linspace(-16.0, 16.0, 99), p)[1]).all():
-        raise GapError(f"with (12) released its branch of SS isn't whole: that needs an η nearer to j than {p.eta:g}")
-    return Diagram(figure, p)
-
-
-def _draw_round_with_fluid(
-    axes: Axes,
-    p: Parameters,
-    case: Case,
-    span: tuple[float, float],
-    name: Name = ("RR", (0.5, (-5, 5))),
-    line: Line = STABLE,
-) -> None:
-    """Draw the branch of a case in which the ball goes round with the fluid, from one flow to another."""
-    slip_x, flows = round_with_fluid(p, case, *span)
-    style.curve(axes, case, flows, spin(p, slip_x, flows), name, line)
-
-
 def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     """A bifurcation diagram, the spin on the wall over the flow, with both scales; and its caption."""
     figure, p = style.figure(5.8, 4.1), of.p
-    axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
-    draw = partial(_draw_round_with_fluid, axes, p)
-    guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
-    bottom, top = 0.0, 2 * t.omega_02
-    if of.figure == "fig-9":
-        guides = {"omega_02": t.omega_02}
-        draw(Case.NS, (1e-3 * t.omega_02, (1 - 1e-9) * t.omega_02), ("NS", (0.35, (-4, 6))))
-        draw(Case.NR, (t.omega_02, top), ("NR", (0.5, (4, 6))))
-        style.mark(axes, t.omega_02, spin_off_floor(t.omega_02, p), "P2", (0, 8))
-    elif of.figure == "fig-10":
-        del guides["omega_03"]
-        top = 1.25 * t.omega_04
-        draw(Case.RR, (0.0, t.omega_01))
-        slipping(axes, p, partial(spin, p), (0.5, (0, -7)), (0.4, (6, 6)))
-        draw(Case.SR, (t.omega_02, top), ("SR", (0.85, (-5, -5))))
-        style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
-        style.mark(axes, t.omega_02, spin_off_floor(t.omega_02, p), "NF2", (-4, -6))
-        style.mark(axes, t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
-    elif of.figure == "fig-11":
-        guides = {"omega_02": t.omega_02, "omega_03": t.omega_03}
-        top = 1.6 * t.omega_03
-        draw(Case.RR, (0.0, t.omega_03))
-        draw(Case.SR, (t.omega_02, t.omega_03), ("SR, unstable", (0.02, (9, 3))), UNSTABLE)
-        draw(Case.SR, (t.omega_03, top), ("SR", (0.5, (4, 6))))
-        for w in (t.omega_02, t.omega_03):
-            axes.plot([w], [spin_off_floor(w, p)], **style.POINT)
-    else:
-        curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
-        guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
-        omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
-        bottom, top = (edge + part * (omega_04 - t.omega_02) for edge, part in ((t.omega_02, -0.5), (omega_04, 0.35)))
-        draw(Case.RR, (bottom, t.omega_03))
-        draw(Case.RR, (t.omega_03, omega_01), ("RR, virtual", (0.6, (-4, 4))), UNSTABLE)
-        slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
-        draw(Case.SR, (t.omega_02, t.omega_03), ("SR, unstable", (0.5, (-30, -14))), UNSTABLE)
-        draw(Case.SR, (t.omega_03, top), ("SR", (0.35, (-5, -5))))
-        style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
-        style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (7, 0))
-        style.mark(axes, t.omega_02, spin_off_floor(t.omega_02, p), "NF2", (-6, 4))
-        style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
-        for s in slipping_branch.hopf_places(p):
-            x, omega_0 = slipping_branch.states(s, p)
-            style.mark(axes, float(omega_0), float(bifurcation.wall_spin(State.of(x), p)), "H", (5, -6))
-    axes.set(xlim=(bottom, top), ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
+    if of.figure != "fig-9":
+        only_where(p, of.figure == "fig-10")
+    check_thresholds(p)
+    axes, t = figure.add_subplot(), bifurcation.thresholds(p)
+    guides, flows = _draw_branches(axes, p, of.figure)
+    axes.set(xlim=flows, ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
     if of.figure == "fig-12":
         axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * guides["omega_01"] * p.R / p.r)
     style.points(axes, of.states)
@@ -266,22 +183,86 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     return figure, caption + style.marks(of.states)
 
 
-_PLANES = {
-    "fig-7": "Fig. 7: regions over wall friction and flow",
-    "fig-8": "Fig. 8: regions over equal friction and flow",
-}
-_DIAGRAMS = {
-    "fig-9": "Fig. 9: off the floor",
-    "fig-10": "Fig. 10: on the floor, η < j",
-    "fig-11": "Fig. 11: on the floor, η > j",
-    "fig-12": "Fig. 12: on the floor, η > j, (12) released",
-}
+def _draw_branches(axes: Axes, p: Parameters, figure: str) -> tuple[dict[str, float], tuple[float, float]]:
+    """Draw all branches and special points of a diagram; return thresholds to be named and the flows shown, rad s-1."""
+    t, rolls, mark = bifurcation.thresholds(p), p.R / p.r, partial(style.mark, axes)
+    guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+
+    def draw(case: Case, begin: float, end: float, name: str, place: Place, line: Line = STABLE) -> None:
+        slip_x, flows = round_with_fluid(p, case, begin, end)  # the ball goes round with the fluid
+        style.curve(axes, case, flows, spin(p, slip_x, flows), (name, place), line)
+
+    if figure == "fig-9":
+        draw(Case.NS, 1e-3 * t.omega_02, (1 - 1e-9) * t.omega_02, "NS", (0.35, (-4, 6)))
+        draw(Case.NR, t.omega_02, 2 * t.omega_02, "NR", (0.5, (4, 6)))
+        mark(t.omega_02, spin_of(Case.NR, t.omega_02, p), "P2", (0, 8))
+        return {"omega_02": t.omega_02}, (0.0, 2 * t.omega_02)
+    if figure == "fig-10":
+        del guides["omega_03"]
+        draw(Case.RR, 0.0, t.omega_01, "RR", (0.5, (-5, 5)))
+        slipping(axes, p, partial(spin, p), (0.5, (0, -7)), (0.4, (6, 6)))
+        draw(Case.SR, t.omega_02, 1.25 * t.omega_04, "SR", (0.85, (-5, -5)))
+        mark(t.omega_01, t.omega_01 * rolls, "P3", (-6, 4))
+        mark(t.omega_02, spin_of(Case.NR, t.omega_02, p), "NF2", (-4, -6))
+        mark(t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
+        return guides, (0.0, 1.25 * t.omega_04)
+    if figure == "fig-11":
+        draw(Case.RR, 0.0, t.omega_03, "RR", (0.5, (-5, 5)))
+        draw(Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.02, (9, 3)), UNSTABLE)
+        draw(Case.SR, t.omega_03, 1.6 * t.omega_03, "SR", (0.5, (4, 6)))
+        for w in (t.omega_02, t.omega_03):
+            axes.plot([w], [spin_of(Case.NR, w, p)], **style.POINT)
+        return {"omega_02": t.omega_02, "omega_03": t.omega_03}, (0.0, 1.6 * t.omega_03)
+    if not np.isfinite(slipping_branch.states(np.linspace(-16.0, 16.0, 99), p)[1]).all():
+        raise GapError(f"with (12) released its branch of SS isn't whole: that needs an η nearer to j than {p.eta:g}")
+    curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
+    guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
+    omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
+    bottom, top = t.omega_02 - 0.5 * (omega_04 - t.omega_02), omega_04 + 0.35 * (omega_04 - t.omega_02)
+    draw(Case.RR, bottom, t.omega_03, "RR", (0.5, (-5, 5)))
+    draw(Case.RR, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
+    slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
+    draw(Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.5, (-30, -14)), UNSTABLE)
+    draw(Case.SR, t.omega_03, top, "SR", (0.35, (-5, -5)))
+    mark(omega_01, omega_01 * rolls, "P3", (-6, 0))
+    mark(t.omega_03, t.omega_03 * rolls, "NT1", (7, 0))
+    mark(t.omega_02, spin_of(Case.NR, t.omega_02, p), "NF2", (-6, 4))
+    mark(omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
+    for s in slipping_branch.hopf_places(p):
+        x, omega_0 = slipping_branch.states(s, p)
+        mark(float(omega_0), float(bifurcation.wall_spin(State.of(x), p)), "H", (5, -6))
+    return guides, (bottom, top)
+
+
+def _spins(cases: tuple[str, ...], evidence: Evidence) -> list[Measurement]:
+    """Measured spins on the wall in some cases."""
+    measured = [*evidence.select("wall_spin", "case"), *evidence.select("edge_wall_spin", "case")]
+    return [m for m in measured if m.conditions["case"] in cases]
+
+
+def _select_released(_: Evidence) -> Diagram:
+    return Diagram("fig-12", RELEASED)
+
+
 FIGURES = {
-    name: Drawing(title, partial(select_plane, figure=name), draw_plane, (name,), partial(Plane, equal=name == "fig-8"))
-    for name, title in _PLANES.items()
-} | {
-    name: Drawing(
-        title, partial(select_diagram, figure=name), draw_diagram, (name,), partial(diagram_of_set, figure=name)
+    name: Drawing(title, partial(select_plane, figure=name), draw_plane, (name,), partial(Diagram, name))
+    for name, title in (
+        ("fig-7", "Fig. 7: regions over wall friction and flow"),
+        ("fig-8", "Fig. 8: regions over equal friction and flow"),
     )
-    for name, title in _DIAGRAMS.items()
 }
+FIGURES |= {
+    name: diagram(name, title, set, draw_diagram, (name,), partial(_spins, cases))
+    for name, title, set, cases in (
+        ("fig-9", "Fig. 9: off the floor", "reference", ("NS", "NR")),
+        ("fig-10", "Fig. 10: on the floor, η < j", "reference", ("RR", "SS", "SR", "NR")),
+        ("fig-11", "Fig. 11: on the floor, η > j", "high-wall-friction", ("RR", "SR", "NR")),
+    )
+}
+FIGURES["fig-12"] = Drawing(
+    "Fig. 12: on the floor, η > j, (12) released",
+    _select_released,
+    draw_diagram,
+    ("fig-12",),
+    partial(Diagram, "fig-12"),
+)

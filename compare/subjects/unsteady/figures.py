@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
 from functools import cache, partial
 
 import numpy as np
@@ -15,88 +15,55 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import pulsation, response
 from compare.branches import check_thresholds, slipping, stable_ends
 from compare.kit import style
-from compare.kit.drawing import Drawing, Evidence, GapError, Motion, only_where
+from compare.kit.drawing import Diagram, Evidence, GapError, diagram, only_where
 from compare.kit.record import Measurement
-from compare.subjects.unsteady.measure import RAMP_ENDS, ROLLS_AT, caught_up, odd_part
+from compare.subjects.unsteady.measure import Changes, caught_up, odd_part
 from model import Case, Flow, Parameters
 
-SET = "reference"
-REFERENCE = Parameters.named(SET)
-_SLOWEST, _FASTEST, _SPAN = 0.04, 0.86, 3e3
-"""Frequencies shown: in units of c, of sqrt(g/R), and the greatest ratio of the two."""
 _LASTS = 4.0, 56.0
 """Times shown after a jump: in units of 1/c, and of sqrt(R/g), whichever is shorter."""
 FREQUENCIES = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
-SHARES = 0.2, 0.4, RAMP_ENDS[0]
+SHARES = 0.2, 0.4, Changes.ramp[0]
 """Flows about which the jumps of a ball that slips are shown, as parts of the way from omega_01 to where it ends."""
-RATES = 0.002, 0.01, 0.04
-"""Of ramps, in c times that range of flows."""
 
 
-@dataclass(frozen=True)
-class Measurements:
-    """What was measured on the set that is shown, and the runs after a jump of a ball that slips, up and down."""
-
-    rows: tuple[Measurement, ...] = ()
-    runs: tuple[Motion, ...] = ()
-    p: Parameters = REFERENCE
-
-    def of(self, quantity: str) -> list[Measurement]:
-        """The measurements of one quantity."""
-        return [m for m in self.rows if m.quantity == quantity]
-
-    @property
-    def mean(self) -> Parameters:
-        """The set, with the mean flow of the pulsations."""
-        usual = self.p.replace(omega_0=ROLLS_AT * stable_ends(self.p)[0])
-        return next((m.parameters for m in self.of("gain")), usual)
-
-    @property
-    def slips(self) -> tuple[float, float]:
-        """The flows between which balls slip at both points, rad s-1; nan where the wall's friction is too great."""
-        t = bifurcation.thresholds(self.p)
-        return t.omega_01, t.omega_02 if math.isnan(t.omega_04) else t.omega_04
-
-    def slipping(self, share: float) -> Parameters:
-        """The set with a flow between the ends of `slips`: a share of the way from the first."""
-        low, high = self.slips
-        return self.p.replace(omega_0=low + share * (high - low))
+def _ends_of_slipping(p: Parameters) -> tuple[float, float]:
+    """The flows between which balls slip at both points, rad s-1; nan where the wall's friction is too great."""
+    t = bifurcation.thresholds(p)
+    return t.omega_01, t.omega_02 if math.isnan(t.omega_04) else t.omega_04
 
 
-def select(evidence: Evidence, figure: str) -> Measurements:
-    """The measurements of a protocol; for the jumps their runs with the finer step, too."""
-    own = tuple(m for m in evidence.records.measurements if m.protocol == figure and m.set == SET)
-    runs = [motion for m in own if m.quantity == "jump_height" for motion in evidence.motions(m)[-2:]]
-    return Measurements(own, tuple(runs[:2]))
+def _slipping(p: Parameters, share: float) -> Parameters:
+    """A set with a flow between those ends: a share of the way from the first."""
+    low, high = _ends_of_slipping(p)
+    return p.replace(omega_0=low + share * (high - low))
 
 
-def of_set(p: Parameters, figure: str) -> Measurements:
-    """What theory has of a set: pulsations where rolling ends, jumps and ramps where slipping does."""
-    if figure == "unsteady":
-        only_where(p, folds=True)
-        check_thresholds(p)
-    elif not 0 < stable_ends(p)[0] < math.inf:
-        raise GapError("there is no flow at which two-point rolling ends")
-    return Measurements(p=p)
+def _rolling(of: Diagram) -> Parameters:
+    """The set of a figure with the mean flow of its pulsations."""
+    usual = of.p.replace(omega_0=Changes.rolls_at * stable_ends(of.p)[0])
+    return next((m.parameters for m in of.states if m.quantity == "gain"), usual)
 
 
 @cache
 def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     """Frequencies, amplitudes at which slip begins, mean errors at half as much again."""
-    fastest = _FASTEST * math.sqrt(p.g / p.R)
-    f = np.geomspace(max(_SLOWEST * p.c, fastest / _SPAN), fastest, FREQUENCIES).tolist()
+    fastest = 0.86 * math.sqrt(p.g / p.R)
+    f = np.geomspace(max(0.04 * p.c, fastest / 3e3), fastest, FREQUENCIES).tolist()
     onsets = [pulsation.slip_onset(p, each) for each in f]
     return f, onsets, [pulsation.mean_error(p, 1.5 * a, each) for each, a in zip(f, onsets, strict=True)]
 
 
-def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
+def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
     """A figure of pulsations: gain, phase, onset of slip and mean error over frequency; and its caption."""
-    p = of.mean
+    if not 0 < stable_ends(of.p)[0] < math.inf:
+        raise GapError("there is no flow at which two-point rolling ends")
+    p = _rolling(of)
     figure, ((gain, onset), (phase, error)) = style.panels(9.0, 5.6, 2, 2, sharex=True)
     frequencies, onsets, errors = _theory(p)
     f = np.geomspace(frequencies[0], frequencies[-1], 400)
-    cases = {Case.RR: p} | ({Case.SS: of.slipping(SHARES[1])} if p.eta < p.j else {})
+    cases = {Case.RR: p} | ({Case.SS: _slipping(of.p, SHARES[1])} if p.eta < p.j else {})
     for case, q in cases.items():
         ratio = response.transfer(q, case, f)
         style.curve(gain, case, f, np.abs(ratio))
@@ -113,7 +80,8 @@ def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
     panels = {"gain": gain, "phase_lag": phase, "slip_amplitude": onset, "mean_error": error}
     for quantity, axes in panels.items():
         unit = 180 / math.pi if axes is phase else 1.0
-        style.points(axes, of.of(quantity), lambda m: float(m.conditions["f"]), unit=unit)
+        measured = [m for m in of.states if m.quantity == quantity]
+        style.points(axes, measured, lambda m: m.at("f"), unit=unit)
     gain.set(xscale="log", yscale="log", ylabel="gain, amplitude of $\\omega_c$ / of $\\omega_0$")
     phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
     onset.set(yscale="log", ylabel="amplitude at which\nslip begins (rad/s)")
@@ -127,31 +95,33 @@ def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
         f"where it rolls at both points (RR){both}. "
         "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast "
         "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
-        states=of.rows,
+        states=of.states,
     )
 
 
-def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
+def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
     """A figure of step responses, ramps, and their overshoot over the rate; and its caption."""
+    only_where(of.p, folds=True)
+    check_thresholds(of.p)
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
     t = np.linspace(0.0, min(_LASTS[0] / of.p.c, _LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
-    jump.plot(t, response.step_response(of.mean, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
-    flows = [of.slipping(share) for share in SHARES]
-    flows[0] = next((m.parameters for m in of.of("jump_height")), flows[0])
+    jump.plot(t, response.step_response(_rolling(of), Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
+    flows = [_slipping(of.p, share) for share in SHARES]
+    flows[0] = next((m.parameters for m in of.states if m.quantity == "jump_height"), flows[0])
     for p, shade in zip(flows, (0.4, 0.7, 1.0), strict=True):
         y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
         jump.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {p.omega_0:.3g} rad/s")
-    if len(of.runs) == 2:
-        up, down = (motion.load() for motion in of.runs)
+    if of.motions:
+        up, down = (motion.load() for motion in of.motions[-2:])  # with the finer step
         shown = np.flatnonzero(up.time <= t[-1])[::5]
         jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="mujoco")
     jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$ / final change")
     style.legend(jump)
-    (low, fold), measured = of.slips, of.of("ramp_end")
+    (low, fold), measured = _ends_of_slipping(of.p), [m for m in of.states if m.quantity == "ramp_end"]
     p = measured[0].parameters if measured else flows[-1]
     slipping(ramp, of.p, lambda slip_x, omega_c: omega_c)
-    rates, passed, start = np.array(RATES) * p.c * (fold - low), [], analytic.solution(p, Case.SS)
-    last = of.slipping(RAMP_ENDS[1]).omega_0
+    rates, passed, start = np.array([0.002, 0.01, 0.04]) * p.c * (fold - low), [], analytic.solution(p, Case.SS)
+    last = _slipping(of.p, Changes.ramp[1]).omega_0
     for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
         lasts = (last - p.omega_0) / rate
         flow = Flow.ramp(p.omega_0, last, lasts)
@@ -164,7 +134,7 @@ def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
     style.guides(ramp, {"omega_04": fold})
     law.loglog(rates, response.ramp_coefficient(of.p) * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
     law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
-    style.points(law, measured, lambda m: float(m.conditions["rate"]), lambda m: m.value - fold)
+    style.points(law, measured, lambda m: m.at("rate"), lambda m: m.value - fold)
     law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
     for axis in (law.xaxis, law.yaxis):
         axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -172,7 +142,7 @@ def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
         axis.set_minor_formatter(NullFormatter())
     for axes in (ramp, law):
         style.legend(axes, loc="upper left")
-    dots = " Dots: mujoco, half the difference of two small jumps, up and down." if of.runs else ""
+    dots = " Dots: mujoco, half the difference of two small jumps, up and down." if of.motions else ""
     return figure, style.caption(
         of.p,
         "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls approaches its "
@@ -184,11 +154,14 @@ def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
     )
 
 
-_PULSATION = ("pulsation-lag", "pulsation-slip", "pulsation-mean")
+def _measured(protocol: str, evidence: Evidence) -> Iterator[Measurement]:
+    return evidence.records.select(protocol)
+
+
 FIGURES = {
-    name: Drawing(f"Unsteady flow: {title}", partial(select, figure=name), draw, claims, partial(of_set, figure=name))
+    name: diagram(name, f"Unsteady flow: {title}", "reference", draw, claims, partial(_measured, name))
     for name, title, draw, claims in (
-        ("pulsation", "pulsation", draw_pulsation, _PULSATION),
+        ("pulsation", "pulsation", draw_pulsation, ("pulsation-lag", "pulsation-slip", "pulsation-mean")),
         ("unsteady", "jumps and ramps", draw_unsteady, ("jump-slipping", "ramp-fold")),
     )
 }

@@ -29,33 +29,54 @@ from compare.kit.record import Measurement, Missing, Records, if_found, measurem
 from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Measured, peaks, top
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, TrialResult, carry_out, with_step_error
+from compare.kit.trials import Start, Trial, carry_out, with_step_error
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
-RAISE = 1.5
-"""Factor by which the amplitude is raised at a time where the law of drag isn't Stokes'."""
-PERIODS, ROUNDS = 3, 5
-"""Periods in a run, and successive runs until it is settled, the last with half the step."""
-LASTING = 5
-"""Samples for which slip must last to count: friction may be full for a moment before."""
-PHASES = 8
-"""Phases of a period at which the motion is started anew from its state."""
-ROLLS_AT, SLIPS_AT, RAMP_ENDS = 0.85, 0.3, (0.75, 1.35)
-"""Flows of rolling, in units of that at which it ends; of slipping, as parts of the way from there to where the wall
-carries the ball; and ends of a ramp, as parts of the way to where slipping ends in a jump."""
+
+@dataclass(frozen=True)
+class Changes:
+    """Flows, and how they change."""
+
+    rolls_at: float = 0.85  # flow of rolling, in units of that at which it ends
+    slips_at: float = 0.3  # of slipping, as a part of the way from there to where the wall carries the ball
+    ramp: tuple[float, float] = (0.75, 1.35)  # its ends, as parts of the way to where slipping ends in a jump
+    # Size of a jump from rolling divided by the flow, and from slipping by a third of the range of flows in which it
+    # is: the response to a small jump is wanted, and near the ends of that range it is far from linear.
+    jump: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Driving:
+    """How balls are driven by a pulsation."""
+
+    raised: float = 1.5  # factor by which the amplitude is raised at a time where the law of drag isn't Stokes'
+    periods: int = 3  # in a run
+    rounds: int = 5  # successive runs until it is settled, the last with half the step
+    lasting: int = 5  # samples for which slip must last to count: friction may be full for a moment before
+    phases: int = 8  # of a period at which the motion is started anew from its state
 
 
 def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
-    ends = {name: _threshold(records, name, "omega_01") for name in sets}
-    why = "no flow was measured at which two-point rolling ends by slipping"
-    yield from (Missing("pulsation", name, why) for name, end in ends.items() if end is None)
-    small = [each for name, end in ends.items() if end is not None for each in _pulsations(lab, name, sets[name], end)]
+    small = []  # about a flow at which a ball rolls, at several frequencies
+    for name, p in sets.items():
+        if (end := _threshold(records, name, "omega_01")) is None:
+            yield Missing("pulsation", name, "no flow was measured at which two-point rolling ends by slipping")
+            continue
+        q = p.replace(omega_0=Changes.rolls_at * end)
+        room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
+        octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach * room
+        small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
     followed = _as_followed(lab, small)
     for each in followed:
-        yield from _response(lab, each)
+        if each.failure:
+            yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
+            continue
+        gain, lag, sure = abs(each.ratio), -cmath.phase(each.ratio), each.uncertainty
+        for quantity, value in (("gain", Measured(gain, sure)), ("phase_lag", Measured(lag, sure / gain))):
+            yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
     rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
         onset = _onset(lab, each, bracket)
@@ -75,12 +96,9 @@ class Timing(NamedTuple):
     """How a run in a pulsation is done."""
 
     periods: float
-    samples: int
-    """In a period."""
-    refine: int
-    """By what the longest time step is divided."""
-    phase: float = 0.0
-    """Of the flow at the beginning, rad."""
+    samples: int  # in a period
+    refine: int  # by what the longest time step is divided
+    phase: float = 0.0  # of the flow at the beginning, rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,25 +106,16 @@ class Pulsation:
     """A pulsating flow, and how a rolling ball follows it."""
 
     set: str
-    p: Parameters
-    """With the mean flow."""
+    p: Parameters  # with the mean flow
     frequency: float
-    amplitude: float
-    """rad s-1"""
-    reach: float
-    """Largest amplitude of omega_c that is tried, rad s-1."""
-    lead: float = 0.0
-    """omega_c less the mean flow as a period begins, divided by the amplitude."""
-    power: float = 0.0
-    """Power of the amplitude with which `lead` grows."""
-    ratio: complex = 1.0
-    """omega_c divided by omega_0, from the Fourier sums over two periods."""
-    uncertainty: float = math.inf
-    """Of the parts of `ratio`."""
-    failure: str = ""
-    """Why it isn't known how the ball rolls; empty if it does all the time."""
-    tasks: tuple[Task, ...] = ()
-    """The last two runs."""
+    amplitude: float  # rad s-1
+    reach: float  # largest amplitude of omega_c that is tried, rad s-1
+    lead: float = 0.0  # omega_c less the mean flow as a period begins, divided by the amplitude
+    power: float = 0.0  # power of the amplitude with which `lead` grows
+    ratio: complex = 1.0  # omega_c divided by omega_0, from the Fourier sums over two periods
+    uncertainty: float = math.inf  # of the parts of `ratio`
+    failure: str = ""  # why it isn't known how the ball rolls; empty if it does all the time
+    tasks: tuple[Task, ...] = ()  # the last two runs
 
     def start(self, amplitude: float) -> Array:
         """The state (8,) of a ball that follows a pulsation of an amplitude, as it begins."""
@@ -131,25 +140,6 @@ class Pulsation:
         return measurement(lab, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at)
 
 
-def _pulsations(lab: Lab, name: str, p: Parameters, end: float) -> list[Pulsation]:
-    """Small pulsations of several frequencies about a flow at which a ball of a set rolls."""
-    q = p.replace(omega_0=ROLLS_AT * end)
-    room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
-    octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach
-    return [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach * room) for n in octaves]
-
-
-def _response(lab: Lab, each: Pulsation) -> Iterator[Measurement | Missing]:
-    """Measurements of gain and phase with which a ball follows a pulsation."""
-    if each.failure:
-        yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
-        return
-    gain, lag = abs(each.ratio), -cmath.phase(each.ratio)
-    own = {"gain": Measured(gain, each.uncertainty), "phase_lag": Measured(lag, each.uncertainty / gain)}
-    for quantity, value in own.items():
-        yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
-
-
 def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
     """The measurement of the amplitude at which slip begins."""
     at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
@@ -159,7 +149,7 @@ def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing
     if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
         return Missing("pulsation", each.set, f"in {at} one contact slips before both do, too little to tell when")
     # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-    unseen = (math.pi * LASTING / lab.effort.pulsation_samples) ** 2 / 2 * place.value
+    unseen = (math.pi * Driving.lasting / lab.effort.pulsation_samples) ** 2 / 2 * place.value
     return each.row(lab, "slip_amplitude", Measured(place.value, math.hypot(place.uncertainty, unseen)), bracket.tasks)
 
 
@@ -178,15 +168,19 @@ def _settled_rounds(
     A ball that slips goes on with the rest of its last state.
     """
     states, seen = [each.start(a) for each, a in driven], list[list[Round] | str]([[]] * len(driven))
-    for n in range(ROUNDS):
-        timing = Timing(PERIODS, samples, refine * (lab.effort.pulsation_refine if n == ROUNDS - 1 else 1))
+    for n in range(Driving.rounds):
+        last = n == Driving.rounds - 1
+        timing = Timing(Driving.periods, samples, refine * (lab.effort.pulsation_refine if last else 1))
         todo = [(k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)]
         tasks = [each.task(lab, a, states[k], timing) for k, each, a, _ in todo]
         for (k, each, a, before), task, run in zip(todo, tasks, lab.each(tasks), strict=True):
             if isinstance(run, str):
                 seen[k] = f"the run {run}"
                 continue
-            omega_c = limit(run.omega_c[samples::samples])
+            # As the periods begin omega_c goes on as a geometric sequence to its limit, or diverges.
+            one, two, omega_c = run.omega_c[samples::samples][-3:].tolist()
+            first, second = two - one, omega_c - two
+            omega_c += second * second / (first - second) if abs(second) < abs(first) else 0.0
             slid = State.of(run.x[-1])._replace(omega_c=omega_c).stacked()
             states[k] = slid if slips else each.with_omega_c(omega_c).start(a)
             seen[k] = [*before[-1:], Round(task, run, omega_c)]
@@ -217,12 +211,12 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     raised, todo = list(pulsations), [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
     for _ in range(12):
         higher = [
-            replace(each, amplitude=RAISE * each.amplitude, lead=each.lead * RAISE**each.power)
+            replace(each, amplitude=Driving.raised * each.amplitude, lead=each.lead * Driving.raised**each.power)
             for each in (raised[k] for k in todo)
         ]
         still = [(k, each) for k, each in zip(todo, _as_followed(lab, higher), strict=True) if not each.failure]
         for k, each in still:
-            raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, RAISE))
+            raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, Driving.raised))
         todo = [k for k, _ in still]
     return raised
 
@@ -239,14 +233,14 @@ def _search(lab: Lab, each: Pulsation) -> Search:
         largest = each.reach / abs(each.ratio)
         first, size = Bracket(0.0, largest), largest / 2
     else:
-        first, size = Bracket(0.99 * each.amplitude, RAISE * each.amplitude), each.amplitude
+        first, size = Bracket(0.99 * each.amplitude, Driving.raised * each.amplitude), each.amplitude
     return Search(first, task, rolls_on, lab.effort.pulsation_width * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
-    """Whether after the first sixth the ball nowhere slips at both points or leaves the floor for `LASTING`."""
+    """Whether after the first sixth the ball nowhere slips at both points or leaves the floor for `lasting` samples."""
     gone = np.isin(run.case[run.time > run.time[-1] / 6], [Case.SS, *(case for case in Case if case.A is Contact.N)])
-    return bool(np.convolve(gone, np.ones(LASTING)).max() < LASTING)
+    return bool(np.convolve(gone, np.ones(Driving.lasting)).max() < Driving.lasting)
 
 
 def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterator[Measurement | Missing]:
@@ -256,15 +250,16 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
     much the mean depends on it is seen in periods that start anew from states of the last one.
     """
 
-    samples = 8 * PHASES
+    phases = Driving.phases
+    samples = 8 * phases
     rounds = _settled_rounds(lab, slipping, 1, samples, slips=True)
     anew = [
-        each.task(lab, a, x, Timing(1, samples, 1, phase=2 * math.pi * k / PHASES))
+        each.task(lab, a, x, Timing(1, samples, 1, phase=2 * math.pi * k / phases))
         for (each, a), seen in zip(slipping, rounds, strict=True)
         if not isinstance(seen, str)
-        for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // PHASES])
+        for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // phases])
     ]
-    begun = lab.groups([anew[k : k + PHASES] for k in range(0, len(anew), PHASES)])
+    begun = lab.groups([anew[k : k + phases] for k in range(0, len(anew), phases)])
     for (each, amplitude), seen in zip(slipping, rounds, strict=True):
         at = f"the mean reading at {each.frequency:g} Hz"
         if isinstance(seen, str) or isinstance(again := next(begun), str):
@@ -278,7 +273,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         spread = float(np.abs(turns * each.frequency - usual).max())
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
         # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by half of that part.
-        within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
+        within = abs(value) / round(task.steps / Driving.periods) if task.settings.timestep else 0.0
         error = Measured(value, drift + within)
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
         yield if_found(row, f"{at} is none")
@@ -287,17 +282,6 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
 def _threshold(records: Records, set: str, threshold: str) -> float | None:
     """The flow that was measured first as a threshold of a set, rad s-1; None if it was not."""
     return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
-
-
-def limit(values: Array) -> float:
-    """The limit of the last three values of a geometric sequence; the last one if they diverge."""
-    first, second = values[-2] - values[-3], values[-1] - values[-2]
-    return float(values[-1] + (second**2 / (first - second) if abs(second) < abs(first) else 0.0))
-
-
-JUMP = 1e-3
-"""Size of a jump from rolling divided by the flow, and from slipping by a third of the range of flows in which it is:
-the response to a small jump is wanted, and near the ends of that range it is far from linear."""
 
 
 def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -311,13 +295,17 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             continue
         flows[name] = begins, holds, ends or math.nan
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
-            q = p.replace(omega_0=ROLLS_AT * begins)
-            trials.append(_jump(lab, Start(name, q, "RR", State(omega_c=q.omega_0).stacked()), JUMP * q.omega_0))
-        starts.append(Start(name, p.replace(omega_0=begins + SLIPS_AT * (holds - begins)), "jump", np.zeros(8)))
+            q = p.replace(omega_0=Changes.rolls_at * begins)
+            trials.append(
+                _jump(lab, Start(name, q, "RR", State(omega_c=q.omega_0).stacked()), Changes.jump * q.omega_0)
+            )
+        starts.append(Start(name, p.replace(omega_0=begins + Changes.slips_at * (holds - begins)), "jump", np.zeros(8)))
         if ends is None:
             yield Missing("unsteady", name, "no flow was measured at which slipping at both points ends in a jump")
         else:
-            starts.append(Start(name, p.replace(omega_0=begins + RAMP_ENDS[0] * (ends - begins)), "ramp", np.zeros(8)))
+            starts.append(
+                Start(name, p.replace(omega_0=begins + Changes.ramp[0] * (ends - begins)), "ramp", np.zeros(8))
+            )
     for start, state in zip(starts, settle(lab, starts), strict=True):
         if state.failure or state.case is not Case.SS:
             why = state.failure or state.case.name
@@ -327,11 +315,23 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         # At both walls to the last digit.
         begun = replace(start, x0=State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked())
         if start.name == "jump":
-            trials.append(_jump(lab, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
+            trials.append(_jump(lab, replace(begun, name="SS"), Changes.jump / 3 * (holds - begins)))
         else:
             trials += _ramps(lab, begun, begins, ends)
     for result in carry_out(lab, "unsteady", trials):
-        yield from [result] if isinstance(result, Missing) else _rows_of_change(lab, result)
+        if isinstance(result, Missing):
+            yield result
+            continue
+        trial, coarse, fine = result.trial, result.coarse, result.fine
+        if trial.flow is None:
+            for quantity in ("jump_delay",) if trial.name == "RR" else ("jump_peak", "jump_height"):
+                row = result.row(lab, quantity, with_step_error(coarse[quantity].value, fine[quantity]))
+                yield if_found(row, f"{quantity} in {trial.name}: no peak")
+        elif math.isfinite(coarse) and math.isfinite(fine):
+            yield result.row(lab, "ramp_end", with_step_error(coarse, Measured(fine, 0.0)))
+        else:
+            why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
+            yield Missing("unsteady", trial.set, why)
 
 
 def _jump(lab: Lab, start: Start, size: float) -> Trial:
@@ -346,26 +346,12 @@ def _jump(lab: Lab, start: Start, size: float) -> Trial:
 def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial]:
     """Trials of ramps of the flow at several rates, rad s-2, from settled SS, which is between two flows."""
     p, span = start.p, ends - begins
-    last = begins + RAMP_ENDS[1] * span
+    last = begins + Changes.ramp[1] * span
     for rate in lab.effort.unsteady_rates:
         rise = rate * p.c * span
         t_end, at = (last - p.omega_0) / rise, {"rate": rise, **state_of(start.x0[:6])}
         flow, refine = Flow.ramp(p.omega_0, last, t_end), lab.effort.unsteady_ramps
         yield Trial(start.set, p, "ramp", start.x0, t_end, refine, 16000, caught_up, flow, (), at)
-
-
-def _rows_of_change(lab: Lab, result: TrialResult) -> Iterator[Measurement | Missing]:
-    """Measurements of the delay, peak or end that a jump or a ramp of the flow shows."""
-    trial, coarse, fine = result.trial, result.coarse, result.fine
-    if trial.flow is None:
-        for quantity in ("jump_delay",) if trial.name == "RR" else ("jump_peak", "jump_height"):
-            row = result.row(lab, quantity, with_step_error(coarse[quantity].value, fine[quantity]))
-            yield if_found(row, f"{quantity} in {trial.name}: no peak")
-    elif math.isfinite(coarse) and math.isfinite(fine):
-        yield result.row(lab, "ramp_end", with_step_error(coarse, Measured(fine, 0.0)))
-    else:
-        why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
-        yield Missing("unsteady", trial.set, why)
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:

@@ -33,13 +33,6 @@ FLUIDS: Mapping[str, Mapping[str, float]] = {
 """Balls that fall in a fluid, SI."""
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """How far the laws are off, the ratio of friction to normal force, and the speed at which balls sink in a fluid."""
-    yield from _laws(lab, sets)
-    balls = {name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2) for name, fluid in FLUIDS.items()}
-    yield from _sinking(lab, balls)
-
-
 class ContactLaw(NamedTuple):
     """A law of a contact, by the quantity that shows how far it is off."""
 
@@ -48,8 +41,11 @@ class ContactLaw(NamedTuple):
     contact: str
 
 
-def _laws(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Measurement | Missing]:
-    """How far each law of contact is off at its worst in motions from rest, down the wall, and along the floor."""
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """How far each law of contact is off at its worst in motions from rest, down the wall, and along the floor.
+
+    And the speed at which balls sink in the middle of still fluid, off floor and wall.
+    """
     tasks = []
     for p in sets.values():
         t_end, fast = RUN_LENGTH * coarse_step(p), 3.0 / time_unit(p)
@@ -72,16 +68,12 @@ def _laws(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Measurement | Mi
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == law[:2]]
             sure, at = Measured(value, math.hypot(np.nanmax(changes), ROUNDING)), law._asdict()
             yield measurement(lab, PROTOCOL, name, p, at.pop("quantity"), sure, own[len(own) // 2 :], **at)
-
-
-def _sinking(lab: Lab, balls: Mapping[str, Parameters]) -> Iterator[Measurement | Missing]:
-    """The speed at which each ball sinks in the middle of still fluid, off floor and wall."""
-    falls = []
+    balls = {name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2) for name, fluid in FLUIDS.items()}
+    falls, refined = [], lab.effort.laws_refined
     for p in balls.values():
         step, rest = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
-        starts = rest, rest._replace(v_y=-math.sqrt(p.g * p.R))
-        refined = lab.effort.laws_refined
-        falls.append([lab.task(p, x, 64 * step, step / parts, samples=64) for parts in refined for x in starts])
+        begun = rest, rest._replace(v_y=-math.sqrt(p.g * p.R))
+        falls.append([lab.task(p, x, 64 * step, step / parts, samples=64) for parts in refined for x in begun])
     for (name, p), own, runs in zip(balls.items(), falls, lab.groups(falls), strict=True):
         if isinstance(runs, str):
             yield Missing(PROTOCOL, name, f"the run {runs}")

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -45,26 +45,44 @@ from model.cases import TRAITS
 from model.drag import STOKES
 from model.kinematics import VARIABLES, slip_velocities, state_units
 
-SEED = 53
-CENTRES = (16, 40, 64)
-"""Centres of the windows, in steps of the coarser run."""
-BEFORE_AND_AFTER = 4
-"""Steps before and after a window in which the case doesn't change, either, so that friction has built up."""
-TURN = 0.5
-"""Largest change of a slip in a window, and of that which friction alone would make, divided by the slip: where slip is
-about to vanish, or very small, friction turns too fast."""
+
+@dataclass(frozen=True)
+class Windows:
+    """In which equations of motion are looked at; in steps of the coarser run."""
+
+    seed: int = 53  # of the random states
+    centres: tuple[int, ...] = (16, 40, 64)
+    around: int = 4  # steps in which the case doesn't change, either: friction has built up
+    # Largest change of a slip, and of that which friction alone would make, divided by the slip: where slip is about to
+    # vanish, or very small, friction turns too fast.
+    turn: float = 0.5
+
+
 MOVING = {
     case: [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
     for case in Case
 }
 """The variables whose rates of change are measured."""
-STATE_PART, RATES_PART, FORCES_PART = slice(0, 8), slice(8, 16), slice(16, 22)
-"""Parts of what is read at the centre of a window (22,): state, rates of change in SI, and forces at A and B in N."""
 
 
 def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
-    trials = [trial for name, p in sets.items() for trial in _moving(lab, name, p)]
+    refine, trials = (REFINED * lab.effort.halves[0], REFINED * lab.effort.halves[1]), []
+    for name, p in sets.items():
+        rng = np.random.default_rng([Windows.seed, *name.encode()])
+        for case, k in product(Case, range(lab.effort.field_starts)):
+            x, unit = random_state(case, p, rng), time_unit(p)
+            # Friction at two rolling contacts can balance only a slight lag.
+            rolls = case is Case.RR
+            omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / unit
+            q = p.replace(omega_0=omega_0)
+            t_end = (Windows.centres[-1] + HALF_WINDOW + Windows.around) * coarse_step(q) / REFINED
+            trials.append(Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0))
+            if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2:  # Reynolds numbers as in water
+                _, v_y, omega_c, *_, h, v_h = x
+                speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
+                fast = q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * unit))
+                trials.append(replace(trials[-1], p=fast))
     results = []
     for result in carry_out(lab, "field", trials):
         if isinstance(result, Missing):
@@ -72,14 +90,14 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         else:
             results.append(result)
     kept = Counter[tuple[str, float, Case]]()
-    for centre, result in product(CENTRES, results):
+    for centre, result in product(Windows.centres, results):
         set, p, case = result.trial.set, result.trial.p, Case(int(result.coarse.case[centre * lab.effort.halves[0]]))
-        if kept[set, p.nu_f, case] < lab.effort.field_kept:
-            window = _window(lab, case, result.coarse, result.fine, centre)
-            if window is not None:
-                kept[set, p.nu_f, case] += 1
-                for what, value in _values(case, window, p).items():
-                    yield result.row(lab, what, value, case=case.name, **state_of(window[0, STATE_PART]))
+        enough = kept[set, p.nu_f, case] >= lab.effort.field_kept
+        if not enough and (found := _values(lab, case, result, centre)):
+            kept[set, p.nu_f, case] += 1
+            x, values = found
+            for what, value in values.items():
+                yield result.row(lab, what, value, case=case.name, **state_of(x))
     for name, case in product(sets, Case):
         if lacking := lab.effort.field_kept - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
@@ -87,33 +105,16 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             yield Missing("field", name, why, lacking * rows)
 
 
-def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
-    """Trials from random states in every case; with drag other than Stokes' some at Reynolds numbers as in water."""
-    rng = np.random.default_rng([SEED, *name.encode()])
-    for case, k in product(Case, range(lab.effort.field_starts)):
-        x = random_state(case, p, rng)
-        # Friction at two rolling contacts can balance only a slight lag.
-        rolls = case is Case.RR
-        omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
-        q = p.replace(omega_0=omega_0)
-        t_end = (CENTRES[-1] + HALF_WINDOW + BEFORE_AND_AFTER) * coarse_step(q) / REFINED
-        refine = REFINED * lab.effort.halves[0], REFINED * lab.effort.halves[1]
-        trial = Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0)
-        yield trial
-        if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2:
-            _, v_y, omega_c, *_, h, v_h = x
-            speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
-            yield replace(trial, p=q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * time_unit(p))))
+def _values(lab: Lab, case: Case, result: TrialResult, centre: int) -> tuple[Array, dict[str, Measured]] | None:
+    """State (8,), rates and forces at the centre of a window; None if its case changes, or it `turns_or_hovers`.
 
-
-def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
-    """States, rates and forces at the centre of a window (3, 22); None if its case changes, or it `turns_or_hovers`.
-
-    Three rows: extrapolated to a vanishing step, by the finer run, and by that with polynomials of the lower degree.
+    They are extrapolated to a vanishing step, and uncertain by what this and the degree of the polynomials change. The
+    largest relative change of the rates, or of the forces, is used for all of them, since that of one may vanish by
+    chance.
     """
-    read = []
-    for run, times in zip((coarse, fine), lab.effort.halves, strict=True):
-        near, half, middle = ((HALF_WINDOW + BEFORE_AND_AFTER) * times, HALF_WINDOW * times, centre * times)
+    p, read = result.trial.p, []
+    for run, times in zip((result.coarse, result.fine), lab.effort.halves, strict=True):
+        near, half, middle = ((HALF_WINDOW + Windows.around) * times, HALF_WINDOW * times, centre * times)
         window = slice(middle - half, middle + half + 1)
         if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(case, run, window):
             return None
@@ -123,9 +124,18 @@ def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: 
         forces = polynomials(acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at)[0]
         read.append(np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1))
     (one, _), (two, lower) = read
-    best = two + (two - one) * EXTRAPOLATION
-    best[STATE_PART] = constrained(case, best[STATE_PART], fine.header.parameters)
-    return np.stack([best, two, lower])
+    rows = np.stack([two + (two - one) * EXTRAPOLATION, two, lower])  # (3, 22): state, rates, forces at A and B
+    speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
+    scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
+    moving, held = MOVING[case], [_forces(case, row) for row in rows[:, 16:]]
+    rate_change, force_change = (
+        max((abs(a - b) * DOUBT / EXTRAPOLATION + abs(b - c) for a, b, c in np.transpose(each).tolist()), default=0.0)
+        for each in ((rows[:, 8:16] / scales)[:, moving], [[w / weight for w in each.values()] for each in held])
+    )
+    rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
+    values = {f"rate_{VARIABLES[k]}": Measured(rows[0, 8 + k], rate_change * scales[k]) for k in moving}
+    values |= {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in held[0].items()}
+    return constrained(case, rows[0, :8], p), values
 
 
 def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
@@ -135,31 +145,9 @@ def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
     for v, contact, (friction, load) in zip(slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True):
         change = max(float(np.linalg.norm(v[-1] - v[0])), friction * load.max() * (1 + p.j) / (p.j * p.m) * time)
         hovers = load.min() < PRESSES * p.m * p.g
-        if contact is Contact.S and (hovers or change > TURN * np.linalg.norm(v, axis=1).min()):
+        if contact is Contact.S and (hovers or change > Windows.turn * np.linalg.norm(v, axis=1).min()):
             return True
     return False
-
-
-def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
-    """Quantities with uncertainties, from what the extrapolation and the degree of the polynomials change.
-
-    The largest relative change of the rates, or of the forces, is used for all of them, since that of one may vanish by
-    chance.
-    """
-    moving = MOVING[case]
-    speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
-    scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
-    forces = [_forces(case, row) for row in window[:, FORCES_PART]]
-    rate_change, force_change = (
-        max((abs(a - b) * DOUBT / EXTRAPOLATION + abs(b - c) for a, b, c in np.transpose(rows).tolist()), default=0.0)
-        for rows in (
-            (window[:, RATES_PART] / scales)[:, moving],
-            [[w / weight for w in each.values()] for each in forces],
-        )
-    )
-    rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
-    rates = {f"rate_{VARIABLES[k]}": Measured(window[0, RATES_PART][k], rate_change * scales[k]) for k in moving}
-    return rates | {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in forces[0].items()}
 
 
 def _forces(case: Case, forces: Array) -> dict[str, float]:
@@ -185,11 +173,16 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
 )
 """omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-LENGTH = 40
-"""Samples in a piece."""
-APART = 10
-"""Samples between the ends of a piece and any change of case: three until a force has built up, three until the case
-is taken to have changed, and a few by which a change comes too early or late."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Of motions, in samples."""
+
+    length: int = 40
+    # Between the ends of a piece and any change of case: three until a force has built up, three until the case is
+    # taken to have changed, and a few by which a change comes too early or late.
+    apart: int = 10
 
 
 def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -211,7 +204,7 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if lacking := count - len(chosen):
             why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips by a trace"
             yield Missing("motions", name, why, lacking)
-        for first, last in ((first, first + LENGTH) for first in chosen):
+        for first, last in ((first, first + Pieces.length) for first in chosen):
             case = Case(int(run.case[last]))
             seen[name].add(case)
             at = state_of(constrained(Case(int(run.case[first])), run.x[first], p))
@@ -240,12 +233,12 @@ def pieces(run: Trajectory, count: int) -> list[int]:
         plain &= (contact != "N") | (gap > 1e-4 * p.R)
         plain &= (contact != "S") | (speed > 2 * p.g * coarse_step(p) / REFINED)
     changes = np.flatnonzero(np.diff(run.case)) + 1
-    firsts = np.arange(APART, len(run.time) - LENGTH - APART)
-    for end in (0, LENGTH):
+    firsts = np.arange(Pieces.apart, len(run.time) - Pieces.length - Pieces.apart)
+    for end in (0, Pieces.length):
         near = np.min(np.abs((firsts + end)[:, None] - changes), axis=1, initial=len(run.time))
-        firsts = firsts[(near >= APART) & plain[firsts + end]]
+        firsts = firsts[(near >= Pieces.apart) & plain[firsts + end]]
     # As many pieces with a change of case in them as without, as far as there are.
-    inside = np.any((changes > firsts[:, None]) & (changes < firsts[:, None] + LENGTH), axis=1)
+    inside = np.any((changes > firsts[:, None]) & (changes < firsts[:, None] + Pieces.length), axis=1)
     chosen: set[int] = set()
     for some in (firsts[inside], firsts[~inside]):
         if len(some):
@@ -279,34 +272,28 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts are 4 to 5 times that
     high, and of a plastic landing nothing is left but the fall within a step.
     """
-    trials = [_landing(name, p, how) for name, p in sets.items() for how in LANDINGS]
+    trials = []
+    for name, p in sets.items():
+        for how, state in LANDINGS.items():
+            start = _start(name, p, 0.8, state, how)
+            step = coarse_step(start.p) / REFINED
+            conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
+            t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
+            trials.append(Trial(**vars(start), t_end=t_end, refine=refine, conditions=conditions, rows=len(LANDED)))
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
     for landing in carry_out(lab, "impacts", trials):
         if isinstance(landing, Missing):
             yield landing
             continue
         tasks[landing.trial.set] += landing.tasks
-        rebounds[landing.trial.set] += sum(_rebounds(run, landing.trial) for run in (landing.coarse, landing.fine))
+        for run in (landing.coarse, landing.fine):
+            gap = run.y if landing.trial.name.startswith("floor") else run.h
+            low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
+            rebounds[landing.trial.set] += bool(gap[low:].max() > gap[low] + 1e-2 * landing.trial.p.R)
         yield from _landed(lab, landing)
     for name, count in rebounds.items():
         p = next(trial.p for trial in trials if trial.set == name)
         yield measurement(lab, "impacts", name, p, "rebounds", count, tasks[name])
-
-
-def _landing(name: str, p: Parameters, how: str) -> Trial:
-    """The trial of a motion in which a ball lands."""
-    start = _start(name, p, 0.8, LANDINGS[how], how)
-    step = coarse_step(start.p) / REFINED
-    conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
-    t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
-    return Trial(**vars(start), t_end=t_end, refine=refine, conditions=conditions, rows=len(LANDED))
-
-
-def _rebounds(run: Trajectory, trial: Trial) -> bool:
-    """Whether the contact at which a ball lands opens again."""
-    gap = run.y if trial.name.startswith("floor") else run.h
-    low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
-    return bool(gap[low:].max() > gap[low] + 1e-2 * trial.p.R)
 
 
 def _landed(lab: Lab, landing: TrialResult) -> Iterator[Measurement | Missing]:

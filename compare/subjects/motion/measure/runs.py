@@ -45,10 +45,6 @@ STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
     "sinks along the wall": (1.0, 1.0, (5.0, -0.3, 0.7, 0.5, 0.6, 0.8, 0.0, 0.0)),
 }
 """omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-RAMPS = {"rolls while the flow rises": 0.2, "rolls while the flow falls": -0.2}
-"""Rates in units of g/R of flows that change in the second half of a run."""
-BLUNTER = 1.1
-"""The other drag coefficient: of a disk instead of a sphere."""
 
 
 def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
@@ -103,8 +99,9 @@ def _trials(name: str, p: Parameters) -> Iterator[Trial]:
         start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)
         yield trial(how, q, start, lasts, rows=len(VARIABLES))
         if how == "thrown" and p.drag == QUADRATIC:
-            yield trial("thrown, blunter", q.replace(C_D=BLUNTER), start, lasts, rows=len(VARIABLES))
-    for how, rate in RAMPS.items():
+            blunter = q.replace(C_D=1.1)  # that of a disk
+            yield trial("thrown, blunter", blunter, start, lasts, rows=len(VARIABLES))
+    for how, rate in ("rolls while the flow rises", 0.2), ("rolls while the flow falls", -0.2):
         q = p.replace(omega_0=0.5 / unit)
         yield trial(how, q, State(omega_c=q.omega_0), 2.0, len(VARIABLES), rate / unit**2)
     for flow in (0.5, 0.7, 0.9, 1.1, 1.3):

@@ -18,22 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compare.kit import trials
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
 from compare.kit.statistics import Measured, slope_error
 from compare.kit.tasks import Task
-from compare.kit.trials import (
-    DOUBT,
-    EXTRAPOLATION,
-    HALF_WINDOW,
-    REFINED,
-    WINDOW_DEGREES,
-    Start,
-    lag_error,
-    polynomials,
-    random_state,
-    slip_unit,
-)
+from compare.kit.trials import Start
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
@@ -49,17 +39,26 @@ PUSHES = {
 """Arrows of Fig. 6 along which a contact begins to slip, and directions out of random states at the quick level."""
 SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 """Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
-STEPS, SKIPPED = 20, 6
-"""Steps of a record, and those at its start in which contact forces build up."""
-LARGE, SMALL, SLIP_BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
-"""Slips at the start in units of `start_unit`: so large that they neither end nor turn much in a record; small where
-one contact has to hold; and three beside a slip that is there already, where the direction depends on the size."""
-SETTLED = 6
-"""Last steps of a record in which the case must be the same for a slip to have passed into it."""
-DEGREES = (4, 3)
-"""Degrees of the polynomials; the lower one shows what the degree changes."""
-AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_error(
-    np.arange(-HALF_WINDOW, HALF_WINDOW + 1.0), WINDOW_DEGREES[0]
+
+
+@dataclass(frozen=True)
+class Record:
+    """How a slip is recorded."""
+
+    steps: int = 20
+    skipped: int = 6  # at its start, in which contact forces build up
+    settled: int = 6  # at its end, in which the case must be the same for a slip to have passed into it
+    degrees: tuple[int, int] = (4, 3)  # of the polynomials; the lower one shows what the degree changes
+    # Slips at the start in units of `start_unit`, each half of the one before: so large that they neither end nor turn
+    # much in a record; small where one contact has to hold; and three beside a slip that is there already, where the
+    # direction depends on the size.
+    large: tuple[float, ...] = (3.0, 1.5)
+    small: tuple[float, ...] = (0.3, 0.15)
+    beside: tuple[float, ...] = (1.2, 0.6, 0.3)
+
+
+AT_START = slope_error(np.arange(Record.skipped, Record.steps + 1.0), Record.degrees[0]) / slope_error(
+    np.arange(-trials.HALF_WINDOW, trials.HALF_WINDOW + 1.0), trials.WINDOW_DEGREES[0]
 )
 """Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a window."""
 FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
@@ -111,21 +110,20 @@ class Push:
     start: Start
     inner: Case
     outer: Case
-    n: Array
-    """Direction, a unit vector (3,) of slip_x, slip_y, slip_z."""
+    n: Array  # direction, a unit vector (3,) of slip_x, slip_y, slip_z
 
     @property
     def sizes(self) -> tuple[float, ...]:
-        """Sizes of slip, in units of `start_unit`, each half of the one before."""
+        """Sizes of slip, in units of `start_unit`."""
         if self.inner in (Case.RS, Case.SR):
-            return SLIP_BESIDE
-        return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
+            return Record.beside
+        return Record.small if self.outer in (Case.RS, Case.SR) else Record.large
 
     def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
         """Tasks with one size of slip, in units of `start_unit`, with both time steps, divided by `refine`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        steps, step = STEPS * refine, coarse_step(p) / (REFINED * refine)
+        steps, step = Record.steps * refine, coarse_step(p) / (trials.REFINED * refine)
         return [lab.task(p, x, steps * step, step / n, samples=steps * n) for n in lab.effort.halves]
 
     def tasks(self, lab: Lab) -> list[Task]:
@@ -134,12 +132,12 @@ class Push:
 
     def rates(self, run: Trajectory) -> Array:
         """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in another case."""
-        record = slice(SKIPPED * (len(run.time) // STEPS), None)
+        record = slice(Record.skipped * (len(run.time) // Record.steps), None)
         # The wall carries nothing beside a ball at rest: that contact is not detected.
         alike = [self.outer, Case.RN] if self.start.name == "rest" else [self.outer]
         if not np.isin(run.case[record], alike).all():
             return np.full(2, np.nan)
-        return polynomials(run.time[record], run.x[record, SLIP_XYZ] @ self.n, DEGREES)[1]
+        return trials.polynomials(run.time[record], run.x[record, SLIP_XYZ] @ self.n, Record.degrees)[1]
 
     def row(
         self, lab: Lab, protocol: str, quantity: str, value: Measured | float, tasks: Sequence[Task], **at: float
@@ -153,9 +151,9 @@ class Push:
         self, lab: Lab, protocol: str, size: float, tasks: Sequence[Task], runs: Sequence[Trajectory]
     ) -> Measurement | None:
         """The case that follows where a slip doesn't last; None if it lasts, or runs with both steps disagree."""
-        coarse, fine = runs
+        fine = runs[1]
         ended = int(fine.case[-1])
-        if ended == self.outer or np.any(coarse.case[-SETTLED:] != ended) or np.any(fine.case[-SETTLED:] != ended):
+        if ended == self.outer or any(np.any(run.case[-Record.settled :] != ended) for run in runs):
             return None
         at = {"slip": size * start_unit(self.start.p, self.start.x0), "time": float(fine.time[-1])}
         return self.row(lab, protocol, "case", ended, tasks, **at)
@@ -170,13 +168,13 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     coarse, fine = (np.array([push.rates(run) for run in some]) for some in (runs[::2], runs[1::2]))
     if np.isnan(coarse).any() or np.isnan(fine).any():
         return None
-    best = fine + (fine - coarse) * EXTRAPOLATION
+    best = fine + (fine - coarse) * trials.EXTRAPOLATION
     value, lower = limit_of_no_size(best)
-    step = limit_of_no_size(fine - coarse)[0] * DOUBT
+    step = limit_of_no_size(fine - coarse)[0] * trials.DOUBT
     size = (value - limit_of_no_size(best[-2:])[0]) / 3
     p = push.start.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
-    least = lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
+    least = trials.lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * trials.slip_unit(p)
     return Measured(float(value), math.hypot(step, value - lower, size, least))
 
 
@@ -196,13 +194,13 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
     for side in (1, -1):
         yield [Push(still, Case.RR, Case.RS, np.array([0.0, side, 0.0]))]
         # It sinks half as fast as the fluid pulls it along the wall.
-        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-0.5 * dragged_speed(p))
+        sinking = State.of(trials.random_state(Case.NR, p, rng))._replace(v_y=-0.5 * dragged_speed(p))
         dragged = p.replace(omega_0=sinking.omega_c + dragged_speed(p) / p.R)
         start = Start(name, dragged, "dragged", sinking.stacked())
         yield [Push(start, Case.NR, Case.NS, np.array([0.0, 0.8 * side, 0.6]))]
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):
-            x = State.of(random_state(inner, p, rng))
+            x = State.of(trials.random_state(inner, p, rng))
             # The orbit is one at which both contacts press, whichever way friction acts.
             if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
                 x = x._replace(omega_c=math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
@@ -237,7 +235,7 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     for name, p in rough.items():
         rng = np.random.default_rng([58, *name.encode()])
         for _ in range(lab.effort.steepest_states):
-            x = random_state(Case.NR, p, rng)
+            x = trials.random_state(Case.NR, p, rng)
             # The fluid pulls along the orbit, by half the weight to three times it: that turns the direction.
             pull = rng.choice([-1, 1]) * rng.uniform(0.5, 3.0)
             start = Start(name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x)

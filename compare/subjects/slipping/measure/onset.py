@@ -29,29 +29,61 @@ from model.arrays import Array
 from model.drag import STOKES
 from model.kinematics import state_units
 
-AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)
-"""The second two flows, divided by the zero that the first two show; and where the law of drag bends the line."""
-MEDIUM = (1.0, 0.5)
-"""Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `Push.sizes`."""
-BEYOND, FOLLOWED = 2.1, 100.0
-"""Largest zero that is recorded, divided by the largest value at which slip stayed in its case; and that is followed,
-divided by the largest of the first flows."""
-HANGING = (1.05, 1.6, 1.3)
-"""Flows at which a ball hangs on the wall, divided by the measured one at which it ceases to."""
+
+@dataclass(frozen=True)
+class Bounds:
+    """How the bounds of growing slip are looked for."""
+
+    around: tuple[float, float] = (0.7, 1.3)  # second two flows, divided by the zero that the first two show
+    around_bent: tuple[float, float] = (0.8, 1.1)  # where the law of drag bends the line
+    slips: tuple[float, float] = (1.0, 0.5)  # as `Push.sizes`, of a ball that hangs on a smooth wall, and so goes fast
+    beyond: float = 2.1  # largest zero recorded, divided by the largest value at which slip stayed in its case
+    followed: float = 100.0  # largest zero followed, divided by the largest of the first flows
+    hanging: tuple[float, ...] = (1.05, 1.6, 1.3)  # flows, divided by the one at which a ball ceases to hang
 
 
 def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Zero and slope of gamma along every line: from two flows, then from two more around the zero that these show."""
     yield from (Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta))
     sets = {name: p for name, p in sets.items() if p.mu and p.eta}
-    hanging = _lines_on_wall(lab, sets, records)
-    for name in (name for name in sets if name not in hanging):
+    lines = [line for name, p in sets.items() for line in _lines_from_rolling(name, p)]
+    ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
+    starts = [
+        [named_start(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in Bounds.hanging]
+        for name, end in ends.items()
+    ]
+    hangs = set[str]()  # sets whose wall alone carries the ball: there it is pushed out of settled states
+    for name, states in zip(ends, settle_groups(lab, starts), strict=True):
+        if not any(state.failure or state.case is not Case.NR for state in states):
+            hangs.add(name)
+            rides = [(state.start.p, np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0])) for state in states]
+            begun = [Start(name, p, "stationary", x) for p, x in rides]
+            lines.append(Crossing(tuple(Push(start, Case.NR, Case.NS, np.array([0, 0, 1])) for start in begun)))
+    for name in (name for name in sets if name not in hangs):
         yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
-    lines = [*(line for name, p in sets.items() for line in _lines_from_rolling(name, p)), *hanging.values()]
     first = _growths(lab, [line.pushes[:2] for line in lines])
     around = _growths(lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)])
     for line, seen, more in zip(lines, first, around, strict=True):
-        yield from _zero_and_slope(lab, line, seen, more)
+        push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*seen.tasks, *more.tasks]
+        name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
+        if np.isnan(seen.points[1]).any():
+            yield from seen.strays or [Missing("bounds", name, f"slips {slips} pass through several cases", 2)]
+            continue
+        points = np.concatenate([seen.points, more.points], axis=1)
+        flows, gamma, noise = points[:, ~np.isnan(points[1])]
+        # What the step changes may be little by chance at one of the flows.
+        q, noise = flows**line.power, np.maximum(noise, seen.points[2].max())
+        if line.is_curved:
+            zero, slope = zero_and_slope(q, gamma, noise)
+        else:  # the points share causes of error: more of them don't reduce the uncertainty
+            zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
+        growth = f"growth of slip {slips}, {push.start.name},"
+        if abs(zero.value) <= Bounds.beyond * np.abs(q).max():
+            yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
+        else:
+            why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
+            yield Missing("bounds", name, why)
+        yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +111,11 @@ class Crossing:
         q = flows**self.power
         slope = np.diff(gammas)[0] / np.diff(q)[0]
         zero = float(q[0] - gammas[0] / slope) if slope else math.inf
-        if not 0 < zero < (FOLLOWED * max(flows)) ** self.power:  # or nan
+        if not 0 < zero < (Bounds.followed * max(flows)) ** self.power:  # or nan
             return ()
         least, first = flows[0] if self.power == 1 else 0.0, self.pushes[0]
         pushes = []
-        for factor in AROUND_BENT if self.is_curved else AROUND:
+        for factor in Bounds.around_bent if self.is_curved else Bounds.around:
             omega_0 = float(least + (zero ** (1 / self.power) - least) * factor)
             orbit = State.of(first.start.x0).omega_c if self.power == 1 else omega_0
             p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
@@ -95,27 +127,9 @@ class Crossing:
 class Growths:
     """gamma at some flows of a line, for a vanishing step and size of slip."""
 
-    points: Array
-    """Flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2; gamma is nan where a slip didn't last."""
+    points: Array  # flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2; gamma is nan where a slip didn't last
     tasks: list[Task]
-    strays: list[Measurement | Missing]
-    """What became of slips that didn't last, and of runs that broke down."""
-
-
-def _lines_on_wall(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[str, Crossing]:
-    """For each set pushes out of rolling on the wall alone, from settled states; none where one is no such state."""
-    ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
-    starts = [
-        [named_start(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in HANGING]
-        for name, end in ends.items()
-    ]
-    lines = {}
-    for name, states in zip(ends, settle_groups(lab, starts), strict=True):
-        if not any(state.failure or state.case is not Case.NR for state in states):
-            rides = [(state.start.p, np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0])) for state in states]
-            begun = (Start(name, p, "stationary", x) for p, x in rides)
-            lines[name] = Crossing(tuple(Push(start, Case.NR, Case.NS, np.array([0, 0, 1])) for start in begun))
-    return lines
+    strays: list[Measurement | Missing]  # what became of slips that didn't last, and of runs that broke down
 
 
 def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
@@ -125,7 +139,7 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
     """
     tasks, refine = [], lab.effort.bounds_refined
     for push in (push for pushes in rows for push in pushes):
-        large, small = push.sizes if push.inner is not Case.NR else MEDIUM
+        large, small = push.sizes if push.inner is not Case.NR else Bounds.slips
         tasks.append([*push.pair(lab, large, refine), push.pair(lab, small, refine)[1]])
     results, found = zip(tasks, lab.groups(tasks), strict=True), []
     for pushes in rows:
@@ -137,7 +151,7 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
                 strays.append(Missing("bounds", push.start.set, f"from {push.inner.name}: the run {runs}", 2))
                 points.append((p.omega_0, math.nan, math.nan))
                 continue
-            size = push.sizes[0] if push.inner is not Case.NR else MEDIUM[0]
+            size = push.sizes[0] if push.inner is not Case.NR else Bounds.slips[0]
             if stray := push.following_case(lab, "bounds", size, own[:2], runs[:2]):
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
@@ -146,30 +160,6 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
             points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
         found.append(Growths(np.reshape(points, (-1, 3)).T, used, strays))
     return found
-
-
-def _zero_and_slope(lab: Lab, line: Crossing, seen: Growths, more: Growths) -> Iterator[Measurement | Missing]:
-    """Measurements of zero and slope of gamma on a line, from its first flows and from those around the zero."""
-    push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*seen.tasks, *more.tasks]
-    name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
-    if np.isnan(seen.points[1]).any():
-        yield from seen.strays or [Missing("bounds", name, f"slips {slips} pass through several cases", 2)]
-        return
-    points = np.concatenate([seen.points, more.points], axis=1)
-    flows, gamma, noise = points[:, ~np.isnan(points[1])]
-    # What the step changes may be little by chance at one of the flows.
-    q, noise = flows**line.power, np.maximum(noise, seen.points[2].max())
-    if line.is_curved:
-        zero, slope = zero_and_slope(q, gamma, noise)
-    else:  # the points share causes of error: more of them don't reduce the uncertainty
-        zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
-    growth = f"growth of slip {slips}, {push.start.name},"
-    if abs(zero.value) <= BEYOND * np.abs(q).max():
-        yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
-    else:
-        why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
-        yield Missing("bounds", name, why)
-    yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
 
 
 def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
@@ -203,22 +193,25 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.SS, Case.NS): (0.3, 0.1, 0.8),
 }
 """Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
-LEADS = 1.5
-"""How much faster than the ball the fluid goes round where a contact slips."""
-ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
-"""The first orbits, omega_c sqrt(R/g)."""
-LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
-"""Relative distances of the later orbits below the one at which the first ones show the ball to leave."""
-STEPS, SKIPPED, FEWEST = 16, 4, 5
-"""Steps of a run, those at its start in which contact forces build up, and the fewest that must be left."""
-DEGREES = (3, 2)
-"""Degrees of the polynomials; the lower one shows what the degree changes."""
+
+
+@dataclass(frozen=True)
+class Lifts:
+    """How it is looked for where a ball leaves the floor."""
+
+    leads: float = 1.5  # how much faster than the ball the fluid goes round where a contact slips
+    orbits: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)  # the first ones, omega_c sqrt(R/g)
+    later: tuple[float, ...] = (0.05, 0.08, 0.12, 0.17)  # relative distances of others below that at which it leaves
+    steps: int = 16  # of a run
+    skipped: int = 4  # at its start, in which contact forces build up
+    fewest: int = 5  # that must be left
+    degrees: tuple[int, int] = (3, 2)  # of the polynomials; the lower one shows what the degree changes
 
 
 def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
     arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
-    orbits = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
+    orbits = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in Lifts.orbits] for arrow in arrows]
     first = list(lab.groups(orbits))
     kept = [[] if isinstance(got, str) else arrow.staying(got) for arrow, got in zip(arrows, first, strict=True)]
     nearer = [arrow.tasks_near_onset(runs) for arrow, runs in zip(arrows, kept, strict=True)]
@@ -254,17 +247,17 @@ class Arrow:
         """Parameters with the flow, and the state (8,), of a ball that goes round with omega_c."""
         unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
-        leads = 1.0 if self.inner is Case.RR else LEADS  # a ball that rolls at both points can hardly lag
+        leads = 1.0 if self.inner is Case.RR else Lifts.leads  # a ball that rolls at both points can hardly lag
         return self.p.replace(omega_0=leads * omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
 
     def task(self, omega_c: float, times: int = 1) -> Task:
         """A short run from the orbit at omega_c, with steps half as long as those of `REFINED`, divided by `times`."""
         step = coarse_step(self.p) / (2 * REFINED * times)
-        return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
+        return self.lab.task(*self.start(omega_c), Lifts.steps * step, step, samples=Lifts.steps)
 
     def staying(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
         """Of runs those of the first row of orbits that stay in the two cases of the arrow, without a third."""
-        strays = [not np.isin(run.case[SKIPPED:], [self.inner, self.outer]).all() for run in runs]
+        strays = [not np.isin(run.case[Lifts.skipped :], [self.inner, self.outer]).all() for run in runs]
         first = [*strays, False].index(False)
         return runs[first : [*strays, True].index(True, first)]
 
@@ -275,7 +268,7 @@ class Arrow:
             return []
         (a, high), (b, low) = pressed[-2:]
         where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
-        orbits = [where * (1 - part) for part in LATER_ORBITS if where]
+        orbits = [where * (1 - part) for part in Lifts.later if where]
         return [self.task(orbit, times) for orbit in orbits for times in self.lab.effort.halves]
 
     def row(self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]) -> Measurement:
@@ -287,14 +280,14 @@ class Arrow:
 
 def _force(run: Trajectory) -> Measured | None:
     """Force of the floor at the beginning divided by the weight; None where it doesn't press for long enough."""
-    p, force = run.header.parameters, run.force_A[SKIPPED:, 1]
+    p, force = run.header.parameters, run.force_A[Lifts.skipped :, 1]
     pressed = int(np.argmax(np.append(force <= 0, True)))
-    if pressed < FEWEST:
+    if pressed < Lifts.fewest:
         return None
-    time = run.time[SKIPPED:][:pressed]
+    time = run.time[Lifts.skipped :][:pressed]
     # The force of a sample acts from then on for a step: it belongs to the middle of it.
     begin = -(time[1] - time[0]) / 2
-    value, lower = (polynomials(time, force[:pressed], DEGREES, begin)[0] / (p.m * p.g)).tolist()
+    value, lower = (polynomials(time, force[:pressed], Lifts.degrees, begin)[0] / (p.m * p.g)).tolist()
     return Measured(value, abs(value - lower))
 
 

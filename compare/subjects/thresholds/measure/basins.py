@@ -11,8 +11,8 @@ for a while near the unstable state. The mean of their states while they are tog
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice, zip_longest
 
@@ -31,52 +31,54 @@ from model.arrays import Array
 from model.drag import QUADRATIC
 from model.kinematics import SLIP_XYZ
 
-DRAG = 1.25
-"""Drag c, s-1: states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry."""
 FIGURES = ("fig-7", "fig-8")
 """mu as it is, and mu = eta."""
 WAYS = ("rest", "half as fast", "with the fluid", "on the wall")
 """How balls start at each point of a plane."""
 
 
+@dataclass(eq=False)
+class Plane:
+    """What was seen on one plane; points are (2,) of the unit square."""
+
+    figure: str
+    points: list[Array]  # those to be measured next
+    tried: set[tuple[float, ...]] = field(default_factory=set)
+    seen: list[tuple[Array, int]] = field(default_factory=list)
+    """Points at which all runs settled, and bit masks of the cases reached."""
+
+
 def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
-    plane = sets["reference"].replace(c=DRAG)
-    points = {figure: spread_points(lab.effort.plane_spread, 7 + k) for k, figure in enumerate(FIGURES)}
-    seen: dict[str, list[tuple[Array, int]]] = {figure: [] for figure in FIGURES}
-    tried: dict[str, set[tuple[float, ...]]] = {figure: set() for figure in FIGURES}
-    for count in (*lab.effort.plane_added, 0):
-        chosen = [(figure, u) for figure in FIGURES for u in points[figure]]
-        starts = []
-        for figure, u in chosen:
-            eta, flow = (np.array([0.02, 0.45]) + u * np.array([0.78, 3.15])).tolist()
-            p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
-            p = p.replace(mu=eta) if figure == "fig-8" else p
-            starts.append([named_start(figure, p, how) for how in WAYS])
-        # Only the case matters: states may drift a thousand times as far as those whose values are compared.
-        patience = Patience(span=20.0, loose=1000.0, rounds=lab.effort.plane_rounds)
-        for (figure, u), states in zip(chosen, settle_groups(lab, starts, patience), strict=True):
-            if not any(each.failure for each in states):
-                mask = sum(1 << case for case in {physical_case(each.case) for each in states})
-                seen[figure].append((u, mask))
-                p, tasks = states[0].start.p, [each.task for each in states]
-                yield measurement(lab, "plane", "reference", p, "cases", mask, tasks, figure=figure)
-        for figure in FIGURES:
-            tried[figure] |= {tuple(u.tolist()) for u in points[figure]}
-            fresh = (u for u in added_points(seen[figure]) if tuple(u.tolist()) not in tried[figure])
-            points[figure] = list(islice(fresh, count))
-    for figure in FIGURES:
-        if out := len(tried[figure]) - len(seen[figure]):
-            total = len(tried[figure])
-            reason = f"{figure}: {out} of {total} points are left out, too close to a change of case to settle"
-            yield Missing("plane", "reference", reason)
-
-
-def spread_points(count: int, seed: int) -> list[Array]:
-    """Points (2,) of the unit square, evenly spread."""
     from scipy.stats import qmc  # slow to import
 
-    return list(qmc.Halton(2, seed=seed).random(count))
+    # In such drag states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry.
+    p = sets["reference"].replace(c=1.25)
+    spread = [list(qmc.Halton(2, seed=7 + k).random(lab.effort.plane_spread)) for k in range(len(FIGURES))]
+    both = [Plane(figure, points) for figure, points in zip(FIGURES, spread, strict=True)]
+    for count in (*lab.effort.plane_added, 0):
+        chosen = [(plane, u) for plane in both for u in plane.points]
+        starts = []
+        for plane, u in chosen:
+            eta, flow = (np.array([0.02, 0.45]) + u * np.array([0.78, 3.15])).tolist()
+            q = p.replace(eta=eta, omega_0=flow / time_unit(p), mu=eta if plane.figure == "fig-8" else p.mu)
+            starts.append([named_start(plane.figure, q, how) for how in WAYS])
+        # Only the case matters: states may drift a thousand times as far as those whose values are compared.
+        patience = Patience(span=20.0, loose=1000.0, rounds=lab.effort.plane_rounds)
+        for (plane, u), states in zip(chosen, settle_groups(lab, starts, patience), strict=True):
+            if not any(each.failure for each in states):
+                mask = sum(1 << case for case in {physical_case(each.case) for each in states})
+                plane.seen.append((u, mask))
+                q, tasks = states[0].start.p, [each.task for each in states]
+                yield measurement(lab, "plane", "reference", q, "cases", mask, tasks, figure=plane.figure)
+        for plane in both:
+            plane.tried |= {tuple(u.tolist()) for u in plane.points}
+            fresh = (u for u in added_points(plane.seen) if tuple(u.tolist()) not in plane.tried)
+            plane.points = list(islice(fresh, count))
+    for plane in both:
+        if out := len(plane.tried) - len(plane.seen):
+            at = f"{plane.figure}: {out} of {len(plane.tried)} points"
+            yield Missing("plane", "reference", f"{at} are left out, too close to a change of case to settle")
 
 
 def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
@@ -99,10 +101,14 @@ def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     return [(places[a] + places[b]) / 2 for _, a, b in turns]
 
 
-FAR_AWAY, ARRIVED = 0.1, 0.01
-"""Distances divided by that of the attractors: a long way, in two fifths of a run, and where a ball has arrived."""
-CLOSING = (0.1, 0.17, 0.26, 0.38)
-"""Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
+@dataclass(frozen=True)
+class Borders:
+    """How the border between two basins is followed."""
+
+    far: float = 0.1  # a long way, in two fifths of a run, divided by the distance of the attractors
+    arrived: float = 0.01  # distance at which a ball has arrived, divided likewise
+    # Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins.
+    closing: tuple[float, ...] = (0.1, 0.17, 0.26, 0.38)
 
 
 def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -124,18 +130,35 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
-        for part in (CLOSING if name == soonest else lab.effort.edge_flows)
+        for part in (Borders.closing if name == soonest else lab.effort.edge_flows)
     ]
-    edges = yield from _edges(lab, flows)
+    starts = [[named_start(name, p, "rest"), named_start(name, p, "on the wall")] for name, p in flows]
+    edges = []  # first on the line between the two attractors
+    for (name, p), (slipping, lifted) in zip(flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True):
+        if slipping.failure or lifted.failure or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR):
+            fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
+            yield Missing("edge", name, f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}")
+        else:
+            a, b = _on_floor(slipping.mean), _on_floor(lifted.mean)
+            edges.append(Edge(name, p, a, b, a, b - a))
     for _ in range(lab.effort.edge_lines):
-        edges = _crossed_once_more(lab, edges)
+        lines = [_next_line(edge) for edge in edges]
+        brackets = narrow(lab, [_search(lab, line) for line in lines], careful=False)
+        edges = [e.crossed(line, bracket) for e, line, bracket in zip(edges, lines, brackets, strict=True)]
     for edge in edges:
         yield from _edge_rows(lab, edge)
     for name, (low, high) in limits.items():
-        last = low + (max(CLOSING) + 1e-6) * (high - low)
+        last = low + (max(Borders.closing) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
-        if len(near) >= len(CLOSING):
-            yield _edge_meets_lifted(lab, near)
+        if len(near) >= len(Borders.closing):  # the edge meets the lifted ball where both have the same omega_c
+            noise = max(float(_uncertainty(edge)[2]) for edge in near)
+            apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
+            place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
+            tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
+            p = sets[name].replace(omega_0=place.value)
+            at = {"side": "from above", "by": "unstable slipping meets the lifted ball"}
+            row = measurement(lab, "edge", name, p, "omega_02", place, tasks, **at)
+            yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
         elif name == soonest or lab.level > Level.QUICK:
             yield Missing("edge", name, "too few crossings to follow the edge to where it meets the lifted ball")
 
@@ -147,16 +170,12 @@ class Edge:
     set: str
     p: Parameters
     slipping: Array
-    lifted: Array
-    """The settled states on either side."""
+    lifted: Array  # the settled states on either side
     centre: Array
-    line: Array
-    """Direction of the line; its length is the distance of the attractors."""
-    missed: int = 0
-    """How many lines since the last crossing were too short."""
+    line: Array  # direction of the line; its length is the distance of the attractors
+    missed: int = 0  # how many lines since the last crossing were too short
     bracket: Bracket | None = None
-    moves: tuple[Array, ...] = ()
-    """By how much each of the last crossings differs from that of the line before."""
+    moves: tuple[Array, ...] = ()  # by how much each of the last crossings differs from that of the line before
 
     @property
     def crossing(self) -> Array:
@@ -164,33 +183,12 @@ class Edge:
         assert self.bracket is not None
         return np.asarray(self.centre + self.bracket.place.value * self.line)
 
-
-def _edges(lab: Lab, flows: Sequence[tuple[str, Parameters]]) -> Generator[Missing, None, list[Edge]]:
-    """The edges at flows of sets, first on the line between the two attractors; and where these did not settle."""
-    starts = [[named_start(name, p, "rest"), named_start(name, p, "on the wall")] for name, p in flows]
-    edges = []
-    for (name, p), (slipping, lifted) in zip(flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True):
-        if slipping.failure or lifted.failure or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR):
-            fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
-            yield Missing("edge", name, f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}")
-        else:
-            a, b = _on_floor(slipping.mean), _on_floor(lifted.mean)
-            edges.append(Edge(name, p, a, b, a, b - a))
-    return edges
-
-
-def _crossed_once_more(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
-    """The edges, each crossed on one line more."""
-    lines, found = [_next_line(edge) for edge in edges], []
-    brackets = narrow(lab, [_search(lab, line) for line in lines], careful=False)
-    for edge, line, bracket in zip(edges, lines, brackets, strict=True):
+    def crossed(self, line: Edge, bracket: Bracket) -> Edge:
+        """The edge once it was looked for on one more line."""
         if None in bracket.runs:
-            found.append(replace(edge, moves=(), missed=edge.missed + 1))
-        else:
-            crossed = replace(line, bracket=bracket, missed=0)
-            moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
-            found.append(replace(crossed, moves=moves))
-    return found
+            return replace(self, moves=(), missed=self.missed + 1)
+        crossed = replace(line, bracket=bracket, missed=0)
+        return replace(crossed, moves=(*self.moves, np.abs(crossed.crossing - self.crossing)) if self.bracket else ())
 
 
 def _on_floor(x: Array) -> Array:
@@ -224,10 +222,10 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
     parts = np.array_split(run.omega_c[tail(run, 0.4)], 4)
     first, second, third, last = (float(taper(len(part)) @ part / taper(len(part)).sum()) for part in parts)
     before, now, way = second - first, last - third, abs(lifted - slipping)
-    if abs(last - first) > FAR_AWAY * way or (before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)):
+    if abs(last - first) > Borders.far * way or (before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)):
         return (last - first) * (slipping - lifted) > 0
     end = last + now * abs(now) / max(abs(before) - abs(now), abs(now), 1e-300)  # by a geometric series
-    rests = [abs(end - each) < ARRIVED * way for each in (slipping, lifted)]
+    rests = [abs(end - each) < Borders.arrived * way for each in (slipping, lifted)]
     return rests[0] if any(rests) else None
 
 
@@ -280,14 +278,3 @@ def _edge_rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
     for name, value in values.items():
         of = Measured(value, slips / roll if name == "omega_c" else slips)
         yield measurement(lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
-
-
-def _edge_meets_lifted(lab: Lab, near: Sequence[Edge]) -> Measurement | Missing:
-    """The measured flow at which the edge of a set meets the lifted ball: where both have the same omega_c."""
-    noise = max(float(_uncertainty(edge)[2]) for edge in near)
-    apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
-    place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
-    tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
-    p, by = near[0].p.replace(omega_0=place.value), "unstable slipping meets the lifted ball"
-    row = measurement(lab, "edge", near[0].set, p, "omega_02", place, tasks, side="from above", by=by)
-    return if_found(row, "the edge points to no flow at which it meets the lifted ball")

@@ -18,21 +18,22 @@ from compare.kit.statistics import Measured, initial_slope, straight_line
 from compare.kit.tasks import Task
 from model import Case, Parameters
 
-FIRST_DRAGS, NEARER_DRAGS = (2.0, 4.0), (1.6, 2.6)
-"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), then multiples of the drag extrapolated
-from those two, so far off that states still settle soon."""
-BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
-"""Distances of the states from omega_02 there, in parts of the range of slipping."""
+
+@dataclass(frozen=True)
+class Births:
+    """Where the birth of a fold is looked for."""
+
+    first: tuple[float, float] = (2.0, 4.0)  # values of c sqrt(R/g)
+    nearer: tuple[float, float] = (1.6, 2.6)  # of the drag extrapolated from those: far off, where states settle soon
+    before: tuple[float, ...] = (0.02, 0.035, 0.055, 0.08, 0.12)  # omega_02, in parts of the range of slipping
 
 
 @dataclass(frozen=True, eq=False)
 class BranchEnd:
     """How the branch of slipping ends in one drag."""
 
-    lag: float
-    """1/c, s, to which the lag by a force is proportional."""
-    slope: Measured
-    """Of omega_0 as a function of the floor's force where that vanishes."""
+    lag: float  # 1/c, s, to which the lag by a force is proportional
+    slope: Measured  # of omega_0 as a function of the floor's force where that vanishes
     tasks: list[Task]
 
 
@@ -48,12 +49,12 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             ranges[name] = begins.value, ends.value
     found: dict[str, list[BranchEnd]] = {name: [] for name in ranges}
     lags: dict[str, Measured] = {}
-    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
-    for _ in (FIRST_DRAGS, NEARER_DRAGS):
+    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in Births.first]
+    for _ in (Births.first, Births.nearer):
         starts = [
             [
                 named_start(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest")
-                for part in BEFORE_END
+                for part in Births.before
             ]
             for name, c in drags
             for low, high in [ranges[name]]
@@ -64,14 +65,14 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
                 slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
                 found[name].append(BranchEnd(1 / c, slope, [state.task for state in states]))
         for name, own in found.items():
-            if len(own) >= len(FIRST_DRAGS):
+            if len(own) >= len(Births.first):
                 values, noise = zip(*((end.slope.value, end.slope.uncertainty) for end in own), strict=True)
                 lags[name], _ = straight_line([end.lag for end in own], values, noise)
-        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in NEARER_DRAGS]
+        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in Births.nearer]
     for name, p in sets.items():
         if name not in ranges:
             yield Missing("birth", name, "there is no range of slipping at both points that ends at the wall")
-        elif len(found[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
+        elif len(found[name]) < len(Births.first) + len(Births.nearer):
             yield Missing("birth", name, "too few states of slipping at both points settle near the end of the branch")
         else:
             drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)

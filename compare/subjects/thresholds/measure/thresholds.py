@@ -17,40 +17,34 @@ from itertools import pairwise
 
 import numpy as np
 
+from compare.kit import settling
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.engines import sliding_speeds
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.settling import (
-    Patience,
-    Settled,
-    named_start,
-    physical_case,
-    rounded_duration,
-    safe_height,
-    settle_groups,
-    settled_cases,
-)
+from compare.kit.settling import Patience, Settled
 from compare.kit.statistics import COVERAGE, POINTS, Measured, extrapolated_maximum, extrapolated_zero
 from compare.kit.tasks import Task
 from compare.subjects.thresholds.measure.answers import ASKED, lifts, slip
 from model import Case, Parameters, State
 from model.arrays import Array
 
-PROTOCOL = "thresholds"
-COARSE = 1e-2
-"""Relative width of a bracket where only the neighbourhood is wanted."""
-DISTANCES: Array = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
-"""Relative distances of settled states from a flow at which something vanishes."""
-TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
-"""The same below a fold, where slip goes like the root of the distance; in parts of the range of slipping."""
-RIDES: Array = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
-"""The same of the states that are continued to where a ball rides the wall as slowly as it can."""
+
+@dataclass(frozen=True)
+class Distances:
+    """Relative distances of flows."""
+
+    coarse: float = 1e-2  # width of a bracket where only the neighbourhood is wanted
+    away: float = 0.03  # from a known end of rolling, where an engine beside the one on trial looks for it
+    # Of settled states from where something vanishes; below a fold, where slip goes like the root of the distance, in
+    # parts of the range of slipping; and from where a ball rides the wall as slowly as it can.
+    settled: tuple[float, ...] = (0.005, 0.01, 0.02, 0.03, 0.05)
+    turning: tuple[float, ...] = (0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15)
+    riding: tuple[float, ...] = (0.002, 0.008, 0.02, 0.035, 0.05)
+
+
 FOUND = {"rolling": ("omega_01", "omega_03"), "sinking": ("omega_02",), "slipping": ("omega_04",)}
 """The thresholds at which each ends or begins."""
-AWAY = 0.03
-"""Relative distance from there at which an engine beside the one on trial looks for the end of rolling."""
-
 From = Callable[[Parameters], Array]
 """The state in which a ball starts, by its parameters."""
 
@@ -58,19 +52,18 @@ From = Callable[[Parameters], Array]
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The thresholds of each set: bisected between flows whose settled cases differ, and extrapolated from states."""
     sure = not lab.effort.granted
-    found = [_changes(lab, name, p, records) for name, p in sets.items()]
-    found = _narrowed(lab, found, _end_of_rolling, careful=sure)
-    found = _narrowed(lab, found, _sinking_and_slipping)
-    found = _settled_beside(lab, found)
-    found = _narrowed(lab, found, _riding_and_leaning, careful=sure)
-    found = _narrowed(lab, found, _fold)
+    found = [_where_cases_change(lab, name, p, records) for name, p in sets.items()]
+    _narrow(lab, found, _end_of_rolling, careful=sure)
+    _narrow(lab, found, _sinking_and_slipping)
+    _settle_beside(lab, found)
+    _narrow(lab, found, _riding_and_leaning, careful=sure)
+    _narrow(lab, found, _fold)
     for each in found:
         for kind, bracket in each.brackets.items():
             if bracket.failure and kind != "sinking":  # which is looked for roughly
                 yield each.missing(f"{kind}: its limit is known less well, as a run {bracket.failure}", 0)
-        yield from _rolling_rows(each)
-        yield from _riding_rows(each)
-        yield from _slipping_rows(each)
+        yield from _rows(each)
+        yield from _rows_of_slipping(each)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +76,10 @@ class Findings:
     lab: Lab
     set: str
     p: Parameters
-    cases: Mapping[str, Mapping[float, Case]]
-    """In which cases balls were seen to settle, by flow, the slowest first."""
-    changes: Mapping[str, Bracket]
-    """Flows between which it is looked for."""
-    brackets: Mapping[str, Bracket] = field(default_factory=dict)
-    states: Mapping[str, Sequence[Settled]] = field(default_factory=dict)
+    cases: Mapping[str, Mapping[float, Case]]  # in which cases balls were seen to settle, by flow, the slowest first
+    changes: Mapping[str, Bracket]  # flows between which it is looked for
+    brackets: dict[str, Bracket] = field(default_factory=dict)
+    states: dict[str, list[Settled]] = field(default_factory=dict)
     """Settled states beside a change, the nearest first, by kind: of "riding", "sinking", "lifted" balls; of "slipping"
     ones near its beginning, and "turning" ones near its end."""
 
@@ -101,7 +92,7 @@ class Findings:
 
         def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
             q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
-            t_end = rounded_duration(q, units * time * attempt.time)
+            t_end = settling.rounded_duration(q, units * time * attempt.time)
             return self.lab.task(q, last.x[-1] if last else start(q), t_end, coarse_step(q) / attempt.refine)
 
         return kind, Search(around, task, answer, width)
@@ -113,70 +104,69 @@ class Findings:
 
     def missing(self, why: str, rows: int = 1) -> Missing:
         """A record of a threshold that was not found, and why."""
-        return Missing(PROTOCOL, self.set, why, rows)
+        return Missing("thresholds", self.set, why, rows)
 
     def row(
-        self, quantity: str, at: Measured | None, tasks: Sequence[Task], side: str, by: str
+        self, quantity: str, at: Measured | float | None, tasks: Sequence[Task], **how: str
     ) -> Measurement | Missing:
-        """The measurement of a threshold that was found, or why it was not."""
+        """The measurement of a threshold, or of a number on the set; or why the threshold was not found."""
         if at is None:
-            return self.missing(f"too few states settled for {quantity} by {by}, or their extrapolation has no zero")
-        p = self.p.replace(omega_0=at.value)
-        return measurement(self.lab, PROTOCOL, self.set, p, quantity, at, tasks, side=side, by=by)
-
-    def count(self, quantity: str, value: float, tasks: Sequence[Task]) -> Measurement:
-        """The measurement of a count on the set."""
-        return measurement(self.lab, PROTOCOL, self.set, self.p, quantity, value, tasks)
+            return self.missing(
+                f"too few states settled for {quantity} by {how['by']}, or their extrapolation has no zero"
+            )
+        p = self.p.replace(omega_0=at.value) if isinstance(at, Measured) else self.p
+        return measurement(self.lab, "thresholds", self.set, p, quantity, at, tasks, **how)
 
     def row_of_bracket(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
         """The measurement of a threshold that lies in a bracket."""
         # Slip that is still too small to count may have begun below: it is proportional to the distance.
         speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run))
-        unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
+        unseen = of.width / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
-        return self.row(quantity, place, of.tasks, side, by)
+        return self.row(quantity, place, of.tasks, side=side, by=by)
 
     def rows_of_zero(self, kind: str, what: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
         """The measurement of a threshold at which something is zero, extrapolated from settled states beside it."""
         if kind in self.states:
             states = self.states[kind]
-            tasks = [state.task for state in states]
-            yield self.row(quantity, extrapolated(states, what, extrapolated_zero), tasks, side, f"{by} → 0")
+            place, tasks = extrapolated(states, what, extrapolated_zero), [state.task for state in states]
+            yield self.row(quantity, place, tasks, side=side, by=f"{by} → 0")
 
 
-Questions = Callable[[Findings], Iterator[tuple[str, Search]]]
-"""What is to be narrowed down on a set, by kind."""
-
-
-def _changes(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
+def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
     """For each kind of change the bracket of flows between which settled cases differ, so where to look for it.
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one on trial looks where
     that one found something.
     """
     starts = {"rolling": "with the fluid", "sinking": "on the wall", "slipping": lab.effort.settled_starts[0][0]}
-    cases = {kind: settled_cases(records, name, how) for kind, how in starts.items()}
+    cases = {kind: settling.settled_cases(records, name, how) for kind, how in starts.items()}
     changes = {}
     for kind, seen in cases.items():
         if flows := list(seen):
             ended = {Case.NR} if kind != "rolling" else set(Case) - {Case.RR}
             low = max((flow for flow in flows if seen[flow] not in ended), default=flows[0] / 2)
             changes[kind] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
-    if any(m.set == name for m in records.select(PROTOCOL)):
+    if any(m.set == name for m in records.select("thresholds")):
         changes = {}
         for kind, quantities in FOUND.items():
             for known in filter(None, (records.threshold(name, quantity) for quantity in quantities)):
-                away = AWAY if kind == "rolling" else COARSE / 3
+                away = Distances.away if kind == "rolling" else Distances.coarse / 3
                 changes[kind] = Bracket(known.value * (1 - away), known.value * (1 + away))
     return Findings(lab, name, p, cases, changes)
 
 
-def _narrowed(lab: Lab, found: Sequence[Findings], questions: Questions, careful: bool = False) -> list[Findings]:
-    """Findings with what questions narrow down, on all sets together."""
-    asked = [dict(questions(each)) for each in found]
-    brackets = iter(narrow(lab, [search for own in asked for search in own.values()], careful))
-    new = [{kind: next(brackets) for kind in own} for own in asked]
-    return [replace(each, brackets={**each.brackets, **own}) for each, own in zip(found, new, strict=True)]
+def _narrow(
+    lab: Lab,
+    found: Sequence[Findings],
+    searches: Callable[[Findings], Iterator[tuple[str, Search]]],
+    careful: bool = False,
+) -> None:
+    """Narrow down what is searched for on a set, on all sets together."""
+    asked = [(each, kind, search) for each in found for kind, search in searches(each)]
+    brackets = narrow(lab, [search for *_, search in asked], careful)
+    for (each, kind, _), bracket in zip(asked, brackets, strict=True):
+        each.brackets[kind] = bracket
 
 
 def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
@@ -189,55 +179,49 @@ def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
     """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles on the floor."""
     if change := each.changes.get("sinking"):
-        yield each.search("sinking", change, _start_state("on the wall"), COARSE * change.low)
+        yield each.search("sinking", change, _start_state("on the wall"), Distances.coarse * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
     if change and end and not lifts(end) and end.high < change.high:
         change = replace(change, low=max(change.low, end.high))
-        yield each.search("slipping", change, _start_state("rest"), COARSE * change.low)
+        yield each.search("slipping", change, _start_state("rest"), Distances.coarse * change.low)
 
 
-def _settled_beside(lab: Lab, found: Sequence[Findings]) -> list[Findings]:
-    """Findings with settled states beside every change; only those that did settle in the case that belongs.
+def _start_state(how: str) -> From:
+    """A function from parameters to the state at the start of a kind of run, see `settling.named_start`."""
+    return lambda p: settling.named_start("", p, how).x0
+
+
+def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
+    """Settle states beside every change; those count that did settle, in the case that belongs there.
 
     A bracket is taken for a change only if something was seen beyond it, or that may be taken for granted.
     """
-    if not lab.effort.granted:
-        seen = [{k: b for k, b in each.brackets.items() if b.runs[1] or b.high in each.cases[k]} for each in found]
-        found = [replace(each, brackets=own) for each, own in zip(found, seen, strict=True)]
-    belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
-    places = [_flows_beside(each) for each in found]
+    beside: list[tuple[Findings, str, str, Array]] = []  # findings, kind of state, how it starts, flows in rad s-1
+    for each in found:
+        unseen = [kind for kind, b in each.brackets.items() if not (b.runs[1] or b.high in each.cases[kind])]
+        for kind in unseen if not lab.effort.granted else ():
+            del each.brackets[kind]
+        settled, turning, riding = (np.array(row) for row in (Distances.settled, Distances.turning, Distances.riding))
+        if carried := each.brackets.get("sinking"):
+            beside.append((each, "riding", "on the wall", carried.high * (1 + riding)))
+            if lab.effort.slow:  # a ball that sinks swings for long
+                beside.append((each, "sinking", "on the wall", carried.low * (1 - settled / 2)))
+        end, last = each.brackets.get("rolling"), each.brackets.get("slipping")
+        if end and lifts(end):
+            beside.append((each, "lifted", "on the wall", end.high * (1 + riding)))
+        elif end and last:
+            span = last.low - end.high
+            beside.append((each, "slipping", "rest", end.high + settled * min(span, end.high)))
+            beside.append((each, "turning", "rest", last.low - turning * span))
     starts = [
-        [named_start(each.set, each.p.replace(omega_0=flow), how) for flow in flows.tolist()]
-        for each, own in zip(found, places, strict=True)
-        for flows, how in own.values()
+        [settling.named_start(each.set, each.p.replace(omega_0=flow), how) for flow in flows.tolist()]
+        for each, _, how, flows in beside
     ]
     patience = Patience(loose=lab.effort.thresholds_loose, rounds=lab.effort.thresholds_rounds)
-    rows = iter(settle_groups(lab, starts, patience))
-    settled = []
-    for each, own in zip(found, places, strict=True):
-        states = {
-            kind: [s for s in next(rows) if not s.failure and physical_case(s.case) is belongs.get(kind, Case.NR)]
-            for kind in own
-        }
-        settled.append(replace(each, states=states))
-    return settled
-
-
-def _flows_beside(each: Findings) -> dict[str, tuple[Array, str]]:
-    """By kind of change the flows beside it at which states are to settle, rad s-1, and how they start."""
-    places = {}
-    if carried := each.brackets.get("sinking"):
-        places["riding"] = carried.high * (1 + RIDES), "on the wall"
-        if each.lab.effort.slow:  # a ball that sinks swings for long
-            places["sinking"] = carried.low * (1 - DISTANCES / 2), "on the wall"
-    end, last = each.brackets.get("rolling"), each.brackets.get("slipping")
-    if end and lifts(end):
-        places["lifted"] = end.high * (1 + RIDES), "on the wall"
-    elif end and last:
-        span = last.low - end.high
-        places["slipping"] = end.high + DISTANCES * min(span, end.high), "rest"
-        places["turning"] = last.low - TURNS * span, "rest"
-    return places
+    belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
+    for (each, kind, *_), states in zip(beside, settling.settle_groups(lab, starts, patience), strict=True):
+        case = belongs.get(kind, Case.NR)
+        each.states[kind] = [s for s in states if not s.failure and settling.physical_case(s.case) is case]
 
 
 def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
@@ -247,112 +231,14 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
     """
     width = each.lab.effort.thresholds_width
     begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
-    if begins and len(riding) == len(RIDES):
-        ride = riding_start(riding, height=safe_height(each.p))
-        yield each.search("riding", begins, ride, width * begins.high)
+    if begins and len(riding) == len(Distances.riding):
+        yield each.search(
+            "riding", begins, riding_start(riding, height=settling.safe_height(each.p)), width * begins.high
+        )
     end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
-    if end and len(lifted) == len(RIDES):
-        pressed = riding_start(lifted, height=0.0, less=1e-3)
-        change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
-        yield each.search("leaning", change, pressed, width * end.high)
-
-
-def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
-    """The maximum of omega_0 along the branch of slipping, if it ends in a fold; and whether it ends without one.
-
-    There is no fold where the floor would have to pull at that maximum, or there is none and the floor's force vanishes
-    just where the wall begins to carry the ball.
-    """
-    turned, held = each.states.get("turning", []), each.brackets.get("riding")
-    top, unloaded = (
-        extrapolated(turned, "slip_x", extrapolated_maximum),
-        extrapolated(turned, "force_Ay", extrapolated_zero),
-    )
-    off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
-    forces = partial(extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in turned]))
-    if pressing := extrapolated(turned, "slip_x", forces):
-        sure = COVERAGE * pressing.uncertainty
-        return top if pressing.value > sure else None, pressing.value < -sure
-    return None, bool(held and off < each.lab.effort.thresholds_fold * held.high)
-
-
-def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
-    """A search for the largest flow at which a ball on the floor settles, about the maximum of omega_0 on the branch.
-    At a fold all slows down, like the root of the distance.
-    """
-    top, _ = _end_of_slipping(each)
-    if top and each.lab.effort.slow:
-        narrowest = each.lab.effort.thresholds_fold
-        half = max(narrowest, 5.0 * top.uncertainty / top.value)
-        change, nearest = Bracket(top.value * (1 - half), top.value * (1 + half)), each.states["turning"][0]
-        yield each.search("fold", change, lambda _: nearest.mean, narrowest * top.value, 1 / math.sqrt(narrowest))
-
-
-NONE = "no flow that was tried, up to twice the fastest of the settled states,"
-
-
-def _rolling_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """Measurements of the end of rolling at both points: by lifting off, or by slip."""
-    if not (rolling := each.bracket_seen("rolling")):
-        yield each.missing(f"{NONE} ends two-point rolling")
-    elif lifts(rolling):
-        yield each.count("lifts", 1.0, rolling.tasks)
-        yield each.row_of_bracket("omega_03", rolling, "from below", "loss of the floor")
-        if leaning := each.bracket_seen("leaning"):
-            yield each.row_of_bracket("omega_03", leaning, "from above", "return to rolling when pressed")
-        else:
-            why = "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
-            yield each.missing(why)
-    else:
-        yield each.count("lifts", 0.0, rolling.tasks)
-        yield each.row_of_bracket("omega_01", rolling, "from below", "onset of slip")
-        yield from each.rows_of_zero("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
-
-
-def _riding_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """Measurements of the least flow that holds a ball on the wall, omega_02."""
-    if riding := each.bracket_seen("riding"):
-        yield each.row_of_bracket("omega_02", riding, "from above", "onset of sliding on the wall")
-    else:
-        yield each.missing(f"{NONE} is the least to hold a ball on the wall")
-    yield from each.rows_of_zero("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
-
-
-def _slipping_rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the number of folds."""
-    if "turning" not in each.states:
-        if (rolling := each.bracket_seen("rolling")) and not lifts(rolling):
-            yield each.missing("no end of slipping at both points was found", 3)
-        return
-    (top, smooth), tasks = _end_of_slipping(each), [state.task for state in each.states["turning"]]
-    settles, ends = len(tasks) >= POINTS, _count_ends(each.cases["slipping"], each.brackets.get("slipping"))
-    # Beside known flows only a ball may have settled at none beyond the last.
-    if settles and (ends or not each.lab.effort.granted):
-        yield each.count("folds", ends - smooth, tasks)
-    if smooth:
-        yield from each.rows_of_zero("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
-    elif top is None:
-        yield each.missing("settled slipping points to no flow at which it ends", 2 if settles else 3)
-    else:
-        yield each.row("omega_04", top, tasks, "from below", "maximum of omega_0 along the branch")
-        if fold := each.bracket_seen("fold"):
-            yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
-        else:
-            slow = "costs more than an engine beside the one on trial may"
-            why = "could not be done" if each.lab.effort.slow else slow
-            yield each.missing(f"the end of slipping at both points is extrapolated; to bracket it {why}")
-
-
-def _count_ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
-    """At how many of the rising flows that were tried a ball from rest ceases to settle in SS."""
-    said = {flow: case is Case.SS for flow, case in cases.items()} | dict(bracket.said if bracket else ())
-    settles = [said[flow] for flow in sorted(said)]
-    return sum(bool(before) and after is False for before, after in pairwise(settles))
-
-
-def _start_state(how: str) -> From:
-    """A function from parameters to the state at the start of a kind of run, see `settling.named_start`."""
-    return lambda p: named_start("", p, how).x0
+    if end and len(lifted) == len(Distances.riding):
+        change = Bracket(end.low * (1 - Distances.coarse), end.high * (1 + Distances.coarse))
+        yield each.search("leaning", change, riding_start(lifted, height=0.0, less=1e-3), width * end.high)
 
 
 def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) -> From:
@@ -368,6 +254,23 @@ def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) ->
     return ride
 
 
+def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
+    """The maximum of omega_0 along the branch of slipping, if it ends in a fold; and whether it ends without one.
+
+    There is no fold where the floor would have to pull at that maximum, or there is none and the floor's force vanishes
+    just where the wall begins to carry the ball.
+    """
+    turned, held = each.states.get("turning", []), each.brackets.get("riding")
+    top = extrapolated(turned, "slip_x", extrapolated_maximum)
+    unloaded = extrapolated(turned, "force_Ay", extrapolated_zero)
+    off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
+    forces = partial(extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in turned]))
+    if pressing := extrapolated(turned, "slip_x", forces):
+        sure = COVERAGE * pressing.uncertainty
+        return top if pressing.value > sure else None, pressing.value < -sure
+    return None, bool(held and off < each.lab.effort.thresholds_fold * held.high)
+
+
 def extrapolated(
     states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Measured]], Measured]
 ) -> Measured | None:
@@ -380,3 +283,72 @@ def extrapolated(
         values = [Measured(flow - orbit.value, orbit.uncertainty) for flow, orbit in zip(flows, values, strict=True)]
     place = to(np.array(flows), values)
     return place if math.isfinite(place.uncertainty) else None
+
+
+def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
+    """A search for the largest flow at which a ball on the floor settles, about the maximum of omega_0 on the branch.
+
+    At a fold all slows down, like the root of the distance.
+    """
+    top, _ = _end_of_slipping(each)
+    if top and each.lab.effort.slow:
+        narrowest = each.lab.effort.thresholds_fold
+        half = max(narrowest, 5.0 * top.uncertainty / top.value)
+        change, nearest = Bracket(top.value * (1 - half), top.value * (1 + half)), each.states["turning"][0]
+        yield each.search("fold", change, lambda _: nearest.mean, narrowest * top.value, 1 / math.sqrt(narrowest))
+
+
+def _rows(each: Findings) -> Iterator[Measurement | Missing]:
+    """Measurements of the end of rolling at both points, by lifting off or by slip; and of the least flow that holds a
+    ball on the wall, omega_02.
+    """
+    none = "no flow that was tried, up to twice the fastest of the settled states,"
+    if not (rolling := each.bracket_seen("rolling")):
+        yield each.missing(f"{none} ends two-point rolling")
+    elif lifts(rolling):
+        yield each.row("lifts", 1.0, rolling.tasks)
+        yield each.row_of_bracket("omega_03", rolling, "from below", "loss of the floor")
+        if leaning := each.bracket_seen("leaning"):
+            yield each.row_of_bracket("omega_03", leaning, "from above", "return to rolling when pressed")
+        else:
+            why = "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
+            yield each.missing(why)
+    else:
+        yield each.row("lifts", 0.0, rolling.tasks)
+        yield each.row_of_bracket("omega_01", rolling, "from below", "onset of slip")
+        yield from each.rows_of_zero("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
+    if riding := each.bracket_seen("riding"):
+        yield each.row_of_bracket("omega_02", riding, "from above", "onset of sliding on the wall")
+    else:
+        yield each.missing(f"{none} is the least to hold a ball on the wall")
+    yield from each.rows_of_zero("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
+
+
+def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
+    """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the number of folds."""
+    if "turning" not in each.states:
+        if (rolling := each.bracket_seen("rolling")) and not lifts(rolling):
+            yield each.missing("no end of slipping at both points was found", 3)
+        return
+    (top, smooth), tasks = _end_of_slipping(each), [state.task for state in each.states["turning"]]
+    # At how many of the rising flows that were tried a ball from rest ceases to settle in SS.
+    said: dict[float, bool | None] = {flow: case is Case.SS for flow, case in each.cases["slipping"].items()}
+    if tried := each.brackets.get("slipping"):
+        said |= dict(tried.said)
+    ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
+    settles = len(tasks) >= POINTS
+    # Beside known flows only a ball may have settled at none beyond the last.
+    if settles and (ends or not each.lab.effort.granted):
+        yield each.row("folds", float(ends - smooth), tasks)
+    if smooth:
+        yield from each.rows_of_zero("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
+    elif top is None:
+        yield each.missing("settled slipping points to no flow at which it ends", 2 if settles else 3)
+    else:
+        yield each.row("omega_04", top, tasks, side="from below", by="maximum of omega_0 along the branch")
+        if fold := each.bracket_seen("fold"):
+            yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
+        else:
+            slow = "costs more than an engine beside the one on trial may"
+            why = "could not be done" if each.lab.effort.slow else slow
+            yield each.missing(f"the end of slipping at both points is extrapolated; to bracket it {why}")
