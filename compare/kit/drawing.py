@@ -87,7 +87,7 @@ class Drawing:
     """The same of another set, by theory alone: `draw` raises `GapError` where the set has no such thing."""
 
 
-Measured = Callable[[Evidence], Iterable[Measurement]]
+_Rows = Callable[[Evidence], Iterable[Measurement]]
 """What a figure shows of what was measured, by all engines on all sets."""
 
 
@@ -97,13 +97,13 @@ def diagram(
     set: str,
     draw: Callable[[Diagram], tuple[Figure, str]],
     claims: tuple[str, ...],
-    measured: Measured | None = None,
+    measured: _Rows | None = None,
 ) -> Drawing:
     """The figure of a `Diagram`: of one set with what was measured with it, or of any other set without."""
     return Drawing(title, partial(select, name, set, measured), draw, claims, partial(Diagram, name))
 
 
-def select(name: str, set: str, measured: Measured | None, evidence: Evidence) -> Diagram:
+def select(name: str, set: str, measured: _Rows | None, evidence: Evidence) -> Diagram:
     """What a figure shows of one set: what was measured with it, and the runs that are there."""
     states = tuple(m for m in measured(evidence) if m.set == set) if measured else ()
     return Diagram(name, Parameters.named(set), states, tuple(run for m in states for run in evidence.motions(m)))
