@@ -1,7 +1,7 @@
 """Exact cases of version 2: on feet, one body on another, on a belt, on a joint, on an edge or a rim, after a bounce.
 
-Like `compare.bench.one_contact`: courses are functions of time and of the constants that a wrong engine or theory would
-have otherwise. Those of the tripod and of what it stands on are quadratures, to 1e-12.
+Like `compare.bench.closed_forms`: courses are functions of time and of the constants that a wrong engine or theory
+would have otherwise. Those of the tripod and of what it stands on are quadratures, to 1e-12.
 """
 
 from __future__ import annotations
@@ -15,15 +15,10 @@ from scipy.special import ellipj, ellipk, ellipkinc
 
 from compare.adapters.scene import Surface
 from compare.bench.case import Case
-from compare.bench.one_contact import SPEED_ALONE, UP, WAY, G, along, block, closed_form, slope, sphere
+from compare.bench.closed_forms import SPEED_ALONE, UP, WAY, G, along, block, closed_form, slope, sphere
 from model.arrays import Array
 
 _Motion = tuple[Array, ...]
-
-
-def cases() -> tuple[Case, ...]:
-    """The cases that version 2 added."""
-    return (_tripod(), _plank(), _heavy_on_light(), _belt(), _joint(), _rocking(), _bounce(), _disc())
 
 
 def _tripod() -> Case:
@@ -283,3 +278,7 @@ def _disc() -> Case:
         until=1.2, scales=(2.0, 1.0, 5.0), contacts=("T",),
         source="balances of momentum and angular momentum in axes that go round with the disc",
     )  # fmt: skip
+
+
+MECHANISMS = (_tripod, _plank, _heavy_on_light, _belt, _joint, _rocking, _bounce, _disc)
+"""Functions that make these cases."""
