@@ -59,19 +59,15 @@ class Scene:
         )
         floor = [[0, 0, 1, 0, 0, 0], [1, 0, 0, 0, -r, 0], [0, 1, 0, r, 0, 0]]
         wall = [[-1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, r], [0, 0, 1, 0, -r, 0]]
-        self.simulate(ball, *(kernel.LagrangianLinearTIR(np.array(rows, float)) for rows in (floor, wall)))
-
-    def simulate(self, ball: Any, floor: Any, wall: Any) -> None:
-        """Begin with a ball and its contacts; there is no floor where none has a friction."""
         given = self.given
         self.ball, system = ball, kernel.NonSmoothDynamicalSystem(0.0, float("inf"))
         system.insertDynamicalSystem(ball)
         self.contacts = []
-        for friction, relation in ((given["mu"], floor), (given["eta"], wall)):
-            if friction is None:
+        for friction, rows in ((given["mu"], floor), (given["eta"], wall)):
+            if friction is None:  # there is no floor
                 continue
             law = kernel.NewtonImpactFrictionNSL(0.0, 0.0, friction, 3)
-            self.contacts.append(kernel.Interaction(law, relation))
+            self.contacts.append(kernel.Interaction(law, kernel.LagrangianLinearTIR(np.array(rows, float))))
             system.link(self.contacts[-1], ball)
         solver = kernel.FrictionContact(3)
         options = solver.numericsSolverOptions()

@@ -21,7 +21,7 @@ from model.kinematics import rotated
 class Dart(Free):
     """A free body in DART."""
 
-    TELLS = True
+    TELLS = TURNS = True
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")
 
     def make(self) -> None:

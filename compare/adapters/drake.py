@@ -41,7 +41,7 @@ logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces 
 class Drake(Free):
     """A free body in Drake."""
 
-    TELLS = True
+    TELLS = TURNS = True
     RESOLUTION = STICTION
 
     def make(self) -> None:
@@ -78,7 +78,8 @@ class Drake(Free):
         self.context = plant.GetMyMutableContextFromRoot(self.root)
         self.force, self.x = np.zeros(plant.num_velocities()), plant.GetPositionsAndVelocities(self.context)
         self.ball = self.wall = self.state_slices(ball)
-        self.put(self.ball, [*body.orientation, *body.position], [*body.spin, *body.velocity])
+        self.x[self.ball[0]] = [*body.orientation, *body.position]
+        self.x[self.ball[1]] = [*body.spin, *body.velocity]
         for surface in moving:
             if surface.turning:
                 turns = plant.GetJointByName(surface.name)
@@ -131,10 +132,6 @@ class Drake(Free):
         at, rate = body.floating_positions_start(), self.plant.num_positions() + body.floating_velocities_start_in_v()
         return slice(at, at + 7), slice(rate, rate + 6)
 
-    def put(self, numbers: tuple[slice, slice], pose: Any, rate: Any) -> None:
-        """Set pose and velocity of a free body at the given slices of the state."""
-        self.x[numbers[0]], self.x[numbers[1]] = pose, rate
-
     def advance(self) -> None:
         self.plant.get_applied_generalized_force_input_port().FixValue(self.context, self.force)
         self.plant.SetPositionsAndVelocities(self.context, self.x)
@@ -149,7 +146,7 @@ class Drake(Free):
         self.force[first + 3 : first + 6] = force
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        self.put(self.wall, [*facing(normal), *point], [0.0, 0.0, 0.0, *velocity])
+        self.x[self.wall[0]], self.x[self.wall[1]] = [*facing(normal), *point], [0.0, 0.0, 0.0, *velocity]
 
     def touches(self) -> list[Touch]:
         results = self.plant.get_contact_results_output_port().Eval(self.context)

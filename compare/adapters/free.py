@@ -81,8 +81,8 @@ class Free(ABC):
     RESOLUTION = 1e-9
     """The least slip speed that the engine tells from rolling, m/s: to what its solver goes, or round-off."""
 
-    TELLS = False
-    """Whether the engine tells what contacts carry, friction included."""
+    TELLS = TURNS = False
+    """Whether the engine tells what contacts carry, friction included, and whether its planes turn."""
 
     def __init__(self, name: str, note: str, best: str = "") -> None:
         """`note`: what is worst, and why; `best` declares settings other than the engine's own; empty for those."""
@@ -131,6 +131,8 @@ class Free(ABC):
 
     def planes(self) -> Iterator[tuple[Surface, str, Array, Array]]:
         """The planes of the scene, as `Scene.planes`: a cylinder's are many, or the one that moves along."""
+        if any(surface.turning for surface in self.scene.surfaces) and not self.TURNS:
+            raise NotImplementedError("its planes don't turn")
         return self.scene.planes(1 if self.best else FACETS)
 
     @abstractmethod

@@ -29,15 +29,21 @@ told from what stays where it is."""
 class Bodies(Free):
     """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step."""
 
-    TELLS = True
+    TELLS = TURNS = True
     FEATURES: tuple[str, ...] = FEATURES
     TIMESTEPS: tuple[float, ...] = TIME_STEPS
 
     def __init__(
-        self, name: str, note: str, best: str = "", tune: Callable[[Any, Scene, float], None] | None = None
+        self,
+        name: str,
+        note: str,
+        best: str = "",
+        tune: Callable[[Any, Scene, float], None] | None = None,
+        declared: str = "",
     ) -> None:
+        """`tune` is that function; `declared` is for what `best`, a wall that goes along, doesn't declare."""
         super().__init__(name, note, best)
-        self.tune = tune
+        self.tune, self.DECLARED = tune, declared or self.DECLARED
 
     def make(self) -> None:
         spec = mujoco.MjSpec.from_string(self.scene.mjcf(self.timestep))
@@ -89,28 +95,20 @@ class Lawful(Bodies):
         self.whole = self.timestep
 
     def step(self, n: int) -> None:
+        model, data, slow = self.model, self.data, 2 * self.whole * float(np.linalg.norm(self.model.opt.gravity))
         for _ in range(n):
-            parts = _PARTS if self.lands() else 1
-            self.divide(self.whole / parts)
+            mujoco.mj_step1(model, data)
+            contact, seen = data.contact, data.contact.efc_address >= 0
+            speed, gap = data.efc_vel[contact.efc_address[seen]], contact.dist[seen]
+            # Whether a contact closes in this step or by the middle of the next, where a whole one would see it.
+            lands = ((speed < -slow) & (gap + 1.5 * self.whole * speed < 0)).any()
+            parts = _PARTS if lands else 1
+            if change := (self.whole / parts - self.timestep) / 2:  # positions are half a step ahead of velocities
+                mujoco.mj_integratePos(model, data.qpos, data.qvel, change)
+                self.timestep = model.opt.timestep = self.whole / parts
+                self.ahead, self.now = self.ahead + change, self.now + change
+                self.law.reset()
             super().step(parts)
-
-    def lands(self) -> bool:
-        """Whether a contact closes in this step or by the middle of the next, where a whole one would see it."""
-        mujoco.mj_step1(self.model, self.data)
-        contact, slow = self.data.contact, 2 * self.whole * float(np.linalg.norm(self.model.opt.gravity))
-        seen = contact.efc_address >= 0
-        speed, gap = self.data.efc_vel[contact.efc_address[seen]], contact.dist[seen]
-        return bool(((speed < -slow) & (gap + 1.5 * self.whole * speed < 0)).any())
-
-    def divide(self, timestep: float) -> None:
-        """Go on with other steps, and with positions half of one ahead of velocities."""
-        if timestep == self.timestep:
-            return
-        change = (timestep - self.timestep) / 2
-        mujoco.mj_integratePos(self.model, self.data.qpos, self.data.qvel, change)
-        self.timestep = self.model.opt.timestep = timestep
-        self.ahead, self.now = self.ahead + change, self.now + change
-        self.law.reset()
 
     def advance(self) -> None:
         self.law.step(self.data)

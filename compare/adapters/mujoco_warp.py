@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
 
 import mujoco
 import mujoco_warp as engine
@@ -32,10 +31,6 @@ class Warp(mujoco_free.Bodies):
 
     FEATURES = ("moving surface", "tripod", "disc")
 
-    def __init__(self, name: str, declared: str, tune: Any = None) -> None:
-        super().__init__(name, _WORST, tune=tune)
-        self.DECLARED = declared
-
     def make(self) -> None:
         super().make()
         model, data = self.model, self.data
@@ -57,5 +52,5 @@ class Warp(mujoco_free.Bodies):
         self.data.xfrc_applied.numpy()[0, self.number, :3] = force  # on a processor the engine's own memory
 
 
-defaults = Warp("mujoco-warp-defaults", mujoco_free.defaults.DECLARED)
-best = Warp("mujoco-warp", "elliptic cone, contact settings of the study", mujoco_free.studied)
+defaults = Warp("mujoco-warp-defaults", _WORST)
+best = Warp("mujoco-warp", _WORST, tune=mujoco_free.studied, declared="elliptic cone, contact settings of the study")

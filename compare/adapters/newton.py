@@ -45,8 +45,6 @@ class Newton(Free):
         if hasattr(self.solver, "register_custom_attributes"):
             self.solver.register_custom_attributes(builder)
         for surface, _, point, normal in self.planes():
-            if surface.turning:
-                raise NotImplementedError("its planes don't turn")
             material, own, at = rough(surface.friction**2 if rooted else 2 * surface.friction), -1, pose(point, normal)
             if self.goes_along(surface):
                 self.wall = own = builder.add_body(xform=at, mass=1.0, is_kinematic=True)

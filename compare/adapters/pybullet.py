@@ -41,8 +41,6 @@ class PyBullet(Free):
         engine.setGravity(0, 0, -scene.g * self.scale, **here)
         self.surfaces: dict[int, int] = {}
         for surface, _, point, normal in self.planes():
-            if surface.turning:
-                raise NotImplementedError("its planes don't turn")
             shape = engine.createCollisionShape(engine.GEOM_PLANE, planeNormal=[0, 0, 1], **here)
             self.wall = engine.createMultiBody(0, shape, **here)  # the last one is the one that moves
             self.surfaces[self.wall] = scene.surfaces.index(surface)

@@ -23,7 +23,7 @@ from model.arrays import Array
 class Rapier(Free):
     """A free body in Rapier."""
 
-    PRECISION = "f32"
+    PRECISION, TURNS = "f32", True
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")
     RESOLUTION = 1e-4
     SMALL = 16

@@ -42,8 +42,6 @@ class Sapien(Free):
         self.world = engine.Scene([physx.PhysxCpuSystem()])
         self.world.timestep = self.timestep
         for surface, _, point, normal in self.planes():
-            if surface.turning:
-                raise NotImplementedError("its planes don't turn")
             size: tuple[float, ...] = ()
             own = physx.PhysxRigidStaticComponent()
             if self.goes_along(surface):  # planes have no velocity

@@ -22,7 +22,6 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
 from mjsim.engine import EVENT_TIMES, check_timestep, sampling
 from model import Flow, Header, InputError, Parameters, State, Trajectory
-from model.arrays import Array
 from model.kinematics import Motion, check_place, frame, from_world, to_world
 from model.parameters import POSITIVE, check_number
 from model.trajectory import samples
@@ -167,46 +166,25 @@ class _Steps:
 
     def tell(self, last: bool) -> None:
         """Classify the steps noted since the last call, and keep the samples among them."""
-        steps, self._told = np.arange(self._told, self.done), self.done
-        time = np.asarray(steps * self.timestep, float)
-        block = _samples(time, self._rows[: len(steps)], self._theta, self.engine.ahead, self.p)
-        self._theta = block["theta"][-1] if len(block) else self._theta
-        self.classifier.add(_contacts(block, self.band, self.p), last)
+        steps, self._told, p = np.arange(self._told, self.done), self.done, self.p
+        rows = self._rows[: len(steps)]
+        motion = Motion(*np.split(rows[:, :9], 3, axis=1))
+        state, azimuth = from_world(motion, p)
+        theta = np.unwrap(np.append(self._theta, azimuth))
+        self._theta = float(theta[-1])
+        block = samples(np.asarray(steps * self.timestep, float), theta[1:], state, p)
+        # Forces are along the axes of where the ball was when they were found.
+        x, y, _ = (motion.position + self.engine.ahead * motion.velocity).T
+        axes = frame(np.arctan2(y, x))
+        for name, own in zip("AB", np.split(rows[:, 9:], 2, axis=1), strict=True):
+            block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
+            block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])
+        slips, gaps = (np.stack([block[f"{what}_{k}"] for k in "AB"], axis=-1) for what in ("slip_speed", "gap"))
+        A, B = block["force_A"], block["force_B"]
+        loads = np.stack([A[:, 1], B[:, 0]], axis=-1)
+        used = np.stack([np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])], axis=-1)
+        if np.isnan(A).any():  # a closed contact bears 1 N, and uses all of its friction if it slips
+            loads = (gaps < _REACH * p.r) * 1.0
+            used = np.array([p.mu, p.eta]) * loads * (slips > 3 * self.band)
+        self.classifier.add(Contacts(loads, used, slips, gaps), last)
         self.kept.append(block[steps % self.every == 0])
-
-
-def _samples(time: Array, rows: Array, theta: float, ahead: float, p: Parameters) -> npt.NDArray[np.void]:
-    """Samples of dtype `SAMPLE`, shape (n,), all but the case; azimuths go on from `theta`, rad.
-
-    Forces are along the axes of where the ball was when they were found, `ahead` of the velocities in s.
-    """
-    motion = Motion(*np.split(rows[:, :9], 3, axis=1))
-    state, azimuth = from_world(motion, p)
-    block = samples(time, np.unwrap(np.append(theta, azimuth))[1:], state, p)
-    x, y, _ = (motion.position + ahead * motion.velocity).T
-    axes = frame(np.arctan2(y, x))
-    for name, own in zip("AB", np.split(rows[:, 9:], 2, axis=1), strict=True):
-        block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
-        block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])
-    return block
-
-
-def _contacts(block: npt.NDArray[np.void], band: float, p: Parameters) -> Contacts:
-    """Loads, friction, slip speeds and gaps of both contacts at samples (n,), for the classifier.
-
-    Where forces aren't known a closed contact bears 1 N, and uses all of its friction if it slips.
-    """
-    A, B = block["force_A"].copy(), block["force_B"].copy()
-    if np.isnan(A).any():
-        A[:], B[:] = 0.0, 0.0
-        A[:, 1], B[:, 0] = block["gap_A"] < _REACH * p.r, block["gap_B"] < _REACH * p.r
-        fast = 3 * band
-        A[:, 2] = p.mu * A[:, 1] * (block["slip_speed_A"] > fast)
-        B[:, 2] = p.eta * B[:, 0] * (block["slip_speed_B"] > fast)
-    each = (
-        (A[:, 1], B[:, 0]),
-        (np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])),
-        (block["slip_speed_A"], block["slip_speed_B"]),
-        (block["gap_A"], block["gap_B"]),
-    )
-    return Contacts(*(np.stack(pair, axis=-1) for pair in each))

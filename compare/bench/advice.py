@@ -111,8 +111,10 @@ class AtRest:
         """How bad each contact is, (n,), by each of `FAULTS`: its value divided by the largest that passes for good."""
         law = c.law()
         speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
+        pair = np.unique(c.geoms, axis=0, return_inverse=True)[1].ravel()
+        slides = np.isin(pair, pair[law.slides & ~self.moves])  # as a whole, if one of its contacts does
         return {
-            "creep": np.where(self.moves, 0, speed / self.creep),
+            "creep": np.where(self.moves | slides, 0, speed / self.creep),
             "depth": np.where(self.moves, 0, law.depth / self.depth),
             "largest_step": np.full(len(speed), 0.0 if c.stable(c.timestep) else 2.0),
         }

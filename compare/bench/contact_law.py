@@ -90,9 +90,19 @@ class Contacts:
         found: Array = self.inverse_mass * edges
         return found
 
+    @np.errstate(all="ignore")  # what is not chosen divides by zero
     def reference(self, solref: Array) -> tuple[Array, Array]:
-        """Stiffness and damping of rows of these contacts, see the function `reference`."""
-        return reference(solref, self.solimp, self.timestep, self.discrete, self.refsafe)
+        """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine replaces."""
+        high = np.clip(self.solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
+        time, ratio = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref).T
+        if self.refsafe and self.discrete:
+            shortest = np.where(time * ratio < self.timestep, self.timestep / (np.sqrt(high) * ratio), time)
+            time = np.where(time > 0, shortest, time)
+        elif self.refsafe:
+            time = np.where(time > 0, np.maximum(time, 2 * self.timestep), time)
+        positive = time > 0
+        stiffness = np.where(positive, 1 / (high * time * ratio) ** 2, -time / high**2)
+        return stiffness, np.where(positive, 2 / (high * time), -ratio / high)
 
     @cached_property
     def _springs(self) -> tuple[Array, Array, Array]:
@@ -108,33 +118,35 @@ class Contacts:
 
     def _rows(self, depth: Array) -> tuple[Array, Array, Array]:
         """Softness of a row, its stiffness, and the damping of friction as a steady state sees it."""
-        (spring, b, b_f), d, h = self._springs, impedance(self.solimp, depth), self.timestep
+        (spring, b, b_f), h = self._springs, self.timestep
+        low, high, middle = np.clip(self.solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
+        width, power = np.maximum(self.solimp[:, 2], 1e-15), np.maximum(self.solimp[:, 4], 1)
+        x = np.minimum(depth / width, 1)
+        rising, falling = x**power / middle ** (power - 1), (1 - x) ** power / (1 - middle) ** (power - 1)
+        d = low + (high - low) * np.where(x <= middle, rising, 1 - falling)  # the impedance
         softness, k = (1 - d) / d * self.softness, spring * d
         if not self.discrete:
             return softness, k, b_f
         return softness, k, b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
 
-    def _load_at(self, depth: Array, slides: Array) -> Array:
-        """The load that contacts bear at a depth, N; `slides` says which slip."""
-        softness, k, damping = self._rows(depth)
-        x, load = k * depth / softness, self.force[:, 0]
-        sliding = damping[:, None] * self.friction * np.abs(self.slip) / softness[:, None] * self._frictional
-        if self.pyramidal:
-            edge = np.maximum(2 * x[:, None], np.where(slides[:, None], x[:, None] + sliding, self._scaled_friction))
-            return np.where(self.dim > 1, (edge * self._frictional).sum(1), x)
-        kept = self.friction[:, 0] ** 2 / self.impratio * load
-        return x + np.where(slides, np.maximum(np.hypot.reduce(sliding, 1) - kept, 0), 0)
-
     def _depth(self, slides: Array) -> Array:
-        """Depth below the margin at which contacts bear their loads, by bisection, m."""
+        """Depth below the margin at which contacts bear their loads, by bisection, m; `slides` says which slip."""
         load = self.force[:, 0]
-        low = np.zeros(len(load))
+        low, kept = np.zeros(len(load)), self.friction[:, 0] ** 2 / self.impratio * load
         softness, k, _ = self._rows(low)
         high = 1.01 * softness * load / k
         for _ in range(100):
             middle = (low + high) / 2
-            above = self._load_at(middle, slides) - load > 0
-            low, high = np.where(above, low, middle), np.where(above, middle, high)
+            softness, k, damping = self._rows(middle)
+            x = k * middle / softness
+            sliding = damping[:, None] * self.friction * np.abs(self.slip) / softness[:, None] * self._frictional
+            if self.pyramidal:
+                edge = np.where(slides[:, None], x[:, None] + sliding, self._scaled_friction)
+                edges = (np.maximum(2 * x[:, None], edge) * self._frictional).sum(1)
+                borne = np.where(self.dim > 1, edges, x)
+            else:
+                borne = x + np.where(slides, np.maximum(np.hypot.reduce(sliding, 1) - kept, 0), 0)
+            low, high = np.where(borne > load, low, middle), np.where(borne > load, middle, high)
         return np.asarray((low + high) / 2)
 
     @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
@@ -236,32 +248,6 @@ class Law:
     damping: Array
 
 
-def impedance(solimp: Array, depth: Array) -> Array:
-    """The impedance d at a depth below the margin, of contacts with these `solimp` (n, 5)."""
-    low, high, middle = np.clip(solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
-    width, power = np.maximum(solimp[:, 2], 1e-15), np.maximum(solimp[:, 4], 1)
-    x = np.minimum(depth / width, 1)
-    rising, falling = x**power / middle ** (power - 1), (1 - x) ** power / (1 - middle) ** (power - 1)
-    d: Array = low + (high - low) * np.where(x <= middle, rising, 1 - falling)
-    return d
-
-
-@np.errstate(all="ignore")  # what is not chosen divides by zero
-def reference(
-    solref: Array, solimp: Array, timestep: float, discrete: bool = False, refsafe: bool = True
-) -> tuple[Array, Array]:
-    """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine replaces."""
-    high = np.clip(solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
-    time, ratio = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref).T
-    if refsafe and discrete:
-        time = np.where((time > 0) & (time * ratio < timestep), timestep / (np.sqrt(high) * ratio), time)
-    elif refsafe:
-        time = np.where(time > 0, np.maximum(time, 2 * timestep), time)
-    positive = time > 0
-    stiffness = np.where(positive, 1 / (high * time * ratio) ** 2, -time / high**2)
-    return stiffness, np.where(positive, 2 / (high * time), -ratio / high)
-
-
 def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     """The contacts that carry more than a faint load at a state, and their numbers in `data`."""
     twin = copy.copy(model)  # in it each row is a direction of a contact, whatever the cone and the integrator
@@ -276,7 +262,12 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     force = np.zeros((len(number), 6))
     for k, each in enumerate(number):
         mujoco.mj_contactForce(model, data, each, force[k])
-    bears = force[:, 0] > FAINT * weights(model)[model.geom_bodyid[found.geom[number]]].min(1)
+    # The weight of each body with all that is welded to it, N; inf if no joint moves it, 0 without gravity.
+    welded = np.bincount(model.body_weldid, model.body_mass, model.nbody)[model.body_weldid]
+    weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+    g = 0.0 if weightless else np.hypot.reduce(model.opt.gravity)
+    weights = np.where(model.body_dofnum[model.body_weldid] > 0, g * welded, np.inf if g else 0)
+    bears = force[:, 0] > FAINT * weights[model.geom_bodyid[found.geom[number]]].min(1)
     number, force = number[bears], force[bears]
     first, dim = state.contact.efc_address[number], found.dim[number]
     row = np.minimum(first[:, None] + np.arange(6), max(state.nefc - 1, 0))
@@ -299,15 +290,6 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
         **parameters(model, data, number),
     )
     return described, number
-
-
-def weights(model: Any) -> Array:
-    """The weight of each body with all that is welded to it, N; inf if no joint moves it, 0 without gravity."""
-    mass = np.bincount(model.body_weldid, model.body_mass, model.nbody)[model.body_weldid]
-    moved = model.body_dofnum[model.body_weldid] > 0
-    weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
-    g = 0.0 if weightless else np.hypot.reduce(model.opt.gravity)
-    return np.where(moved, g * mass, np.inf if g else 0)
 
 
 def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:

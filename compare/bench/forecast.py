@@ -30,7 +30,6 @@ from compare.bench.settled import (
     loads_by_pair,
     measured_slip,
     radii,
-    recording_loads,
     settle,
     step_to_most_contacts,
     with_control,
@@ -182,8 +181,14 @@ def _measured(
     moves = np.array([not moving.keys().isdisjoint(both) for both in bodies.tolist()])
     radius = radii(model)[bodies].min(1)
     history: list[dict[tuple[int, int], Array]] = []
+
+    def step_and_record(model: Any, data: Any, nstep: int) -> None:
+        for _ in range(nstep):
+            step(model, data, 1)
+            history.append(loads_by_pair(model, data))
+
     time = WINDOW if settled.steady and not moving else SECOND
-    found = measured_slip(model, data, those, number, recording_loads(step, history), time)
+    found = measured_slip(model, data, those, number, step_and_record, time)
     now = loads_by_pair(model, start)
     for pair in np.unique(those.geoms, axis=0):
         part, key = (those.geoms == pair).all(1), tuple(pair.tolist())
@@ -211,7 +216,7 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
     for k, (first, second) in enumerate(geoms):
         part = belongs.ravel() == k
         own = those.subset(part)
-        largest, slides = own.largest_step(), bool((law.slides & ~moves)[part].any())
+        largest = own.largest_step()
         harm = {name: float(values[part].max()) for name, values in harms.items()}
         pairs.append(
             PairForecast(
@@ -220,11 +225,11 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
                 moves=bool(moves[part].any()),
                 parts=own.parts,
                 load=float(own.force[:, 0].sum()),
-                slides=slides,
+                slides=bool((law.slides & ~moves)[part].any()),
                 hover=float(law.hover[part].min()),
                 largest_step=largest,
                 replaced=dict(replacements(scene.model, own, names)),
-                harm=harm | {"largest_step": those.timestep / largest} | ({"creep": 0.0} if slides else {}),
+                harm=harm | {"largest_step": those.timestep / largest},
                 **{name: float(values[part].max()) for name, values in told.items()},
             )
         )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from compare.bench.advice import FAULTS
 from compare.bench.contact_law import FAINT
-from compare.bench.forecast import SHOWN, Forecast, PairForecast
+from compare.bench.forecast import SHOWN, Forecast
 from compare.bench.settled import NOISE, few
 from compare.kit import pages
 
@@ -54,19 +54,14 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield f"MuJoCo puts to sleep, so that nothing creeps till it wakes: {few(f.settled.asleep)}. Forecast awake."
     if stuck := [p.name for p in f.pairs if not p.parts]:
         yield f"No joint can part these; they bear what the overlap they were built with asks for: {few(stuck)}."
-    yield from _replaced(f.pairs)
+    for kind in dict.fromkeys(kind for p in f.pairs for kind in p.replaced):
+        those = [p for p in f.pairs if kind in p.replaced]
+        more = f", and at {len(those) - 1} more" if len(those) > 1 else ""
+        yield f"MuJoCo replaces {kind} at {those[0].name}{more}: {those[0].replaced[kind]}."
     if math.isfinite(f.largest_step):
         yield f"The contacts are stable up to a step of {1e3 * f.largest_step:.3g} ms (now {1e3 * f.timestep:g} ms)."
     if f.flexible:
         yield f"{f.flexible} contacts of flexible bodies are left out."
-
-
-def _replaced(pairs: Sequence[PairForecast]) -> Iterator[str]:
-    """A sentence for each kind of parameter in whose place MuJoCo takes another, with an example."""
-    for kind in dict.fromkeys(kind for p in pairs for kind in p.replaced):
-        those = [p for p in pairs if kind in p.replaced]
-        more = f", and at {len(those) - 1} more" if len(those) > 1 else ""
-        yield f"MuJoCo replaces {kind} at {those[0].name}{more}: {those[0].replaced[kind]}."
 
 
 def _number(value: float, factor: float = 1, endless: str = "any") -> str:

@@ -117,13 +117,10 @@ def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
 
 def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
     """Engines that were tried in some case; those that pass the largest share first, as they come behind all others."""
-
-    def rank(name: str) -> tuple[bool, float]:
-        own = [result.passed for result in league[name] if not result.skipped]
-        return name.endswith("-defaults"), -statistics.mean(own)
-
-    there = [name for name, results in league.items() if not all(result.skipped for result in results)]
-    return {name: league[name] for name in sorted(there, key=rank)}
+    tried = {name: [result.passed for result in results if not result.skipped] for name, results in league.items()}
+    there = [name for name, own in tried.items() if own]
+    there.sort(key=lambda name: (name.endswith("-defaults"), -statistics.mean(tried[name])))
+    return {name: league[name] for name in there}
 
 
 def cell(result: Result) -> str:
@@ -145,21 +142,14 @@ def number(value: float, floor: float) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
-def worst_result(results: Sequence[Result]) -> Result | None:
-    """The result with the greatest error, one that failed before all others; None if no case was tried."""
-    tried = [result for result in results if not result.skipped]
-    return max(tried, key=lambda r: r.error if math.isfinite(r.error) else math.inf, default=None)
-
-
 def declarations(league: Mapping[str, Sequence[Result]]) -> Rows:
     """What each engine that was tried declares, its worst case and why; `notes` say why others were not."""
     table = [["engine", "version", "declared", "worst case", "why"]]
     for name, results in league.items():
-        engine, found = results[0].engine, worst_result(results)
-        if found is None:
-            continue
-        failed = f": {found.failure}" if found.failure else ""
-        table.append([name, engine.version, engine.declared, f"{found.case}, {cell(found)}{failed}", engine.note])
+        if tried := [result for result in results if not result.skipped]:
+            worst = max(tried, key=lambda r: r.error if math.isfinite(r.error) else math.inf)
+            engine, failed = worst.engine, f": {worst.failure}" if worst.failure else ""
+            table.append([name, engine.version, engine.declared, f"{worst.case}, {cell(worst)}{failed}", engine.note])
     return table
 
 
@@ -180,8 +170,7 @@ def to_mapping(league: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
         name: [vars(result) | {"order": result.order, "passed": result.passed} for result in results]
         for name, results in league.items()
     }
-    data: dict[str, Any] = plain({"version": VERSION, "tolerance": TOLERANCE, "engines": entries})
-    return data
+    return dict(plain({"version": VERSION, "tolerance": TOLERANCE, "engines": entries}))
 
 
 def _median(values: Iterator[float]) -> float:

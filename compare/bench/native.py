@@ -167,7 +167,5 @@ on_joints = PlainOnJoints(
     "mujoco-plain",
     "contacts soft enough for sliding let a ball that lands sink in and throw it back",
     tune=studied,
-)
-on_joints.DECLARED = (
-    "the ball in the vessel on joints: azimuth, radius, height, spin; elliptic cone, settings of the study"
+    declared="the ball in the vessel on joints: azimuth, radius, height, spin; elliptic cone, settings of the study",
 )

@@ -139,8 +139,13 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
         restless[0] = False  # the world
         calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0  # a speed may pass through a maximum
     moving = {int(b): f"{_body_name(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
-    steady = bool((change <= STEADY * speed + NOISE).all())
-    return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(_asleep(sleepy, model, data, step)))
+    steady, asleep = bool((change <= STEADY * speed + NOISE).all()), []
+    if sleepy is not model:  # what it puts to sleep at once if it may
+        state = copy.copy(data)
+        step(sleepy, state, 2 * mujoco.mjMINAWAKE)
+        trees = np.flatnonzero(state.tree_asleep >= 0)
+        asleep = [_body_name(model, int(np.flatnonzero(model.body_treeid == tree)[0])) for tree in trees]
+    return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(asleep))
 
 
 def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
@@ -159,15 +164,6 @@ def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
         if bent[own].max() > BENT and sunk > SUNK * size:
             by = f"joint {joint.name or joint.id!r} by {bent[own].max():.2g} rad"
             yield f"{_body_name(model, root)} by {sunk:.2g} m, its {by}"
-
-
-def _asleep(sleepy: Any, model: Any, data: Any, step: Advance) -> Iterator[str]:
-    """Bodies that MuJoCo puts to sleep at once if it may, in words."""
-    if sleepy is not model:
-        state = copy.copy(data)
-        step(sleepy, state, 2 * mujoco.mjMINAWAKE)
-        for tree in np.flatnonzero(state.tree_asleep >= 0):
-            yield _body_name(model, int(np.flatnonzero(model.body_treeid == tree)[0]))
 
 
 def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array:
@@ -213,17 +209,6 @@ def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
             friction = force[1:3] @ data.contact.frame[k, 3:].reshape(2, 3)
             found[tuple(geoms)] = found.get(tuple(geoms), 0) + np.array([force[0], depth, 1, *friction])
     return found
-
-
-def recording_loads(step: Advance, history: list[dict[tuple[int, int], Array]]) -> Advance:
-    """A law of stepping that appends what pairs of geoms bear in each step to `history`."""
-
-    def step_and_record(model: Any, data: Any, nstep: int) -> None:
-        for _ in range(nstep):
-            step(model, data, 1)
-            history.append(loads_by_pair(model, data))
-
-    return step_and_record
 
 
 def measured_slip(model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float) -> dict[str, Array]:
