@@ -1,8 +1,8 @@
 """Exact cases in closed form: a block or a ball on a surface, or in a groove.
 
 Each course is written as a function of time and of the constants that a wrong engine or theory would have otherwise;
-the wrong answers of a case are the same course with other constants. Moments of a uniform sphere: j = 2/5. First the
-courses, then the table of cases.
+the wrong answers of a case are the same course with other constants. Above a course stands its case, or below it, if it
+has several. Moments of a uniform sphere: j = 2/5.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from model.arrays import Array
 G, J = 9.81, 0.4
 RADIUS, BLOCK, MU = 0.1, (0.1, 0.1, 0.05), 0.5
 """Radius of the spheres and half edges of the blocks, m; all weigh 1 kg; friction of most surfaces."""
+CLOSED_FORMS: list[Callable[[], Case]] = []
+"""Functions that make these cases, in the order in which they are listed."""
 CLOSED = 1e-14
 """Round-off of a closed form, in units of the scales."""
 SPEED_ALONE = (math.inf, 0.01, math.inf)
@@ -36,11 +38,11 @@ Course = Callable[..., _Motion]
 
 
 def closed_form(
+    course: Course,
     name: str,
     about: str,
     body: Mapping[str, Any],
     surfaces: tuple[Surface, ...],
-    course: Course,
     *,
     wrong: Mapping[str, Mapping[str, Any]],
     until: float,
@@ -79,6 +81,19 @@ def closed_form(
     )
 
 
+def case(forms: list[Callable[[], Case]], *row: Any, **given: Any) -> Callable[[Course], Course]:
+    """A decorator that adds the case of a course to `forms`, with what else `closed_form` takes."""
+
+    def add(course: Course) -> Course:
+        forms.append(partial(closed_form, course, *row, **given))
+        return course
+
+    return add
+
+
+_case = partial(case, CLOSED_FORMS)
+
+
 def block(tilt: float = 0.0) -> dict[str, Any]:
     """A block turned about the y axis by an angle, as fields of `Body`."""
     x, y, z = (2 * half for half in BLOCK)
@@ -104,6 +119,7 @@ def along(way: Array, s: Any, v: Any, spin: Any, start: Any) -> _Motion:
     return start + np.outer(s, way), np.outer(v, way), np.outer(spin, across)
 
 
+# fmt: off
 def _slides_down(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> _Motion:
     """A block on a slope with a speed v at first; where friction is the stronger it stops and doesn't start again."""
     way, normal = slope(angle)
@@ -113,17 +129,35 @@ def _slides_down(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> _Mot
     return along(way, v * t + a * t**2 / 2, v + a * t, 0 * t, BLOCK[2] * np.array(normal))
 
 
-def _on_slope(tangent: float, v: float) -> dict[str, Any]:
-    """A block with a speed v on a slope of this tangent, as a case has it."""
-    angle = math.atan(tangent)
-    return {
-        "body": block(angle),
-        "surfaces": (Surface("floor", MU, normal=slope(angle)[1]),),
-        "course": partial(_slides_down, angle=angle, v=v),
-        "source": "Coulomb's law with Newton's second, integrated by hand",
-    }
+def _on_slope(tangent: float, v: float, *row: str, **given: Any) -> None:
+    """Add the case of a block with a speed v on a slope of this tangent."""
+    angle, source = math.atan(tangent), "Coulomb's law with Newton's second, integrated by hand"
+    floor = Surface("floor", MU, normal=slope(angle)[1])
+    _case(*row, block(angle), (floor,), source=source, **given)(partial(_slides_down, angle=angle, v=v))
 
 
+_on_slope(
+    0.9 * MU, 0.0, "block-rests", "a block on a slope whose tangent is 0.9 of its friction must not move",
+    wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.85 * MU}},
+    until=2.0, scales=SPEED_ALONE, contacts=("R",))
+_on_slope(
+    1.25 * MU, 0.0,
+    "block-slides", "a block on a slope whose tangent is 1.25 of its friction slides down at g (sin - mu cos)",
+    wrong={"no friction": {"mu": 0.0}, "friction 5 % too strong": {"mu": 1.05 * MU},
+           "a threshold at 1.3 of Coulomb's": {"mu": 1.3 * MU}},
+    until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S",))
+_on_slope(
+    0.0, 2.0, "box-stops", "a box that is pushed off at 2 m/s slides v^2/(2 mu g) on a level floor, stops and stays",
+    wrong={"friction 5 % too weak": {"mu": 0.95 * MU}, "no friction": {"mu": 0.0}},
+    until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S", 2.0 / (MU * G), "R"))
+
+
+@_case(
+    "growing-pull", "a block under a force that grows by 10 N a second breaks away at mu m g and then slides",
+    block(), (Surface("floor", MU),),
+    wrong={"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
+    until=1.0, scales=(0.1, 0.5, math.inf), contacts=("R", MU * G / 10.0, "S"),
+    source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive", growth=(10.0, 0.0, 0.0))
 def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> _Motion:
     """A block pulled by a force that grows by 10 N each second: it slides once that is more than friction can hold."""
     late = np.maximum(t - grip * mu * G / 10.0, 0.0)
@@ -135,6 +169,14 @@ _PUSH = G / (0.5 * MU)
 """Force at which half of the friction of a wall carries a block, N."""
 
 
+@_case(
+    "pinched-block",
+    "a block is pressed against a vertical wall, half of the friction there is carries it: it must not move",
+    block(), (Surface("wall", MU, normal=(-1.0, 0.0, 0.0)),),
+    wrong={"friction of 0.45 of Coulomb's": {"mu": 0.45 * MU}},
+    until=2.0, scales=SPEED_ALONE, contacts=("R",),
+    source="statics: half of mu times the force carries the weight, the pressure stays on the face",
+    pull=(_PUSH, 0.0, 0.0))
 def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
     """A block pressed to a wall: friction holds it, or it falls along the wall."""
     fall = max(G - mu * _PUSH, 0.0)
@@ -142,6 +184,13 @@ def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
     return start - np.outer(fall * t**2 / 2, UP), -np.outer(fall * t, UP), np.zeros((len(t), 3))
 
 
+@_case(
+    "sphere-slides-rolls",
+    "a sphere that is pushed off at 2 m/s without spin slides, then rolls on at 5/7 of its speed",
+    sphere(), (Surface("floor", 0.2),),
+    wrong={"a hollow sphere": {"j": 2 / 3}, "friction 5 % too weak": {"mu": 0.19}, "it slides on": {"j": 1e9}},
+    until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
+    source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)")
 def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
     """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)), then rolls."""
     slid = np.minimum(t, 2.0 / (mu * G * (1 + 1 / j)))
@@ -159,8 +208,27 @@ def _rolls_down(t: Array, angle: float, mu: float = 0.5, j: float = J) -> _Motio
 
 _GENTLE, _STEEP = math.atan(0.5), math.atan(2.5)
 """Slopes on which a sphere rolls, and on which it slips."""
+_case(
+    "sphere-rolls-down", "a sphere rolls down a slope from rest at 5/7 g sin",
+    sphere(), (Surface("slope", 0.5, normal=slope(_GENTLE)[1]),),
+    wrong={"it slides without friction": {"mu": 0.0}, "a hollow sphere": {"j": 2 / 3}},
+    until=1.0, scales=(1.0, 2.0, 20.0), contacts=("R",), source="Newton and Euler: (1 + j) a = g sin",
+)(partial(_rolls_down, angle=_GENTLE))
+_case(
+    "sphere-slips-down",
+    "a sphere on a slope too steep for rolling, tan > 7/2 mu, slips down and is spun up by friction",
+    sphere(), (Surface("slope", 0.5, normal=slope(_STEEP)[1]),),
+    wrong={"it rolls": {"j": J, "mu": 10.0}, "friction 5 % too strong": {"mu": 0.525}},
+    until=0.5, scales=(1.0, 2.0, 20.0), contacts=("S",),
+    source="Newton and Euler: a = g (sin - mu cos), j r spin' = mu g cos",
+)(partial(_rolls_down, angle=_STEEP))
 
 
+@_case(
+    "drilling-sphere",
+    "a sphere spins about the vertical on a point, where friction has no arm: it spins for ever",
+    sphere(), (Surface("floor", MU),), wrong={"a damping of 5 % a second": {"decay": 0.05}},
+    until=2.0, scales=(0.1, 1.0, 20.0), contacts=("R",), source="a point contact carries no moment")
 def _spins_on_the_spot(t: Array, decay: float = 0.0) -> _Motion:
     """A sphere that spins about the vertical for ever."""
     return RADIUS * UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), UP)
@@ -170,6 +238,12 @@ _TURNING = 3.0
 """Of the turntable, rad/s."""
 
 
+@_case(
+    "turntable", "a ball rolls on a table that turns at 3 rad/s, and circles at 2/7 of that",
+    sphere(), (Surface("table", 0.5, turning=_TURNING),),
+    wrong={"a hollow sphere": {"j": 2 / 3}, "it goes with the table": {"j": 1e9}},
+    until=4.0, scales=(0.5, 0.5, 15.0), contacts=("R",),
+    source="Weltner, Am. J. Phys. 47 (1979): v' = 2/7 turning z x v for a uniform ball")
 def _circles_on_turntable(t: Array, j: float = J) -> _Motion:
     """A sphere on a turntable, x'' = k turning z x x' with k = j/(1 + j), that circles about the table's axis."""
     k = _TURNING * j / (1 + j)
@@ -185,6 +259,14 @@ _CYLINDER = Parameters(m=1.0, r=RADIUS, R=_ORBIT, j=J, mu=1.0, eta=1.0, g=G, c=0
 """The same in the study's vessel, far above its floor."""
 
 
+@_case(
+    "cylinder",
+    "a ball rolls round inside a vertical cylinder: it comes down and rises again, at sqrt(2/7) of its orbit",
+    sphere(), (Surface("wall", 1.0, radius=_ORBIT + RADIUS),),
+    wrong={"a hollow sphere": {"j": 2 / 3}, "it falls freely": {"j": 1e-9}},
+    until=2.0, scales=(1.0, 8.0, 80.0), contacts=("R",),
+    source="Newton and Euler in the turning frame: the spin along the radius changes with height",
+    motion=(_CYLINDER, State(y=10.0, omega_c=_TURNS, slip_x=-_TURNS * _ORBIT / RADIUS)))
 def _rolls_in_cylinder(t: Array, j: float = J) -> _Motion:
     """A sphere rolling round in a cylinder: z'' = -g/(1 + j) - k^2 z with k = turns sqrt(j/(1 + j))."""
     k = _TURNS * math.sqrt(j / (1 + j))
@@ -216,99 +298,24 @@ def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> 
 _PINCHED = math.atan(0.9 * 0.5 / math.sqrt(0.5))
 """A groove in which a cube stays."""
 _IN_GROOVE = "Newton and Euler; by symmetry both planes carry m g cos/sqrt(2)"
-
-
-def _edge_down(angle: float) -> dict[str, Any]:
-    """A cube on an edge on a slope, as fields of `Body`."""
-    turn, across = (math.cos(angle / 2), math.sin(angle / 2)), (math.cos(math.pi / 8), math.sin(math.pi / 8))
-    orientation = (turn[0] * across[0], turn[0] * across[1], turn[1] * across[0], -turn[1] * across[1])
-    size, moments = (RADIUS,) * 3, (0.04 / 6,) * 3
-    return {"shape": "box", "size": size, "mass": 1.0, "inertia": moments, "orientation": orientation}
-
-
-# fmt: off
-CLOSED_FORMS: list[Callable[[], Case]] = [
-    partial(
-        closed_form, "block-rests", "a block on a slope whose tangent is 0.9 of its friction must not move",
-        **_on_slope(0.9 * MU, 0.0), wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.85 * MU}},
-        until=2.0, scales=SPEED_ALONE, contacts=("R",)),
-    partial(
-        closed_form,
-        "block-slides", "a block on a slope whose tangent is 1.25 of its friction slides down at g (sin - mu cos)",
-        **_on_slope(1.25 * MU, 0.0),
-        wrong={"no friction": {"mu": 0.0}, "friction 5 % too strong": {"mu": 1.05 * MU},
-               "a threshold at 1.3 of Coulomb's": {"mu": 1.3 * MU}},
-        until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S",)),
-    partial(
-        closed_form,
-        "box-stops", "a box that is pushed off at 2 m/s slides v^2/(2 mu g) on a level floor, stops and stays",
-        **_on_slope(0.0, 2.0), wrong={"friction 5 % too weak": {"mu": 0.95 * MU}, "no friction": {"mu": 0.0}},
-        until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S", 2.0 / (MU * G), "R")),
-    partial(
-        closed_form,
-        "growing-pull", "a block under a force that grows by 10 N a second breaks away at mu m g and then slides",
-        block(), (Surface("floor", MU),), _pulled_ever_harder,
-        wrong={"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
-        until=1.0, scales=(0.1, 0.5, math.inf), contacts=("R", MU * G / 10.0, "S"),
-        source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive", growth=(10.0, 0.0, 0.0)),
-    partial(
-        closed_form, "pinched-block",
-        "a block is pressed against a vertical wall, half of the friction there is carries it: it must not move",
-        block(), (Surface("wall", MU, normal=(-1.0, 0.0, 0.0)),), _pressed_to_wall,
-        wrong={"friction of 0.45 of Coulomb's": {"mu": 0.45 * MU}},
-        until=2.0, scales=SPEED_ALONE, contacts=("R",),
-        source="statics: half of mu times the force carries the weight, the pressure stays on the face",
-        pull=(_PUSH, 0.0, 0.0)),
-    partial(
-        closed_form, "sphere-slides-rolls",
-        "a sphere that is pushed off at 2 m/s without spin slides, then rolls on at 5/7 of its speed",
-        sphere(), (Surface("floor", 0.2),), _slides_then_rolls,
-        wrong={"a hollow sphere": {"j": 2 / 3}, "friction 5 % too weak": {"mu": 0.19}, "it slides on": {"j": 1e9}},
-        until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
-        source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)"),
-    partial(
-        closed_form, "sphere-rolls-down", "a sphere rolls down a slope from rest at 5/7 g sin",
-        sphere(), (Surface("slope", 0.5, normal=slope(_GENTLE)[1]),), partial(_rolls_down, angle=_GENTLE),
-        wrong={"it slides without friction": {"mu": 0.0}, "a hollow sphere": {"j": 2 / 3}},
-        until=1.0, scales=(1.0, 2.0, 20.0), contacts=("R",), source="Newton and Euler: (1 + j) a = g sin"),
-    partial(
-        closed_form, "sphere-slips-down",
-        "a sphere on a slope too steep for rolling, tan > 7/2 mu, slips down and is spun up by friction",
-        sphere(), (Surface("slope", 0.5, normal=slope(_STEEP)[1]),), partial(_rolls_down, angle=_STEEP),
-        wrong={"it rolls": {"j": J, "mu": 10.0}, "friction 5 % too strong": {"mu": 0.525}},
-        until=0.5, scales=(1.0, 2.0, 20.0), contacts=("S",),
-        source="Newton and Euler: a = g (sin - mu cos), j r spin' = mu g cos"),
-    partial(
-        closed_form, "drilling-sphere",
-        "a sphere spins about the vertical on a point, where friction has no arm: it spins for ever",
-        sphere(), (Surface("floor", MU),), _spins_on_the_spot,
-        wrong={"a damping of 5 % a second": {"decay": 0.05}},
-        until=2.0, scales=(0.1, 1.0, 20.0), contacts=("R",), source="a point contact carries no moment"),
-    partial(
-        closed_form, "turntable", "a ball rolls on a table that turns at 3 rad/s, and circles at 2/7 of that",
-        sphere(), (Surface("table", 0.5, turning=_TURNING),), _circles_on_turntable,
-        wrong={"a hollow sphere": {"j": 2 / 3}, "it goes with the table": {"j": 1e9}},
-        until=4.0, scales=(0.5, 0.5, 15.0), contacts=("R",),
-        source="Weltner, Am. J. Phys. 47 (1979): v' = 2/7 turning z x v for a uniform ball"),
-    partial(
-        closed_form, "cylinder",
-        "a ball rolls round inside a vertical cylinder: it comes down and rises again, at sqrt(2/7) of its orbit",
-        sphere(), (Surface("wall", 1.0, radius=_ORBIT + RADIUS),), _rolls_in_cylinder,
-        wrong={"a hollow sphere": {"j": 2 / 3}, "it falls freely": {"j": 1e-9}},
-        until=2.0, scales=(1.0, 8.0, 80.0), contacts=("R",),
-        source="Newton and Euler in the turning frame: the spin along the radius changes with height",
-        motion=(_CYLINDER, State(y=10.0, omega_c=_TURNS, slip_x=-_TURNS * _ORBIT / RADIUS))),
-    partial(
-        closed_form, "groove-rolls", "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
-        sphere(), _groove(_GENTLE, 0.5), partial(_descends, angle=_GENTLE),
-        wrong={"on one point, 5/7 g sin": {"lever": J}, "a hollow sphere": {"lever": 4 / 3}},
-        until=1.0, scales=(1.0, 2.0, 30.0), contacts=("RR",), source=_IN_GROOVE),
-    partial(
-        closed_form, "groove-rests",
-        "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
-        _edge_down(_PINCHED), _groove(_PINCHED, 0.5), partial(_descends, angle=_PINCHED, lever=math.inf),
-        wrong={"a threshold as on a plane": {"mu": 0.5 * math.sqrt(0.5)}, "at 0.85 of Coulomb's": {"mu": 0.425}},
-        until=2.0, scales=SPEED_ALONE, contacts=("RR",), source=_IN_GROOVE),
-]
-"""A function that makes the case, for each."""
+_TURN, _ACROSS = _PINCHED / 2, math.pi / 8
+_CUBE = {
+    "shape": "box", "size": (RADIUS,) * 3, "mass": 1.0, "inertia": (0.04 / 6,) * 3,
+    "orientation": (math.cos(_TURN) * math.cos(_ACROSS), math.cos(_TURN) * math.sin(_ACROSS),
+                    math.sin(_TURN) * math.cos(_ACROSS), -math.sin(_TURN) * math.sin(_ACROSS)),
+}
+"""With an edge down in it."""
+_case(
+    "groove-rolls", "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
+    sphere(), _groove(_GENTLE, 0.5),
+    wrong={"on one point, 5/7 g sin": {"lever": J}, "a hollow sphere": {"lever": 4 / 3}},
+    until=1.0, scales=(1.0, 2.0, 30.0), contacts=("RR",), source=_IN_GROOVE,
+)(partial(_descends, angle=_GENTLE))
+_case(
+    "groove-rests",
+    "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
+    _CUBE, _groove(_PINCHED, 0.5),
+    wrong={"a threshold as on a plane": {"mu": 0.5 * math.sqrt(0.5)}, "at 0.85 of Coulomb's": {"mu": 0.425}},
+    until=2.0, scales=SPEED_ALONE, contacts=("RR",), source=_IN_GROOVE,
+)(partial(_descends, angle=_PINCHED, lever=math.inf))
 # fmt: on
