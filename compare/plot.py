@@ -42,6 +42,7 @@ def characteristic(p: Parameters, axes: Axes | None = None, *, fastest: float | 
     axes = _given_or_new(axes)
     flowmeter.theory(axes, p, fastest or flowmeter.top_flow(p))
     axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    flowmeter.names_within(axes)
     return axes
 
 

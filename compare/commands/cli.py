@@ -43,23 +43,17 @@ def program() -> NoReturn:
             code = main()
         except SystemExit as done:  # as of --help
             code = int(done.code or 0)
-        code = _flushed(code)
+        try:
+            sys.stdout.flush()
+        except OSError as error:  # nobody reads it, as with `| head`, or the disk is full
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            if code == 0 and not isinstance(error, BrokenPipeError):
+                print(f"dualball: error: cannot write to standard output: {error.strerror}", file=sys.stderr)
+                code = 2
         if code >= 128:  # threads may still be at what nobody wants any more
             gc.collect()  # lets go of what workers shared
             leave(code)
     sys.exit(code)
-
-
-def _flushed(code: int) -> int:
-    """Flush what was printed, unless nobody reads it, as with `| head`; return the exit code."""
-    try:
-        sys.stdout.flush()
-    except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        if code == 0 and not isinstance(error, BrokenPipeError):
-            print(f"dualball: error: cannot write to standard output: {error.strerror}", file=sys.stderr)
-            return 2
-    return code
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -73,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SimulationError as error:
         print(f"dualball: {error}", file=sys.stderr)
         return 1
-    except BrokenPipeError:  # `_flushed` sees to it
+    except BrokenPipeError:  # `program` sees to it
         return 0
     except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
         full = "cannot write to standard output" if error.errno == errno.ENOSPC else ""

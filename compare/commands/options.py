@@ -65,8 +65,11 @@ class Parser(argparse.ArgumentParser):
         for action in (each for each in self._actions if isinstance(each.type, Output)):
             output: Path | None = getattr(found, action.dest, None)
             others = (value for name, value in vars(found).items() if name != action.dest)
-            if output and any(_same(output, path) for path in _named_files(others)):
-                self.error(f"argument {'/'.join(action.option_strings)}: {str(output)!r} is read and would be lost")
+            for path in _named_files(others):
+                with suppress(OSError):  # one doesn't exist, or can't be a name
+                    if output and path.samefile(output):
+                        named = "/".join(action.option_strings)
+                        self.error(f"argument {named}: {str(output)!r} is read and would be lost")
         return found, rest
 
 
@@ -77,14 +80,6 @@ def _named_files(values: Iterable[Any]) -> Iterator[Path]:
             yield from _named_files(value)
         elif isinstance(value, str | Path):
             yield from (Path(value), Path(value).parent)
-
-
-def _same(a: Path, b: Path) -> bool:
-    """Whether two names are those of one file that exists."""
-    try:
-        return a.samefile(b)
-    except OSError:  # one doesn't exist, or can't be a name
-        return False
 
 
 @dataclass(frozen=True)
@@ -115,7 +110,6 @@ _LARGE = 2.0
 """Lengths of a meter, m, above which the user is asked whether millimetres were meant."""
 number = Number()
 count = Number(allowed=Range(1, 1e6, whole=True))
-count_or_none = Number(allowed=Range(0, 1e6, whole=True))
 processes = Number(allowed=Range(0, 8 * (os.cpu_count() or 1), whole=True))
 """Of this machine, some 250 MB each: a slip of the finger would bring it down."""
 seed = Number(allowed=Range(0, 2**32, whole=True))
@@ -266,11 +260,6 @@ def add_own_set(parser: Parser) -> None:
     own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
 
 
-def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
-    """An option for ranges or lists of values (`compare.kit.sweep.Axis`), to be given once or more often."""
-    parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
-
-
 def add_directory(parser: Parser, directory: str, *names: str) -> None:
     """Options of all commands that fill a directory: its name, and whether to show progress."""
     where = "directory of the results; what it holds already is not computed again"
@@ -282,21 +271,6 @@ def add_directory(parser: Parser, directory: str, *names: str) -> None:
 def add_json(parser: Parser, shown: str = "print JSON") -> None:
     """The option --json, to print results for programs."""
     parser.add_argument("--json", action="store_true", help=shown)
-
-
-def add_flow(parser: Parser) -> None:
-    """Options that let omega_0 change in time."""
-    group = parser.add_argument_group("flow", "omega_0 over time, in rad/s and s; steady if none is given")
-    choice = group.add_mutually_exclusive_group()
-    ramp = "rises or falls evenly within so many seconds, and stays"
-    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
-    held, wave = "levels, each held HOLD s", "a mean with waves on it, frequencies in Hz"
-    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help=held)
-    choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
-    choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
-    longest = "longest time between lines of --flow (default: ten times the usual one)"
-    group.add_argument("--longest-interval", type=seconds, help=longest)
-    parser.needs("--longest-interval", "--flow")
 
 
 def add_engine(parser: Parser, default: str = "mujoco") -> None:
@@ -335,12 +309,6 @@ def add_processes(parser: Any) -> None:
     parser.add_argument("--workers", type=processes, default=all_of_them, help=here)
 
 
-def add_samples(parser: Parser) -> None:
-    """The option that says how often a run is sampled."""
-    between = "time between samples (default: duration/1000)"
-    parser.add_argument("--sample-interval", type=seconds, help=between)
-
-
 def add_start(parser: Parser) -> None:
     """The option for the initial state."""
     from model.kinematics import UNITS, VARIABLES  # here, because it loads numpy
@@ -348,11 +316,6 @@ def add_start(parser: Parser) -> None:
     units = ", ".join(f"{name} in {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True))
     meaning = f"initial state: {units}; zero (at rest against the wall) where not named"
     parser.add_argument("--start", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
-
-
-def add_plot(parser: Parser, what: str) -> None:
-    """The option --plot, to draw what is printed."""
-    parser.add_argument("--plot", type=FIGURE, help=f"draw {what}: png, svg or pdf (default: don't)")
 
 
 def add_verdicts(parser: Parser) -> None:

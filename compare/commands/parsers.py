@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from compare.commands import options
-from compare.commands.options import FILM, HDF5, MAP, MARKDOWN, PAGE, Number, Parser
+from compare.commands.options import FIGURE, FILM, HDF5, MAP, MARKDOWN, PAGE, Number, Parser
 from model import InputError
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range
+
+RANGE, SAMPLED = "NAME=FROM:TO:COUNT", "time between samples (default: duration/1000)"
 
 
 class Command(NamedTuple):
@@ -101,15 +103,25 @@ def simulate(parser: Parser) -> None:
     """One run with any engine, into an HDF5 file, or live in MuJoCo's viewer."""
     options.add_engine(parser)
     options.add_parameters(parser)
-    options.add_flow(parser)
+    group = parser.add_argument_group("flow", "omega_0 over time, in rad/s and s; steady if none is given")
+    choice, number = group.add_mutually_exclusive_group(), options.number
+    ramp = "rises or falls evenly within so many seconds, and stays"
+    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
+    held, wave = "levels, each held HOLD s", "a mean with waves on it, frequencies in Hz"
+    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help=held)
+    choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
+    choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
+    longest = "longest time between lines of --flow (default: ten times the usual one)"
+    group.add_argument("--longest-interval", type=options.seconds, help=longest)
     options.add_start(parser)
     parser.add_argument("--time", type=options.seconds, help="duration (default 10)")
-    options.add_samples(parser)
+    parser.add_argument("--sample-interval", type=options.seconds, help=SAMPLED)
     parser.add_argument("-o", "--output", type=HDF5, help="HDF5 file to write (default: none)")
     live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
     parser.add_argument("--view", action="store_true", help=live)
     parser.add_argument("--speed", type=options.speed, help="speed of --view (default 1, real time)")
     options.add_json(parser, "print the description as JSON")
+    parser.needs("--longest-interval", "--flow")
     parser.needs("--speed", "--view")
     parser.excludes("--view", "--json", "--output", "--sample-interval", "--time")
 
@@ -118,7 +130,7 @@ def simulate(parser: Parser) -> None:
 def inspect(parser: Parser) -> None:
     """What a trajectory file holds."""
     parser.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
-    options.add_plot(parser, "the run")
+    parser.add_argument("--plot", type=FIGURE, help="draw the run: png, svg or pdf (default: don't)")
     options.add_json(parser)
 
 
@@ -128,7 +140,7 @@ def compare(parser: Parser) -> None:
     what = "a run, or time and some of its quantities from CSV or any HDF5 file"
     parser.add_argument("a", metavar="FILE", help=what)
     parser.add_argument("b", metavar="OTHER", help="what it is compared with, the same")
-    options.add_plot(parser, "both")
+    parser.add_argument("--plot", type=FIGURE, help="draw both: png, svg or pdf (default: don't)")
     options.add_json(parser)
 
 
@@ -137,7 +149,8 @@ def sweep(parser: Parser) -> None:
     """Many runs over ranges of parameters, resumable."""
     options.add_parameters(parser)
     options.add_start(parser)
-    options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
+    ranges = "a range, or NAME=A,B,C; several make a grid"
+    parser.add_argument("--vary", action="append", required=True, metavar=RANGE, help=ranges)
     parser.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
     parser.add_argument("--seed", type=options.seed, default=0, help="seed of the points of --random")
     ways, meaning = ("held", "up", "down", "both"), "held: a run for each point; else one run, omega_0 in steps"
@@ -145,7 +158,7 @@ def sweep(parser: Parser) -> None:
     options.add_engine(parser)
     lasts = "duration of a run that is held, and else of each step"
     parser.add_argument("--time", type=options.seconds, default=30.0, help=lasts)
-    options.add_samples(parser)
+    parser.add_argument("--sample-interval", type=options.seconds, help=SAMPLED)
     means = "store what each run settles to, for collect, and not its samples"
     parser.add_argument("--means-only", action="store_true", help=means)
     options.add_workers(parser)
@@ -174,9 +187,10 @@ def attractors(parser: Parser) -> None:
     parser.add_argument("--random", type=options.count, default=20, help=unless)
     parser.add_argument("--seed", type=options.seed, default=0, help="seed of the random starts")
     parser.add_argument("--time", type=options.seconds, help="how long to follow a run at most (default 60/c)")
-    options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several: grid")
+    ranges = "a range, or NAME=A,B,C; several: grid"
+    parser.add_argument("--vary", action="append", default=[], metavar=RANGE, help=ranges)
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
-    options.add_axes(parser, "--follow", follow, "NAME=FROM:TO")
+    parser.add_argument("--follow", action="append", default=[], metavar="NAME=FROM:TO", help=follow)
     tables = "write the tables as Markdown, too (default: don't)"
     parser.add_argument("-o", "--output", type=MARKDOWN, dest="page", help=tables)
     options.add_json(parser)
@@ -190,9 +204,9 @@ def basins(parser: Parser) -> None:
     options.add_start(parser)
     for name in ("across", "up"):
         text = f"a state variable {name} the plane, and its range"
-        parser.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
+        parser.add_argument(f"--{name}", required=True, metavar=RANGE, help=text)
     points = "every N-th point along both axes by MuJoCo, too; 0: none"
-    parser.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
+    parser.add_argument("--mujoco", type=Number(allowed=Range(0, 1e6, whole=True)), default=0, help=points)
     parser.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
     options.add_workers(parser)
     drawn = "write the map: drawn as png, svg or pdf, or its data as json (default: don't)"

@@ -97,7 +97,9 @@ def raised() -> Iterator[None]:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         """Raise `Interrupted`, or send the signal again later if something is being imported."""
-        if _is_importing(frame) and len(waits) < _WAITS:
+        while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
+            frame = frame.f_back
+        if frame and len(waits) < _WAITS:
             waits.append(number)
             send_again(number)
         else:
@@ -120,13 +122,6 @@ def raised() -> Iterator[None]:
         raise
     finally:
         sys.unraisablehook = usual
-
-
-def _is_importing(frame: FrameType | None) -> bool:
-    """Whether a frame runs within an import."""
-    while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
-        frame = frame.f_back
-    return frame is not None
 
 
 def end(number: int, frame: FrameType | None) -> NoReturn:

@@ -14,19 +14,29 @@ from compare.kit import collection, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.view import motions
 from mjsim import ContactSettings
-from model import Flow, InputError, Parameters, storage
+from model import Flow, InputError, storage
 from model.files import reading_json, write_text
 
 DURATION = 10.0
 """Of a run, s, unless asked otherwise."""
+_TOLD_APART = ("vary", "random", "seed", "direction", "start", "time", "timestep", "rtol", "restitution",
+               "sample_interval", "means_only")  # fmt: skip
+"""Options by which sweeps differ, beside engine and parameters."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate one run, store it as far as it came, and describe it."""
+    """Simulate one run, store it as far as it came, and describe it; or let MuJoCo's viewer show it."""
+    p, flow = options.parameters(args), running.flow(args)
     if args.view:
-        return open_viewer(args)
+        from compare.view import viewer  # here, because nothing else needs it
+
+        settings = running.settings(args, p)
+        if not isinstance(settings, ContactSettings):
+            raise InputError(f"--view shows MuJoCo, not {args.engine.name}")
+        viewer.view(p, running.start(args), flow or Flow.steady(p.omega_0), settings, args.speed or 1.0)
+        return 0
     args.time = args.time or DURATION
-    task = running.task(args, options.parameters(args), flow=running.flow(args))
+    task = running.task(args, p, flow=flow)
     # The first signal ends the run with its samples, the second without.
     with tempfile.TemporaryDirectory() as scratch, signals.noted() as heard:
         path = args.output or Path(scratch) / "run.h5"
@@ -45,18 +55,6 @@ def run(args: argparse.Namespace) -> int:
         return 128 + heard[0] if heard else 1 if failure else 0
 
 
-def open_viewer(args: argparse.Namespace) -> int:
-    """Open MuJoCo's viewer and simulate in it."""
-    from compare.view import viewer  # here, because nothing else needs it
-
-    p = options.parameters(args)
-    settings = running.settings(args, p)
-    if not isinstance(settings, ContactSettings):
-        raise InputError(f"--view shows MuJoCo, not {args.engine.name}")
-    viewer.view(p, running.start(args), running.flow(args) or Flow.steady(p.omega_0), settings, args.speed or 1.0)
-    return 0
-
-
 def run_sweep(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
     p, axes = options.parameters(args), sweep.Axis.several(args.vary)
@@ -73,7 +71,17 @@ def run_sweep(args: argparse.Namespace) -> int:
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
     save = collection.save_means if args.means_only else storage.save_batch
     with running.campaign(args, "sweep", batch=args.batch, save=save) as work:
-        _check_no_other_sweep(args, p)
+        asked = (
+            {name: getattr(args, name) for name in _TOLD_APART} | {"engine": args.engine.name} | dataclasses.asdict(p)
+        )
+        if (path := args.output / "sweep.json").exists():  # `collect` would mix another one with this
+            with reading_json(path, "sweep") as held:
+                held = asked | held  # one of an earlier version lacks some
+                differ = [f"{name} = {held[name]}, not {value}" for name, value in asked.items() if held[name] != value]
+            if differ:
+                other = f"{args.output} holds another sweep ({'; '.join(differ)})"
+                raise InputError(f"{other}: choose another directory with --output")
+        write_text(path, json.dumps(asked))
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
     if args.json:
@@ -85,21 +93,6 @@ def run_sweep(args: argparse.Namespace) -> int:
         for failure in failures:
             print(f"failed: {failure.task.key}: {failure.reason}", file=sys.stderr)
     return 1 if failures else 0
-
-
-def _check_no_other_sweep(args: argparse.Namespace, p: Parameters) -> None:
-    """Raise `InputError` if the directory holds another sweep, with which `collect` would mix this one."""
-    names = ("vary", "random", "seed", "direction", "start", "time", "timestep", "rtol", "restitution",
-             "sample_interval", "means_only")  # fmt: skip
-    asked = {name: getattr(args, name) for name in names} | {"engine": args.engine.name} | dataclasses.asdict(p)
-    if (path := args.output / "sweep.json").exists():
-        with reading_json(path, "sweep") as held:
-            held = asked | held  # one of an earlier version lacks some
-            differ = [f"{name} = {held[name]}, not {value}" for name, value in asked.items() if held[name] != value]
-        if differ:
-            other = f"{args.output} holds another sweep ({'; '.join(differ)})"
-            raise InputError(f"{other}: choose another directory with --output")
-    write_text(path, json.dumps(asked))
 
 
 def collect(args: argparse.Namespace) -> int:

@@ -139,17 +139,8 @@ def _as_bytes(cells: npt.NDArray[Any]) -> dict[str, str]:
 
 def _cross(x: float, y: float) -> Figure:
     """A black cross at a point, as data of plotly."""
-    look = {"symbol": "cross", "size": 12, "color": "black"}
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "here",
-        "x": [x],
-        "y": [y],
-        "marker": look,
-        "showlegend": False,
-        "cliponaxis": False,
-    }
+    look = {"marker": {"symbol": "cross", "size": 12, "color": "black"}, "showlegend": False, "cliponaxis": False}
+    return {"type": "scatter", "mode": "markers", "name": "here", "x": [x], "y": [y], **look}
 
 
 def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more: Any) -> Figure:
@@ -193,9 +184,8 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     except ImportError as error:
         raise InputError("explore needs NiceGUI: pip install 'dualball[explore]'") from error
     with socket.socket() as tried:
-        tried.setsockopt(
-            socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
-        )  # as the server does: of one that ended nothing is left
+        # As the server does: of one that ended nothing is left.
+        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             tried.bind((HOST, port))
         except OSError as error:
@@ -205,16 +195,8 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     app.add_route("/motion", lambda _: HTMLResponse(scene))
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
-    ui.run(
-        partial(page, p),
-        host=HOST,
-        port=port,
-        title="dualball",
-        show=show,
-        reload=False,
-        show_welcome_message=False,
-        reconnect_timeout=PATIENCE,
-    )
+    quiet: dict[str, Any] = {"reload": False, "show_welcome_message": False, "reconnect_timeout": PATIENCE}
+    ui.run(partial(page, p), host=HOST, port=port, title="dualball", show=show, **quiet)
 
 
 def page(p: Parameters) -> None:
@@ -237,15 +219,15 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
     """Build sliders, choice of drag law and buttons; return a function that draws all and, a bit later, simulates."""
     from nicegui import run
 
-    async def again(mine: int) -> None:
-        if mine != tab.asked:
-            return
+    async def simulate() -> Trajectory | None:
         try:
-            found = await run.io_bound(simulated, tab.p, tab.start)
+            return await run.io_bound(simulated, tab.p, tab.start)
         except InputError as error:
             ui.notify(str(error), type="negative")
-            return
-        if found and mine == tab.asked:  # nothing else was asked for meanwhile
+            return None
+
+    async def again(mine: int) -> None:
+        if mine == tab.asked and (found := await simulate()) and mine == tab.asked:  # nothing else was asked meanwhile
             tab.run = found
             tab.play()
 
@@ -261,13 +243,14 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
 
     def follow() -> None:
         tab.asked += 1
-        ui.timer(0.0, partial(redraw, tab.asked), once=True)
-        ui.timer(REST, partial(again, tab.asked), once=True)
+        mine = tab.asked  # of all that a slider sent meanwhile the last counts
+        ui.timer(0.0, lambda: [each() for each in draw if mine == tab.asked], once=True)
+        ui.timer(REST, partial(again, mine), once=True)
 
-    def redraw(mine: int) -> None:
-        if mine == tab.asked:  # of all that a slider sent meanwhile the last counts
-            for each in draw:
-                each()
+    async def download_run() -> None:
+        """Also if it isn't simulated yet, or the set was changed since."""
+        if found := await simulate():
+            _download(ui, partial(storage.save, found), "run.h5")
 
     def value(name: str) -> float:
         return float(getattr(tab.p, name))
@@ -290,21 +273,16 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
     line = ui.html("", sanitize=False).classes("text-sm said")
     draw.append(show)
     with ui.row():
-        ui.button("Set as TOML", on_click=lambda: ui.download.content(_bytes(tab.p.save, "set.toml"), "set.toml"))
-        ui.button("Run as HDF5", on_click=lambda: _download(ui, tab))
+        ui.button("Set as TOML", on_click=lambda: _download(ui, tab.p.save, "set.toml"))
+        ui.button("Run as HDF5", on_click=download_run)
     return follow
 
 
-def _download(ui: Any, tab: Tab) -> None:
-    if tab.run:
-        ui.download.content(_bytes(partial(storage.save, tab.run), "run.h5"), "run.h5")
-
-
-def _bytes(save: Callable[[Path], object], name: str) -> bytes:
-    """The bytes that a function writes into a file of a name."""
+def _download(ui: Any, save: Callable[[Path], object], name: str) -> None:
+    """Hand the browser what a function writes into a file of a name."""
     with tempfile.TemporaryDirectory() as directory:
         save(Path(directory) / name)
-        return (Path(directory) / name).read_bytes()
+        ui.download.content((Path(directory) / name).read_bytes(), name)
 
 
 def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[[], None]) -> None:
@@ -314,11 +292,9 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
         "curve": lambda: characteristic(tab.p, float(tab.start.omega_c), fastest),
         "map": lambda: regions(tab.p, fastest),
     }
-    for name, figure in figures.items():
-        plot = ui.plotly(_figure([], "", "", 1, 1)).classes(f"w-full h-80 {name}")
-
-        def refresh(plot: Any = plot, figure: Callable[[], Figure] = figure) -> None:
-            plot.update_figure(figure())
+    plots = {}
+    for name in figures:
+        plots[name] = plot = ui.plotly(_figure([], "", "", 1, 1)).classes(f"w-full h-80 {name}")
 
         def clicked(event: Any, name: str = name) -> None:
             x, y = (float(event.args["points"][0][axis]) for axis in "xy")
@@ -329,7 +305,7 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
             follow()
 
         plot.on("plotly_click", clicked)
-        draw.append(refresh)
+    draw.extend(partial(lambda name: plots[name].update_figure(figures[name]()), name) for name in figures)
     hint = "A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η and ω₀."
     ui.html(typeset(hint), sanitize=False)
 

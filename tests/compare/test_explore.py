@@ -87,6 +87,21 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     assert run.omega_c[0] == pytest.approx(60, abs=1.5)
 
 
+def test_a_run_is_saved_that_is_not_simulated_yet(browser, address):
+    """Two files are asked for at once, as soon as there are buttons: both come."""
+    page, saved = browser.new_page(), []
+    page.on("download", lambda each: saved.append(each.suggested_filename))
+    page.goto(address)
+    for text in ("Run as HDF5", "Set as TOML"):
+        page.get_by_text(text).click()
+    for _ in range(600):
+        if len(saved) == 2:
+            break
+        page.wait_for_timeout(100)
+    assert sorted(saved) == ["run.h5", "set.toml"]
+    page.close()
+
+
 @pytest.mark.slow
 def test_a_browser_that_is_busy_keeps_its_set(browser, address):
     """As one that draws in 3-D without a graphics card on a busy machine: its connection is lost meanwhile."""

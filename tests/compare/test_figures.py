@@ -89,6 +89,17 @@ def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(na
     assert ("not as predicted in 1 (crossed)" in caption) == bool(wrong)
 
 
+@pytest.mark.parametrize("name", ["air", "glass-in-water", "hopping", "reference"])
+def test_names_of_curves_stay_within_the_axes(name):
+    axes = plot.characteristic(Parameters.named(name))
+    axes.figure.draw_without_rendering()
+    low, high = axes.get_window_extent().get_points()
+    for text in axes.texts:
+        begin, end = text.get_window_extent().get_points()
+        assert (begin > low - 1).all(), text
+        assert (end < high + 1).all(), text
+
+
 def test_deviations_are_drawn_over_tolerance():
     near, far, equal, count = (check(10.0, predicted) for predicted in (10.0 - 1.5e-9, 9.0, 10.0, 10.0))
     count = dataclasses.replace(count, tolerance=0.0)

@@ -1,6 +1,7 @@
 """Pictures, films, pages and the viewer show the case and the ball where it is, or say clearly why they can't."""
 
 import dataclasses
+import io
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -96,6 +97,19 @@ def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
         assert tab.locator("#case").inner_text() == Case(now.case[0]).name
         assert f"ωc = {now.omega_c[0]:.2f} rad/s" in tab.locator("#numbers").inner_text()
     assert tab.locator("#play").inner_text() == "Play"
+
+
+def test_all_of_a_page_s_vessel_is_seen_however_high_the_ball_flies(tab, tmp_path):
+    """Above it the picture is white; where a contact is open there is no slip to tell."""
+    pytest.importorskip("nicegui")
+    flies = analytic.simulate(Parameters.named("reference"), [0.05, 0, 8.0, 0, 0, 0, 0.03, -0.3], 0.05)
+    render.write(flies, tmp_path / "run.html")
+    tab.goto((tmp_path / "run.html").as_uri())
+    tab.wait_for_function("document.querySelector('#numbers').innerText.includes('slip: floor –, wall –')")
+    seen = Image.open(io.BytesIO(tab.locator("#view").screenshot())).convert("RGB")
+    edge = np.asarray(seen)[3:6, seen.width // 2 :]
+    assert edge[:, :-20].min() == 255
+    assert np.asarray(seen)[:, seen.width // 2 :].min() < 255
 
 
 def test_the_ball_turns_with_its_angular_velocity(reference):

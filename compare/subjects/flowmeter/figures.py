@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
@@ -61,6 +62,8 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         above.grid(alpha=0.25)
         style.deviations(below, curve.states, nearest_prediction)
         below.set(xlabel=style.OMEGA_0)
+    for above in panels[0]:
+        names_within(above)
     sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
     states = [m for curve in curves for m in curve.states]
     return figure, (
@@ -102,6 +105,7 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
+    names_within(axes)
     return figure, style.caption(p, "Characteristic curve of the flowmeter.", said, states=of.states)
 
 
@@ -128,6 +132,16 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     axes.set_xlim(0, fastest)
     style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))})
     return t
+
+
+def names_within(axes: Axes) -> None:
+    """Move names of curves that would stick out of axes, which have their limits and labels, so that they don't."""
+    if figure := axes.get_figure(root=True):
+        figure.draw_without_rendering()
+        low, high = axes.get_window_extent().get_points()
+        for name in axes.findobj(Annotation):
+            begin, end = name.get_window_extent().get_points()
+            name.xyann = name.xyann + (np.maximum(low - begin, 0) - np.maximum(end - high, 0)) * 72 / figure.dpi
 
 
 def draw_fall(of: Diagram) -> tuple[Figure, str]:
