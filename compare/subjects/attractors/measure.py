@@ -84,9 +84,8 @@ def hopping(
             yield row(quantity=quantity, value=with_step_error(coarse.values[quantity].value, value))
         if k:
             parts = (result.coarse, Hopping.later), (result.fine, Hopping.later), (result.fine, 2 * Hopping.later)
-            slow, fast, later = (
-                hop_map(tops(run, k * Hopping.hold + after, end - Hopping.last).x, q)[0] for run, after in parts
-            )
+            begin, last = k * Hopping.hold, end - Hopping.last
+            slow, fast, later = (hop_map(tops(run, begin + after, last).x, q)[0] for run, after in parts)
             factor = row(quantity="orbit_multiplier", value=with_step_error(slow, Measured(fast, abs(fast - later))))
             yield if_found(factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s")
         heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
@@ -180,9 +179,8 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         ahead = steady[-1]
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
-        tasks.append(
-            [task(q, x, Hopping.followed, refined) for x, refined in zip(ahead, Hopping.marginal, strict=True)]
-        )
+        both = zip(ahead, Hopping.marginal, strict=True)
+        tasks.append([task(q, x, Hopping.followed, refined) for x, refined in both])
         (runs,) = lab.groups(tasks[-1:])
         parts = [] if isinstance(runs, str) else [tops(run, Hopping.later, Hopping.followed) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
@@ -260,10 +258,8 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
         yield Missing("swing", "reference", "the ball does not slip at both points for ever")
         return
-    parts = [
-        _swing(run, start)
-        for run, start in ((result.coarse, end), (result.fine, end), (result.fine, end - Hopping.swung))
-    ]
+    begun = (result.coarse, end), (result.fine, end), (result.fine, end - Hopping.swung)
+    parts = [_swing(run, start) for run, start in begun]
     conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
     for name, coarse, fine, before in zip(("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True):
         yield result.row(lab, name, with_step_error(coarse, Measured(fine, abs(fine - before))), **conditions)

@@ -10,6 +10,7 @@ from analytic.mechanics import dynamics
 from compare.claim import Bearing, Text, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement
+from compare.states import thresholds_of
 from compare.subjects.stability.measure import natural_size
 from model import Case, Parameters, State
 from model.arrays import Array
@@ -99,8 +100,8 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
 
 def _slowest_decay(m: Measurement) -> float:
     """The slowest decay of SR: that of leaning below omega_03, where it grows."""
-    p, decay = m.parameters, -theory(analytic.leaning_modes, m.parameters)[0].real
-    return float(decay[0] if p.omega_0 < theory(analytic.thresholds, p.replace(omega_0=1.0)).omega_03 else min(decay))
+    decay = -theory(analytic.leaning_modes, m.parameters)[0].real
+    return float(decay[0] if m.parameters.omega_0 < thresholds_of(m).omega_03 else min(decay))
 
 
 CLAIMS = (

@@ -13,7 +13,7 @@ from analytic.mechanics import rolling_forces
 from compare.claim import Bearing, When, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
-from compare.states import quantity_of
+from compare.states import quantity_of, thresholds_of
 from model import Case, Parameters
 
 _BY = "analytic.thresholds"
@@ -26,12 +26,7 @@ def _threshold(
 ) -> Bearing:
     """A bearing on a threshold, which `analytic.thresholds` predicts."""
     by = f"{_BY}: {quantity}"
-    return Bearing(protocol, quantity, lambda m: float(getattr(_thresholds(m), quantity)), when=when, by=by)
-
-
-def _thresholds(m: Measurement) -> analytic.Thresholds:
-    """The thresholds of a set by theory: independent of the flow at which one was measured."""
-    return theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
+    return Bearing(protocol, quantity, lambda m: float(getattr(thresholds_of(m), quantity)), when=when, by=by)
 
 
 def _unstable_quantity(m: Measurement) -> float:
@@ -95,14 +90,14 @@ CLAIMS = (
         "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in it; above, it "
         "leaves it.",
         _threshold("omega_03"),
-        Bearing("thresholds", "lifts", lambda m: math.isnan(_thresholds(m).omega_01), by=f"{_BY}: omega_01"),
+        Bearing("thresholds", "lifts", lambda m: math.isnan(thresholds_of(m).omega_01), by=f"{_BY}: omega_01"),
     ),
     claim(
         "table-5-F",
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         _threshold("omega_04"),
-        Bearing("thresholds", "folds", lambda m: math.isfinite(_thresholds(m).omega_04), by=f"{_BY}: omega_04"),
+        Bearing("thresholds", "folds", lambda m: math.isfinite(thresholds_of(m).omega_04), by=f"{_BY}: omega_04"),
     ),
     claim(
         "sub-branches",
@@ -120,7 +115,7 @@ CLAIMS = (
         "(87), Fig. 7",
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
         "the wall at ω₀₂, without a jump.",
-        Bearing("thresholds", "folds", lambda m: m.parameters.eta > _thresholds(m).eta_cr, by=f"{_BY}: eta_cr"),
+        Bearing("thresholds", "folds", lambda m: m.parameters.eta > thresholds_of(m).eta_cr, by=f"{_BY}: eta_cr"),
         Bearing(
             "birth", "critical_drag", lambda m: bifurcation.critical_drag(m.parameters), by="diagram.critical_drag"
         ),
@@ -133,7 +128,7 @@ CLAIMS = (
         Bearing(
             "thresholds",
             "omega_04",
-            lambda m: max(_thresholds(m).omega_01, _thresholds(m).omega_02),
+            lambda m: max(thresholds_of(m).omega_01, thresholds_of(m).omega_02),
             relation=Relation.AT_LEAST,
             by=f"{_BY}: omega_01, omega_02",
         ),

@@ -296,16 +296,15 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         flows[name] = begins, holds, ends or math.nan
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
             q = p.replace(omega_0=Changes.rolls_at * begins)
-            trials.append(
-                _jump(lab, Start(name, q, "RR", State(omega_c=q.omega_0).stacked()), Changes.jump * q.omega_0)
-            )
-        starts.append(Start(name, p.replace(omega_0=begins + Changes.slips_at * (holds - begins)), "jump", np.zeros(8)))
+            rolls = Start(name, q, "RR", State(omega_c=q.omega_0).stacked())
+            trials.append(_jump(lab, rolls, Changes.jump * q.omega_0))
+        q = p.replace(omega_0=begins + Changes.slips_at * (holds - begins))
+        starts.append(Start(name, q, "jump", np.zeros(8)))
         if ends is None:
             yield Missing("unsteady", name, "no flow was measured at which slipping at both points ends in a jump")
         else:
-            starts.append(
-                Start(name, p.replace(omega_0=begins + Changes.ramp[0] * (ends - begins)), "ramp", np.zeros(8))
-            )
+            q = p.replace(omega_0=begins + Changes.ramp[0] * (ends - begins))
+            starts.append(Start(name, q, "ramp", np.zeros(8)))
     for start, state in zip(starts, settle(lab, starts), strict=True):
         if state.failure or state.case is not Case.SS:
             why = state.failure or state.case.name

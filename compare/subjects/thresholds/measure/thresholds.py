@@ -45,6 +45,8 @@ class Distances:
 
 FOUND = {"rolling": ("omega_01", "omega_03"), "sinking": ("omega_02",), "slipping": ("omega_04",)}
 """The thresholds at which each ends or begins."""
+STARTS = {"rolling": "with the fluid", "sinking": "on the wall", "slipping": "rest"}
+"""How balls start of which is asked when that ends."""
 From = Callable[[Parameters], Array]
 """The state in which a ball starts, by its parameters."""
 
@@ -83,17 +85,21 @@ class Findings:
     """Settled states beside a change, the nearest first, by kind: of "riding", "sinking", "lifted" balls; of "slipping"
     ones near its beginning, and "turning" ones near its end."""
 
-    def search(self, kind: str, around: Bracket, start: From, width: float, time: float = 1.0) -> tuple[str, Search]:
+    def search(
+        self, kind: str, around: Bracket, width: float, start: From | None = None, time: float = 1.0
+    ) -> tuple[str, Search]:
         """A search that narrows a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
 
-        For the end of slipping, a run starts from the state that the ball reached at the largest flow so far.
+        They start as `STARTS` says, unless another start is given; for the end of slipping, from the state that the
+        ball reached at the largest flow so far.
         """
         units, answer = ASKED[kind]
 
         def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
             q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
+            x0 = last.x[-1] if last else start(q) if start else settling.named_start("", q, STARTS[kind]).x0
             t_end = settling.rounded_duration(q, units * time * attempt.time)
-            return self.lab.task(q, last.x[-1] if last else start(q), t_end, coarse_step(q) / attempt.refine)
+            return self.lab.task(q, x0, t_end, coarse_step(q) / attempt.refine)
 
         return kind, Search(around, task, answer, width)
 
@@ -111,9 +117,8 @@ class Findings:
     ) -> Measurement | Missing:
         """The measurement of a threshold, or of a number on the set; or why the threshold was not found."""
         if at is None:
-            return self.missing(
-                f"too few states settled for {quantity} by {how['by']}, or their extrapolation has no zero"
-            )
+            why = f"too few states settled for {quantity} by {how['by']}, or their extrapolation has no zero"
+            return self.missing(why)
         p = self.p.replace(omega_0=at.value) if isinstance(at, Measured) else self.p
         return measurement(self.lab, "thresholds", self.set, p, quantity, at, tasks, **how)
 
@@ -139,7 +144,7 @@ def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) ->
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one on trial looks where
     that one found something.
     """
-    starts = {"rolling": "with the fluid", "sinking": "on the wall", "slipping": lab.effort.settled_starts[0][0]}
+    starts = STARTS | {"slipping": lab.effort.settled_starts[0][0]}
     cases = {kind: settling.settled_cases(records, name, how) for kind, how in starts.items()}
     changes = {}
     for kind, seen in cases.items():
@@ -173,22 +178,17 @@ def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
     """A search for the largest flow at which a ball that rolls at both points goes on so."""
     if change := each.changes.get("rolling"):
         width = each.lab.effort.thresholds_width * change.high
-        yield each.search("rolling", change, _start_state("with the fluid"), width)
+        yield each.search("rolling", change, width)
 
 
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
     """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles on the floor."""
     if change := each.changes.get("sinking"):
-        yield each.search("sinking", change, _start_state("on the wall"), Distances.coarse * change.low)
+        yield each.search("sinking", change, Distances.coarse * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
     if change and end and not lifts(end) and end.high < change.high:
         change = replace(change, low=max(change.low, end.high))
-        yield each.search("slipping", change, _start_state("rest"), Distances.coarse * change.low)
-
-
-def _start_state(how: str) -> From:
-    """A function from parameters to the state at the start of a kind of run, see `settling.named_start`."""
-    return lambda p: settling.named_start("", p, how).x0
+        yield each.search("slipping", change, Distances.coarse * change.low)
 
 
 def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
@@ -232,13 +232,12 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
     width = each.lab.effort.thresholds_width
     begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
     if begins and len(riding) == len(Distances.riding):
-        yield each.search(
-            "riding", begins, riding_start(riding, height=settling.safe_height(each.p)), width * begins.high
-        )
+        ride = riding_start(riding, height=settling.safe_height(each.p))
+        yield each.search("riding", begins, width * begins.high, ride)
     end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
     if end and len(lifted) == len(Distances.riding):
         change = Bracket(end.low * (1 - Distances.coarse), end.high * (1 + Distances.coarse))
-        yield each.search("leaning", change, riding_start(lifted, height=0.0, less=1e-3), width * end.high)
+        yield each.search("leaning", change, width * end.high, riding_start(lifted, height=0.0, less=1e-3))
 
 
 def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) -> From:
@@ -295,7 +294,7 @@ def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
         narrowest = each.lab.effort.thresholds_fold
         half = max(narrowest, 5.0 * top.uncertainty / top.value)
         change, nearest = Bracket(top.value * (1 - half), top.value * (1 + half)), each.states["turning"][0]
-        yield each.search("fold", change, lambda _: nearest.mean, narrowest * top.value, 1 / math.sqrt(narrowest))
+        yield each.search("fold", change, narrowest * top.value, lambda _: nearest.mean, 1 / math.sqrt(narrowest))
 
 
 def _rows(each: Findings) -> Iterator[Measurement | Missing]:
