@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import textwrap
 from collections.abc import Callable, Sequence
+from inspect import cleandoc
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -28,10 +29,10 @@ class Command(NamedTuple):
     """What may follow its name."""
 
     @property
-    def about(self) -> str:
-        """What the command is for, in words that follow its name in help."""
-        text = self.declare.__doc__ or ""
-        return text[:1].lower() + text[1:].rstrip(".")
+    def about(self) -> tuple[str, str]:
+        """What the command is for, in words that follow its name in help, and what else its own help says."""
+        text, _, more = cleandoc(self.declare.__doc__ or "").partition("\n\n")
+        return text[:1].lower() + text[1:].rstrip("."), more
 
 
 GROUPS: dict[str, dict[str, Command]] = {}
@@ -171,8 +172,14 @@ def sweep(parser: Parser) -> None:
 
 @command("the ball", "simulate.collect", "sweep -o sweep.h5")
 def collect(parser: Parser) -> None:
-    """Gather the runs of a directory into one file for xarray."""
-    parser.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
+    """Gather the runs of a directory into one file for xarray.
+
+    Of each run the file holds the parameters, the mean over the last quarter and how sure that is, the last case, and why it
+    failed, if it did; no samples. The parameters that vary are its dimensions if the runs make a grid, else it has the
+    dimension run.
+    """
+    of = "directory of a sweep, or any with files of runs in it"
+    parser.add_argument("directory", type=Path, metavar="DIR", help=of)
     parser.add_argument("-o", "--output", type=HDF5, default=Path("sweep.h5"), help="HDF5 file to write")
     options.add_processes(parser)
 
@@ -218,8 +225,17 @@ def basins(parser: Parser) -> None:
 
 @command("the ball", "design.run", "meter.toml -o meter.html")
 def design(parser: Parser) -> None:
-    """The best meter for a fluid and a range of flows, within bounds."""
-    parser.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
+    """The best meter for a fluid and a range of flows, within bounds.
+
+    Best is the one whose operating range reaches farthest beyond the fastest flow, at the worst corner of the
+    tolerances. The exit code is 1 if it ends below that flow: then no meter within the bounds covers the flows.
+    """
+    tables = (
+        "TOML, SI units: [fluid] nu_f, rho_f (drag, C_D, gravity); [flow] slowest, fastest, rad/s (response, s); "
+        "[bounds] r, R, rho_b, mu, eta (j), each a number or [lowest, highest], or several [[material]] with a name "
+        "and bounds of their own; [tolerances] of mu, eta, r, R, relative; what stands in round brackets may be left out"
+    )
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help=tables)
     parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write (default: none)")
     parser.add_argument("--seed", type=options.seed, default=0, help="seed of the random numbers of the search")
     options.add_json(parser, "print JSON instead of tables")
@@ -324,7 +340,8 @@ def declare(commands: options.Commands, name: str) -> None:
     """Add a command to those of the program."""
     of = COMMANDS[name]
     told = f"dualball {name} {of.example}"
-    texts = {"help": f"as in: {told}", "description": of.about, "epilog": f"Example: {told}"}
+    said = ". ".join(filter(None, of.about))
+    texts = {"help": f"as in: {told}", "description": said, "epilog": f"Example: {told}"}
     parser: Parser = commands.add_parser(name, **texts, formatter_class=options.Help)
     parser.set_defaults(run=of.run)
     of.declare(parser)
@@ -358,7 +375,9 @@ def parser(words: Sequence[str]) -> Parser:
         listed.append(f"\n{title.capitalize()}:")
         for name, command in group.items():
             commands.add_parser(name)
-            listed.append(textwrap.fill(command.about, 100, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14))
+            listed.append(
+                textwrap.fill(command.about[0], 100, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14)
+            )
     parser.add_argument("--version", action="store_true", help="show the version")
     parser.add_argument(
         "--print-completion", metavar="SHELL", help="print what bash, zsh, fish or tcsh complete words by"

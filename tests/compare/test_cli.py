@@ -15,7 +15,7 @@ import pytest
 
 from compare.bench import league
 from compare.catalogue import CLAIMS
-from compare.commands import cli, parsers, simulate
+from compare.commands import cli, design, parsers, simulate
 from compare.kit import engines, tasks
 from compare.kit.journal import Journal
 from mjsim import ContactSettings
@@ -214,6 +214,9 @@ def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_
         assert f"Example: dualball {name} {command.example}" in " ".join(parser.format_help().split())
         parser.parse_args(command.example.split())
     assert "(default 30)" in parser_of("sweep").format_help()
+    designs = parser_of("design").format_help()
+    for fields in (design._FLUID, design._FLOW, design._BOUNDS, design._TOLERANCES, ["exit code"]):
+        assert all(name in designs for name in fields)
     for name, known in (("simulate", engines.ENGINES), ("league", league.ENTRIES)):
         words = set(re.findall(r"[\w-]+", re.sub(r"-\s+", "-", parser_of(name).format_help())))
         assert not {each for each in known if not {each, each.removesuffix("-defaults")} & words}
