@@ -21,6 +21,8 @@ from model.kinematics import TURNING, VARIABLES, full_state
 from model.parameters import POSITIVE, Range, check_number
 
 MOST_THREADS = 1024
+ENDLESS = 2**62
+"""As many steps as there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,13 +146,13 @@ def _run_time_stepping(run: _Run) -> tuple[float, str]:
     """A run by time stepping, into its rows; when it ended, and why it failed, if it did."""
     from analytic.simulation import stepping, time_stepping  # here, since numba takes a while to load
 
-    given = time_stepping.prepared(run.x0, 0.0, run.p, run.flow, run.settings, run.times)
-    ball, stretches, omega_0, constants = given
-    rows = stepping.Rows(run.x, run.case, run.landings, run.over)
-    end = stepping.follow(ball, stretches, run.quiet, omega_0, constants, rows)
-    if end >= 0:
-        return end, ""
-    return -end, f"stopped at t = {-end:g} s: the velocities don't settle; a shorter step may help"
+    ball, stretches, given = time_stepping.prepared(run.x0, 0.0, run.p, run.flow, run.settings, run.times)
+    none, taken = np.empty((0, 9)), np.array([1, 0])
+    rows = stepping.Rows(run.x, run.case, run.landings, none, none, taken, run.quiet, run.over)
+    parts, (_, _, now, _) = stepping.follow(ball, (0, 0, 0.0, 0.0), stretches, given, rows, ENDLESS)
+    if stepping.ball_from_parts(parts).residual == 0:
+        return now, ""
+    return now, f"stopped at t = {now:g} s: the velocities don't settle; a shorter step may help"
 
 
 def _run_event_driven(run: _Run) -> tuple[float, str]:

@@ -23,7 +23,7 @@ from analytic.simulation import charts, compiling, equations, motion, solvers, t
 from analytic.simulation.charts import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
 from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, Stretch, first_pace, stretch
-from analytic.simulation.motion import Event, Moment, Recorder
+from analytic.simulation.motion import Moment, Recorder
 from analytic.simulation.settings import Settings
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
@@ -282,11 +282,11 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
         return Record.of(times, *each, Stop(math.inf, math.inf, np.zeros(1, bool)), whole=True)
 
     def look(run: Record) -> None:
-        _record_events(run, recorder)
-        recorder.reached(float(run.reached[0]))
+        count, run.taken[1] = int(run.taken[1]), 0
+        recorder.note(run.events[:count], float(run.reached[0]))
 
     done, failure = carry_out(Moment(0.0, theta_0, x0), *prepare(p, flow, settings, float(times[-1])), rows, look)
-    _record_events(done, recorder)
+    events += done.events[: done.taken[1]].tolist()
     recorder.time = max(recorder.time, float(done.reached[0]))
     if count := int(done.taken[0]):
         path = done.path[:count]
@@ -294,13 +294,6 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
         recorder.add(times[:count], path[:, 0], done.x[:count], forces, done.case[:count], path[:, 3])
     if failure:
         raise failure
-
-
-def _record_events(run: Record, recorder: Recorder) -> None:
-    """Hand the events since the last look to the recorder."""
-    for time, before, after, *impulse in run.events[: run.taken[1]].tolist():
-        recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
-    run.taken[1] = 0
 
 
 def path_forces(case: npt.NDArray[np.int8], x: Array, path: Array, p: Parameters) -> Array:

@@ -1,4 +1,4 @@
-"""Data of simulations: the ball in its flow, a moment, an event, and the record of a run."""
+"""Data of simulations: the ball in its flow, a moment, and the record of a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.mechanics import drag, rigid_body
-from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import equations
 from analytic.simulation.equations import Line, Motion
 from analytic.simulation.settings import Settings
@@ -55,16 +54,6 @@ def of_ball(p: Parameters, flow: Flow, settings: Settings) -> Motion:
     )  # fmt: skip
 
 
-class Event(NamedTuple):
-    """A change of case or an impact."""
-
-    time: float
-    from_case: Case
-    to_case: Case
-    impulse: Forces = NOTHING
-    """Impulses (A_x, A_y, A_z, B_x, B_y, B_z) in N s."""
-
-
 class Recorder:
     """Collects a run; what it holds at any moment makes a `Trajectory`."""
 
@@ -72,17 +61,18 @@ class Recorder:
         """`times` are those to sample at, s, increasing."""
         self.p = p
         self.times = times
-        self.events: list[Event] = []
+        self.events: list[list[float]] = []
+        """Of changes of case and impacts: time, codes of the cases before and after, impulses (A_x … B_z), N s."""
         self.time = 0.0
         """How far the run has come, s."""
         self._blocks: list[npt.NDArray[np.void]] = []
         self._progress = progress
-        self._first, self._residual, self._scale = math.nan, 0.0, 0.0
+        self._energy = {"energy_residual": 0.0, "energy_scale": 0.0}
 
     def add(self, time: Array, theta: Array, x: Array, forces: Array, case: npt.ArrayLike, work: Array) -> None:
-        """Add samples, one at least.
+        """Add all samples, one at least.
 
-        Shapes: time, theta (n,), states x (n, 8), forces (n, 6) in the order A_x … B_z, case (n,) or a single one;
+        Shapes: time, theta (n,), states x (n, 8), forces (n, 6) in the order A_x … B_z, case (n,);
         work is that of drag and contacts since the start (n,), J.
         """
         state = State(*x.T)
@@ -90,13 +80,13 @@ class Recorder:
         block["force_A"], block["force_B"], block["case"] = forces[:, :3], forces[:, 3:], case
         self._blocks.append(block)
         energy = rigid_body.energy(state.y, rigid_body.velocities(state, self.p), self.p)
-        if math.isnan(self._first):
-            self._first = float(energy[0] - work[0])  # an impact may precede the first sample
-        self._residual = max(self._residual, float(np.max(np.abs(energy - work - self._first))))
-        self._scale = max(self._scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
+        gained = energy - work
+        self._energy["energy_residual"] = float(np.abs(gained - gained[0]).max())  # an impact may precede the first
+        self._energy["energy_scale"] = float(np.abs([energy, work]).max())
 
-    def reached(self, time: float) -> None:
-        """Note how far the run has come."""
+    def note(self, events: Array, time: float) -> None:
+        """Note rows of `events`, and how far the run has come."""
+        self.events += events.tolist()
         self.time = max(self.time, time)
         if self._progress:
             self._progress(self.time / float(self.times[-1]))
@@ -106,13 +96,13 @@ class Recorder:
 
         The residual is the largest |change of energy - work of drag, friction and impacts| at a sample.
         """
-        settings = {**header.settings, "energy_residual": self._residual, "energy_scale": self._scale}
-        impulse = np.array([event.impulse for event in self.events], dtype=float).reshape(-1, 6)
+        rows = np.array(self.events, dtype=float).reshape(-1, 9)
         events = Events(
-            time=np.array([event.time for event in self.events], dtype=float),
-            from_case=np.array([event.from_case for event in self.events], dtype=np.int8),
-            to_case=np.array([event.to_case for event in self.events], dtype=np.int8),
-            impulse_A=impulse[:, :3],
-            impulse_B=impulse[:, 3:],
+            time=rows[:, 0],
+            from_case=rows[:, 1].astype(np.int8),
+            to_case=rows[:, 2].astype(np.int8),
+            impulse_A=rows[:, 3:6],
+            impulse_B=rows[:, 6:],
         )
-        return Trajectory.from_blocks(replace(header, settings=settings), self._blocks, events)
+        header = replace(header, settings={**header.settings, **self._energy})
+        return Trajectory.from_blocks(header, self._blocks, events)

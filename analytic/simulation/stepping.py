@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from analytic.mechanics import drag, rigid_body
 from analytic.mechanics.contact_problem import Friction, Impulse, project, solve_pair
-from analytic.mechanics.rigid_body import Forces, Velocities, mean
+from analytic.mechanics.rigid_body import NOTHING, Forces, Velocities, mean
 from analytic.simulation import compiling
 from analytic.simulation.equations import AWAY, ROLLS, SLIPS
 from analytic.simulation.settings import LANDED
@@ -86,9 +86,13 @@ class Ball(NamedTuple):
 
 
 def ball_from_parts(parts: Any) -> Ball:
-    """The ball from the plain tuples that `advance` returns."""
+    """The ball from the plain tuples that `follow` returns."""
     (place, u), P, impact, rest = parts
     return Ball(BallState._make([*place, Velocities(*u)]), Forces(*P), Forces(*impact), *rest)
+
+
+Place = tuple[int, int, float, float]
+"""How far a run is: stretch, steps taken of it, time, and time of the last landing, s."""
 
 
 class Touching(NamedTuple):
@@ -101,31 +105,34 @@ class Touching(NamedTuple):
 
 
 class Stretches(NamedTuple):
-    """Stretches of equal steps from each sample or knot of the flow to the next; arrays (n,)."""
+    """Stretches of equal steps from each sample or knot of the flow to the next, arrays (n,); and the flow."""
 
     start: Array
     dt: Array
     steps: npt.NDArray[np.int64]
     sampled: npt.NDArray[np.bool_]
     """Whether the end is a sample."""
-
-
-class Steps(NamedTuple):
-    """Steps number `first` up to `end` of a row of equal steps dt that begins at the time `start`."""
-
-    start: float
-    dt: float
-    first: int
-    end: int
+    flow: FlowArrays
 
 
 class Rows(NamedTuple):
-    """The rows of an `Ensemble` that belong to a run, and whether nobody wants it any more, shape (1,)."""
+    """Arrays with what is kept of a run, a row a sample or event."""
 
     x: Array
+    """States (n, 8)."""
     case: npt.NDArray[np.int8]
     landings: npt.NDArray[np.int64]
+    """Landings since the sample before (n,)."""
+    path: Array
+    """Time, azimuth, work, and contact forces (n, 9); none where nobody wants them."""
+    events: Array
+    """Times, cases before and after, impulses of landings (m, 9); none where nobody wants them."""
+    taken: npt.NDArray[np.int64]
+    """How many samples are kept, and how many events, shape (2,)."""
+    quiet: float
+    """For how long nothing must land for the run to be stopped, s."""
     over: npt.NDArray[np.bool_]
+    """Whether nobody wants it any more, shape (1,)."""
 
 
 class StepSolution(NamedTuple):
@@ -287,8 +294,7 @@ def _step_to_landing(
 
 def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     """The ball a step of dt later, with omega_0 from the middle of the step."""
-    nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    at, P, impact, case, work, landings, residual = ball.at, nothing, nothing, ball.case, ball.work, ball.landings, 0.0
+    at, P, impact, case, work, landings, residual = ball.at, NOTHING, NOTHING, ball.case, ball.work, ball.landings, 0.0
     q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
     start = Forces(q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z)
     left, count = dt, 0
@@ -317,12 +323,11 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
 
 def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> StepSolution:
     """An impact, with Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
-    nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
     to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > p.g * dt / 200 else 0.0
-    hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, to_A, to_B), nothing, p)
+    hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, to_A, to_B), NOTHING, p)
     if hit.residual != 0 and p.mu >= 1 and p.eta >= 1:  # friction may lock the ball in the corner: no rebound
-        hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, 0.0, 0.0), nothing, p)
+        hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, 0.0, 0.0), NOTHING, p)
     return hit
 
 
@@ -353,54 +358,56 @@ def _flow_at(flow: FlowArrays, time: float) -> float:
     return float(omega_0)
 
 
-@compiling.compiled
-def advance(ball: Ball, steps: Steps, flow: FlowArrays, p: Constants, events: Array) -> tuple[Any, int, int]:
-    """Go on through steps; return the ball, the next step, and events noted.
-
-    The ball is in parts, plain tuples (`ball_from_parts`): a signal would be answered while numba makes named ones,
-    which doesn't look whether it has got them. A row of `events` takes time, code of the case before and after,
-    impulses of landings. It ends early when no row is left, or when a step doesn't converge.
-    """
-    (start, dt, k, end), noted = steps, 0
-    while k < end and noted < len(events):
-        before, ball = ball.case, step(ball, dt, _flow_at(flow, start + (k + 0.5) * dt), p)
-        k += 1
-        if ball.residual != 0:
-            break
-        if ball.case != before or ball.impact.A_y > 0 or ball.impact.B_x > 0:
-            events[noted, 0], events[noted, 1], events[noted, 2] = start + k * dt, before, ball.case
-            events[noted, 3], events[noted, 4], events[noted, 5] = ball.impact.A_x, ball.impact.A_y, ball.impact.A_z
-            events[noted, 6], events[noted, 7], events[noted, 8] = ball.impact.B_x, ball.impact.B_y, ball.impact.B_z
-            noted += 1
-    return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), k, noted
+def keep_sample(ball: Ball, P: Forces, dt: float, time: float, p: Constants, run: Rows) -> None:
+    """Store a ball after a step of length dt with impulses P as the next sample."""
+    row = run.taken[0]
+    state = rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p)
+    for i in range(8):
+        run.x[row, i] = state[i]
+    run.case[row] = ball.case
+    if len(run.path) > 0:
+        run.path[row, 0], run.path[row, 1], run.path[row, 2] = time, ball.at.theta, ball.work
+        for i in range(6):
+            run.path[row, 3 + i] = P[i] / dt
+    run.taken[0] += 1
 
 
 @compiling.compiled
-def follow(ball: Ball, stretches: Stretches, quiet: float, flow: FlowArrays, p: Constants, rows: Rows) -> float:
-    """One run through stretches of steps, into rows; return its end, less than 0 if it failed.
+def follow(ball: Ball, place: Place, stretches: Stretches, p: Constants, run: Rows, most: int) -> tuple[Any, Place]:
+    """Follow a run for at most so many steps, or to its end, where it doesn't converge, or is over: ball and place.
 
-    Rows beyond the end of a run that has been quiet for long repeat its last state. Once another thread sets `over` it
-    ends where it is.
+    They are in parts, plain tuples (`ball_from_parts`): a signal would be answered while numba makes named ones, which
+    doesn't look whether it has got them. Samples beyond the end of a run that has been quiet for long repeat its last
+    state; the place is then behind the last stretch, as at any end.
     """
-    (starts, dts, counts, sampled), (x, case, landings, over) = stretches, rows
-    row, now, landed, known = 1, 0.0, 0.0, 0
-    for s in range(len(starts)):
-        for k in range(counts[s]):
-            now = float(starts[s] + (k + 1) * dts[s])
-            ball = step(ball, dts[s], _flow_at(flow, now - dts[s] / 2), p)
-            if ball.residual != 0 or over[0]:
-                return -now
+    (starts, dts, counts, sampled, flow), (s, k, now, landed) = stretches, place
+    while s < len(starts):
+        start, dt = starts[s], dts[s]
+        while k < counts[s]:
+            if most == 0 or run.over[0]:
+                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (s, k, now, landed)
+            most -= 1
+            case, known = ball.case, ball.landings
+            ball = step(ball, dt, _flow_at(flow, start + (k + 0.5) * dt), p)
+            k += 1
+            now = start + k * dt
+            if ball.residual != 0:
+                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (s, k, now, landed)
             if ball.landings > known:
-                landings[row] += ball.landings - known
-                known, landed = ball.landings, now
+                run.landings[run.taken[0]] += ball.landings - known
+                landed = now
+            if len(run.events) > 0 and (ball.case != case or ball.impact.A_y > 0 or ball.impact.B_x > 0):
+                event = run.events[run.taken[1]]
+                event[0], event[1], event[2] = now, case, ball.case
+                for i in range(6):
+                    event[3 + i] = ball.impact[i]
+                run.taken[1] += 1
         if sampled[s]:
-            state = rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p)
-            for i in range(8):
-                x[row, i] = state[i]
-            case[row] = ball.case
-            row += 1
-            if now - landed > quiet:
-                x[row:] = x[row - 1]
-                case[row:] = case[row - 1]
-                return now
-    return now
+            keep_sample(ball, ball.P, dt, now, p, run)
+            if now - landed > run.quiet:
+                last = run.taken[0] - 1
+                run.x[last + 1 :] = run.x[last]
+                run.case[last + 1 :] = run.case[last]
+                s = len(starts)
+        s, k = s + 1, 0
+    return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (s, k, now, landed)

@@ -11,30 +11,27 @@ While the ball is at the wall, velocities are taken along axes that turn with it
 constant within the step and a ball that is held at the wall neither drifts off nor into it; a stationary orbit is
 reproduced exactly. Otherwise the axes stand still, so that the vessel's axis is no singular point.
 
-Steps and loops over them are in `stepping`, which numba compiles where it is installed (the extra `fast`).
+Steps and the loop over them are in `stepping`, which numba compiles where it is installed (the extra `fast`).
 """
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
 
 from analytic.mechanics import drag, rigid_body
 from analytic.mechanics.contact_problem import NotConvergedError
-from analytic.mechanics.rigid_body import NOTHING, Forces
+from analytic.mechanics.rigid_body import NOTHING
 from analytic.simulation import stepping
-from analytic.simulation.motion import Event, Recorder
+from analytic.simulation.motion import Recorder
 from analytic.simulation.settings import Settings, fitting_step
 from model import Case, Flow, Parameters, State, time_scales
 from model.arrays import Array
 
-BLOCK = 256
-"""Samples kept before they are handed over."""
 AT_ONCE = 10_000
 """Most steps between two looks at progress and keyboard."""
-EVENTS = 1000
-"""Most events between them."""
 
 
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
@@ -43,40 +40,37 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     The first sample, before any step, carries the forces and the case of the first step. Raises
     `NotConvergedError`.
     """
-    now, stretches, fluid, given = prepared(x0, theta_0, p, flow, settings, recorder.times)
-    dt = float(stretches.dt[0])
-    first = stepping.step(now, dt, float(flow(dt / 2)), given)
-    now = now._replace(case=first.case)
-    samples = [(0.0, now._replace(P=first.P), dt)]
-    events = np.empty((EVENTS, 9))
+    times = recorder.times
+    ball, stretches, given = prepared(x0, theta_0, p, flow, settings, times)
+    n, dt, place = len(times), float(stretches.dt[0]), (0, 0, 0.0, 0.0)
+    kept = stepping.Rows(
+        np.empty((n, 8)), np.empty(n, np.int8), np.zeros(n, np.int64), np.empty((n, 9)), np.empty((AT_ONCE, 9)),
+        np.zeros(2, np.int64), math.inf, np.zeros(1, bool),
+    )  # fmt: skip
+    first = stepping.step(ball, dt, float(flow(dt / 2)), given)
+    ball = ball._replace(case=first.case)
+    stepping.keep_sample(ball, first.P, dt, 0.0, given, kept)
     try:
-        for start, dt, count, sampled in zip(*(column.tolist() for column in stretches), strict=True):
-            taken = 0
-            while taken < count:
-                steps = stepping.Steps(start, dt, taken, min(count, taken + AT_ONCE))
-                parts, taken, noted = stepping.advance(now, steps, fluid, given, events)
-                now = stepping.ball_from_parts(parts)
-                for time, before, after, *impulse in events[:noted].tolist():
-                    recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
-                recorder.reached(start + taken * dt)
-                if now.residual != 0:
-                    raise NotConvergedError(
-                        f"velocities still change by {now.residual:g} m s-1; a shorter step than {dt:g} s may help"
-                    )
-            if sampled:
-                samples.append((start + count * dt, now, dt))
-            if len(samples) >= BLOCK:
-                _record_samples(samples, p, recorder)
-                samples = []
+        while place[0] < len(stretches.start):
+            parts, place = stepping.follow(ball, place, stretches, given, kept, AT_ONCE)
+            ball = stepping.ball_from_parts(parts)
+            recorder.note(kept.events[: kept.taken[1]], place[2])
+            kept.taken[1] = 0
+            if ball.residual != 0:
+                dt = stretches.dt[place[0]]
+                raise NotConvergedError(
+                    f"velocities still change by {ball.residual:g} m s-1; a shorter step than {dt:g} s may help"
+                )
     finally:
-        if samples:
-            _record_samples(samples, p, recorder)
+        count = int(kept.taken[0])
+        time, theta, work = kept.path[:count, :3].T
+        recorder.add(time, theta, kept.x[:count], kept.path[:count, 3:], kept.case[:count], work)
 
 
 def prepared(
     x: State, theta: float, p: Parameters, flow: Flow, settings: Settings, times: Array
-) -> tuple[stepping.Ball, stepping.Stretches, stepping.FlowArrays, stepping.Constants]:
-    """What the compiled loops take: the ball in a state that no step has led to, its steps, the flow, and constants.
+) -> tuple[stepping.Ball, stepping.Stretches, stepping.Constants]:
+    """What the compiled loop takes: the ball in a state that no step has led to, its steps in the flow, and constants.
 
     Raises `InputError` if the time step is too large for the problem.
     """
@@ -90,15 +84,12 @@ def prepared(
     given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution, p.fluid_torque
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
-        stepping.Stretches(knots[:-1], length / steps, steps, np.isin(knots[1:], times)),
-        stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
+        stepping.Stretches(
+            knots[:-1],
+            length / steps,
+            steps,
+            np.isin(knots[1:], times),
+            stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
+        ),
         stepping.Constants(drag.law(p), *map(float, given)),  # an integer would be compiled for itself
     )
-
-
-def _record_samples(samples: list[tuple[float, stepping.Ball, float]], p: Parameters, recorder: Recorder) -> None:
-    times, balls, steps = zip(*samples, strict=True)
-    theta, case, work = (np.array(each) for each in zip(*((b.at.theta, b.case, b.work) for b in balls), strict=True))
-    states = np.array([rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p) for ball in balls])
-    forces = np.array([ball.P for ball in balls]) / np.array(steps)[:, None]
-    recorder.add(np.array(times), theta, states, forces, case, work)

@@ -34,8 +34,7 @@ BALLS = [P.replace(drag=LAWS[k % len(LAWS)]) for k in range(len(FLOWS))]
 
 def in_plain_python(monkeypatch):
     monkeypatch.setattr(hybrid, "run_compiled", hybrid.run_through_flow)
-    for loop in ("advance", "follow"):
-        monkeypatch.setattr(stepping, loop, getattr(stepping, loop).py_func)
+    monkeypatch.setattr(stepping, "follow", stepping.follow.py_func)
 
 
 def assert_same(run, other, tolerance):

@@ -27,7 +27,7 @@ def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, given):
     while abs(rolls - slips) > 4e-16 * abs(slips):
         middle = (rolls + slips) / 2
         rolling = State(omega_c=middle), 0.0, p, Flow.steady(p.omega_0), Settings(), np.array([0.0, dt])
-        ball, _, _, constants = prepared(*rolling)
+        ball, _, constants = prepared(*rolling)
         after = step(ball, dt, p.omega_0, constants)
         assert after.residual == 0
         rolls, slips = (middle, slips) if after.case == Case.RR else (rolls, middle)
