@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.simulation.motion import Moment
-from analytic.simulation.settings import LANDED, Settings, check_duration, sample_times, start_state
+from analytic.simulation.settings import ENDLESS, LANDED, Settings, check_duration, sample_times, start_state
 from model import Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.errors import check_type
@@ -21,8 +21,6 @@ from model.kinematics import TURNING, VARIABLES, full_state
 from model.parameters import POSITIVE, Range, check_number
 
 MOST_THREADS = 1024
-ENDLESS = 2**62
-"""As many steps as there are."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from analytic.simulation.charts import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
 from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, Stretch, first_pace, stretch
 from analytic.simulation.motion import Moment, Recorder
-from analytic.simulation.settings import Settings
+from analytic.simulation.settings import ENDLESS, Settings
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 
@@ -34,8 +34,6 @@ MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
 STRIDES, STEPS = 20, 1000
 """How often a case is followed, and steps each time, between two looks at progress and keyboard."""
-ENDLESS = 2**62
-"""As many as there are."""
 
 
 class Stage(NamedTuple):

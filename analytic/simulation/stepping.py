@@ -91,7 +91,7 @@ def ball_from_parts(parts: Any) -> Ball:
     return Ball(BallState._make([*place, Velocities(*u)]), Forces(*P), Forces(*impact), *rest)
 
 
-Place = tuple[int, int, float, float]
+Progress = tuple[int, int, float, float]
 """How far a run is: stretch, steps taken of it, time, and time of the last landing, s."""
 
 
@@ -373,7 +373,9 @@ def keep_sample(ball: Ball, P: Forces, dt: float, time: float, p: Constants, run
 
 
 @compiling.compiled
-def follow(ball: Ball, place: Place, stretches: Stretches, p: Constants, run: Rows, most: int) -> tuple[Any, Place]:
+def follow(
+    ball: Ball, place: Progress, stretches: Stretches, p: Constants, run: Rows, most: int
+) -> tuple[Any, Progress]:
     """Follow a run for at most so many steps, or to its end, where it doesn't converge, or is over: ball and place.
 
     They are in parts, plain tuples (`ball_from_parts`): a signal would be answered while numba makes named ones, which
