@@ -39,11 +39,6 @@ def solution_of(m: Measurement) -> StationarySolution:
     raise LookupError(f"no state of case {case_of(m).name} lasts")
 
 
-def exists(case: Case, m: Measurement) -> bool:
-    """Whether friction suffices for a stationary state of a case."""
-    return any(s.exists for s in theory(analytic.stationary_solutions, m.parameters, (case,)))
-
-
 def thresholds_of(m: Measurement) -> analytic.Thresholds:
     """The thresholds of a set by theory: independent of the flow at which something was measured."""
     return theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))

@@ -42,20 +42,14 @@ class Basins:
     """Fates over a plane of starts."""
 
     parameters: Parameters
-    start: tuple[float, ...]
-    """State (8,) whose other variables all starts share."""
-    across: str
-    """Names of the two variables that vary."""
+    start: tuple[float, ...]  # state (8,) whose other variables all starts share
+    across: str  # names of the two variables that vary
     up: str
-    x: Array
-    """Their values, shapes (n,) and (m,)."""
+    x: Array  # their values, shapes (n,) and (m,)
     y: Array
-    fates: npt.NDArray[np.int64]
-    """Indices of `FATES`, by the event-driven simulation, shape (m, n)."""
-    coarse: int
-    """MuJoCo has computed every `coarse`-th point along both axes; 0 for none."""
-    mujoco: npt.NDArray[np.int64]
-    """Its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s."""
+    fates: npt.NDArray[np.int64]  # indices of `FATES`, by the event-driven simulation, shape (m, n)
+    coarse: int  # MuJoCo has computed every `coarse`-th point along both axes; 0 for none
+    mujoco: npt.NDArray[np.int64]  # its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s
     timestep: float
 
     def share(self, fate: str) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
-from compare.claim import Bearing, Text, all_of, bearings, claim, given
+from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, state
 from compare.kit.settling import physical_case
@@ -66,14 +66,9 @@ def _loop_case(m: Measurement) -> Case:
     return next(iter(here or states))
 
 
-def _jumps_up(m: Measurement) -> bool:
-    """Whether the ball was lifted off the floor at a level of the hysteresis loop."""
-    return case_of(m) is Case.NR and m.conditions["before"] != Case.NR.name
-
-
-def _jumps_down(m: Measurement) -> bool:
-    """Whether the ball came down to the floor at a level of the hysteresis loop."""
-    return case_of(m) is not Case.NR and m.conditions["before"] == Case.NR.name
+def _jumps(way: int) -> When:
+    """A filter of levels of the hysteresis loop: the ball was lifted off the floor (1), came down (-1), or neither."""
+    return lambda m: (case_of(m) is Case.NR) - (m.conditions["before"] == Case.NR.name) == way
 
 
 def _loop_reading(m: Measurement) -> float:
@@ -241,8 +236,8 @@ CLAIMS = (
         "Fig. 13, left",
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
         *(
-            Bearing("hysteresis", "case", lambda m: float(_loop_case(m)), when=when, by="analytic.stable_solutions")
-            for when in (_jumps_up, _jumps_down, lambda m: not (_jumps_up(m) or _jumps_down(m)))
+            Bearing("hysteresis", "case", _loop_case, when=_jumps(way), by="analytic.stable_solutions")
+            for way in (1, -1, 0)
         ),
         Bearing("hysteresis", "omega_c", _loop_reading, by="(32), (38), (46)"),
         text=Text.CORRECTED,

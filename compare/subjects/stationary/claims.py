@@ -13,18 +13,7 @@ from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
-from compare.states import (
-    case_of,
-    exists,
-    from_floor,
-    is_in,
-    lasting_cases,
-    lifts_first,
-    quantity_of,
-    slips_first,
-    solution_of,
-    thresholds_of,
-)
+from compare.states import case_of, from_floor, is_in, lasting_cases, lifts_first, quantity_of, slips_first, solution_of
 from model import Case
 from model.drag import SCHILLER_NAUMANN
 
@@ -39,7 +28,7 @@ def case(m: Measurement) -> float:
     """
     allowed = lasting_cases(m.parameters)
     if m.conditions["start"] == "on the wall":
-        if case_of(m) is Case.NS and exists(Case.NR, m):
+        if case_of(m) is Case.NS and _exists(Case.NR, m):
             raise LookupError("NR exists, and yet the ball sinks")
         allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
     else:
@@ -53,12 +42,18 @@ def case(m: Measurement) -> float:
 
 def rolling(m: Measurement) -> float:
     """RR as long as it exists, (84) and (86); beyond, a case that lasts, which RR is not."""
-    limit = thresholds_of(m).omega_01 if slips_first(m) else thresholds_of(m).omega_03
+    t = theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
+    limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
-    if case_of(m) is Case.RR or (exists(Case.RR, m) and m.parameters.mu < 1):  # beyond, forces may hold it
+    if case_of(m) is Case.RR or (_exists(Case.RR, m) and m.parameters.mu < 1):  # beyond, forces may hold it
         raise LookupError("RR has ended")
     return case(m)
+
+
+def _exists(case: Case, m: Measurement) -> bool:
+    """Whether theory has a stationary state of a case."""
+    return any(s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters))
 
 
 def _value_bearings(
