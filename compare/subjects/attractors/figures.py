@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from operator import methodcaller
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +19,7 @@ from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import Bifurcation
 from compare.branches import Drawn, check_thresholds, round_with_fluid, slipping, spin, spin_of
 from compare.kit import style
-from compare.kit.drawing import Diagram, Evidence, GapError, diagram
-from compare.kit.record import Measurement
+from compare.kit.drawing import Diagram, GapError, diagram
 from compare.subjects.attractors.basins import FATES, Basins
 from model import Case, Contact, Parameters, State
 
@@ -241,12 +240,10 @@ def fill_basins(axes: Axes, basins: Basins) -> None:
     )
 
 
-def _measured(quantity: str, evidence: Evidence) -> Iterator[Measurement]:
-    return evidence.select(quantity, "period")
-
-
 FIGURES = {
-    name: diagram(name, f"Beyond the paper: {title}", "hopping", draw, (claim,), functools.partial(_measured, quantity))
+    name: diagram(
+        name, f"Beyond the paper: {title}", "hopping", draw, (claim,), methodcaller("select", quantity, "period")
+    )
     for name, title, quantity, draw, claim in (
         ("hopping-orbit", "a ball that hops for ever", "orbit_omega_c", draw_orbit, "hopping"),
         ("hopping-branch", "Figs. 9, 10 and 13 with hopping", "orbit_omega_c", draw_branch, "hopping-birth"),
