@@ -152,7 +152,7 @@ class PlainOnJoints(Bodies):
             super().step(n)
             return
         if not self._at:
-            (run,) = carry_out([self._task])
+            run = carry_out(self._task)
             if run.header.failure:
                 raise InputError(run.header.failure)
             self._states = np.stack(to_world(run.x, run.theta, self._task.parameters), axis=1)

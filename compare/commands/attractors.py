@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
 
     def simulate(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
         lasting = {"t_end": duration, "sample_interval": interval}
-        return carry_out([running.task(args, p, x0=State.of(x0), **lasting) for x0 in x0s])
+        return [carry_out(running.task(args, p, x0=State.of(x0), **lasting)) for x0 in x0s]
 
     rows = []
     for p in grid(options.parameters(args), axes):

@@ -237,22 +237,24 @@ class Campaign:
         self._read = {}
         self._files = {key: file for key, file in self._files.items() if file not in gone}
 
-    def _carry_out(self, todo: Iterable[Task]) -> Iterator[tuple[Sequence[Task], Sequence[Ended]]]:
+    def _carry_out(self, todo: Sequence[Task]) -> Iterator[tuple[list[Task], list[Ended]]]:
         """Yield each batch of tasks that ends, with what became of them.
 
-        Tasks that can run together are shared out evenly among the workers, the longest first: then all end together.
+        Tasks are shared out evenly among the workers, the longest first: then all end together.
         A worker that dies takes all batches under way with it. Their tasks are tried again at the end, one at a time;
         one that then loses its worker twice has failed.
         """
-        groups: dict[str, list[Task]] = {}
-        for task in todo:
-            groups.setdefault(task.batch_key, []).append(task)
-        fresh = deque[Sequence[Task]]()
-        for group in sorted(groups.values(), key=lambda group: -group[0].steps * len(group)):
-            most = min(self.batch, math.ceil(len(group) / self.fleet.count), int(HELD / group[0].samples))
-            share = 1 if group[0].long else max(1, most)
-            fresh += [group[start : start + share] for start in range(0, len(group), share)]
-        pending: dict[Future[list[Ended]], Sequence[Task]] = {}
+        fresh, share = deque[list[Task]](), sum(task.steps for task in todo) / self.fleet.count
+        steps, samples = 0.0, 0.0  # of the batch that grows: the sum, and the most of a run
+        for task in sorted(todo, key=lambda task: -task.steps):
+            steps, samples = steps + task.steps, max(samples, task.samples)
+            last = fresh[-1] if fresh else []
+            full = len(last) == self.batch or (len(last) + 1) * samples > HELD or steps > 1.001 * share
+            if not last or last[0].long or full:
+                fresh.append([])
+                steps, samples = task.steps, task.samples
+            fresh[-1].append(task)
+        pending: dict[Future[list[Ended]], list[Task]] = {}
         again: deque[Task] = deque()
         died: Counter[str] = Counter()
         while True:
@@ -284,30 +286,28 @@ class Campaign:
 
 
 def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[Ended]:
-    """Carry out tasks within so many s each, and store their runs; raises `StorageError` if that can't be done.
-
-    Where a batch can't be carried out as a whole, its tasks are tried one by one.
-    """
-    begun, paths = time.process_time(), [storing.directory / f"{storing.label}-{task.key}.h5" for task in tasks]
-    try:
-        if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
-            failure = store(tasks[0], paths[0], limit)
-            return [(failure, failed_path(paths[0]) if failure else paths[0], None)]
-        runs = carry_out(tasks, deadline(limit * len(tasks)))
-    except StorageError:  # a full disk is for the user to mend
-        raise
-    except (InputError, TimeoutError, MemoryError) as error:
-        if len(tasks) > 1:
-            return [outcome for task in tasks for outcome in run_batch([task], storing, limit)]
-        return [(str(error) or "out of memory", None, None)]
-    whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
-    handed_out = storing.passing and time.process_time() - begun < SOON_DONE
-    together = storing.store(whole) if whole and not handed_out else None
-    outcomes: list[Ended] = []
-    for run, path in zip(runs, paths, strict=True):
+    """Carry out tasks, each within so many s, and store their runs; raises `StorageError` if that can't be done."""
+    begun, whole, ended = time.process_time(), dict[str, Trajectory](), dict[str, Ended]()
+    for task in tasks:
+        path = storing.directory / f"{storing.label}-{task.key}.h5"
+        try:
+            if task.long or task.samples > HELD:
+                failure = store(task, path, limit)
+                ended[task.key] = failure, failed_path(path) if failure else path, None
+                continue
+            run = carry_out(task, deadline(limit))
+        except StorageError:  # a full disk is for the user to mend
+            raise
+        except (InputError, TimeoutError, MemoryError) as error:
+            ended[task.key] = str(error) or "out of memory", None, None
+            continue
         if run.complete:
-            outcomes.append(("", together, run if handed_out else None))
+            whole[task.key] = run
         else:
             storage.save(run, failed_path(path))
-            outcomes.append((run.header.failure, failed_path(path), None))
-    return outcomes
+            ended[task.key] = run.header.failure, failed_path(path), None
+    if storing.passing and time.process_time() - begun < SOON_DONE:
+        ended |= {key: ("", None, run) for key, run in whole.items()}
+    elif whole:
+        ended |= dict.fromkeys(whole, ("", storing.store(whole), None))
+    return [ended[task.key] for task in tasks]

@@ -103,7 +103,7 @@ STUDY_SLIP = 2.0
 
 @cache
 def _rough(step: float) -> ContactSettings:
-    """Contact settings that suit a ball on the roughest floor; with `suited` one of two, so that runs share a batch."""
+    """Contact settings that suit a ball on the roughest floor."""
     return ContactSettings.for_problem(Parameters.named("reference").replace(mu=1.0, eta=0.0), step, STUDY_SLIP)
 
 

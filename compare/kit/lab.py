@@ -93,9 +93,6 @@ def dragged_speed(p: Parameters) -> float:
 
 
 def coarse_step(p: Parameters) -> float:
-    """A time step in s that resolves `time_unit` about twenty times, and 1/omega_0 four times: a power of two of 1 ms.
-
-    Few sets then need a batch of their own.
-    """
+    """A time step in s, a power of two of 1 ms: a twentieth of `time_unit` or so, and no more than 1/(4 omega_0)."""
     finest = math.floor(math.log2(250 / abs(p.omega_0))) if p.omega_0 else math.inf
     return float(1e-3 * 2.0 ** min(round(math.log2(time_unit(p) / 20e-3)), finest))

@@ -173,7 +173,7 @@ def settled_readings(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterat
 def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
     """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the wall swings.
 
-    A whole multiple of so many coarse time steps, so that sets of about the same drag share a batch.
+    A whole multiple of so many coarse time steps: chosen when alike runs shared a batch, as is `rounded_duration`.
     """
     unit = steps * coarse_step(p)
     turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
@@ -186,7 +186,7 @@ def safe_height(p: Parameters) -> float:
 
 
 def rounded_duration(p: Parameters, units: float) -> float:
-    """A duration of about `units` of 1/c, s: a power of two, so that runs of several sets share batches."""
+    """A duration of about `units` of 1/c, s: a power of two."""
     return float(2.0 ** round(math.log2(units / p.c)))
 
 

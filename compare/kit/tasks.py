@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -100,12 +100,6 @@ class Task:
         """Whether the run hands out its samples and takes more than `LONG` steps."""
         return self.simulator.stream is not None and self.steps > LONG
 
-    @property
-    def batch_key(self) -> str:
-        """Tasks of equal batch key can be carried out together."""
-        apart = () if self.long else ("parameters", "x0", "flow")
-        return json.dumps({k: v for k, v in self.describe().items() if k not in apart}, sort_keys=True)
-
 
 def deadline(limit: float) -> Callable[[], None]:
     """A function that raises `TimeoutError` once more than `limit` s of real time have passed."""
@@ -118,14 +112,11 @@ def deadline(limit: float) -> Callable[[], None]:
     return check
 
 
-def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -> list[Trajectory]:
-    """Run tasks of one `Task.batch_key`, calling `check` from time to time.
-
-    A run that breaks down comes back with its failure in the header.
-    """
-    if simulate := tasks[0].simulator.simulate:
-        return [simulate(task, lambda done: check()) for task in tasks]
-    return [_start_stream(task, progress=lambda done: check()).trajectory() for task in tasks]
+def carry_out(task: Task, check: Callable[[], None] = lambda: None) -> Trajectory:
+    """Run a task, calling `check` from time to time; a run that breaks down has its failure in the header."""
+    if simulate := task.simulator.simulate:
+        return simulate(task, lambda done: check())
+    return _start_stream(task, progress=lambda done: check()).trajectory()
 
 
 def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:
@@ -150,7 +141,7 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
             if stop():
                 raise InterruptedError("interrupted")
 
-        (run,) = carry_out([task], check_stop)
+        run = carry_out(task, check_stop)
         failure = run.header.failure
         storage.save(run, failed_path(path) if failure else path)
     else:

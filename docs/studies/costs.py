@@ -255,7 +255,7 @@ def resuming() -> float:
     """Time to find out that `FINISHED` tasks are done, s."""
     with tempfile.TemporaryDirectory() as directory:
         tasks = _tasks(FINISHED)
-        (run,) = carry_out(tasks[:1])
+        run = carry_out(tasks[0])
         for k in range(0, FINISHED, BATCH):
             storage.save_batch({task.key: run for task in tasks[k : k + BATCH]}, Path(directory) / f"runs-{k:024x}.h5")
         with Campaign(Path(directory), workers=0) as campaign:

@@ -108,7 +108,7 @@ def landings(step: float) -> Rows:
     for name, way in ways.items():
         (contestant,), land, hit = _contestants({name: way}), states.LANDING, states.HITTING
         lands, hits, *others = (
-            carry_out([contestant.task((each.p, x0, lasts, step))])[0]
+            carry_out(contestant.task((each.p, x0, lasts, step)))
             for each, x0, lasts in (
                 *((each, each.x0, each.lasts) for each in (land, hit)),
                 *((land, land.x0._replace(y=land.x0.y + more), 0.25) for more in HIGHER),

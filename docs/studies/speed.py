@@ -232,7 +232,7 @@ def stepped() -> Rows:
     def take(step: float) -> Trajectory:
         way: dict[str, Any] = {"settings": siconos.at(step, motion.p), "sample_interval": motion.t_end / 1000}
         task = Task(engine=siconos.name, parameters=motion.p, x0=motion.x, t_end=motion.t_end, flow=motion.flow, **way)
-        return carry_out([task])[0]
+        return carry_out(task)
 
     step_by_step(timestep=STEPPED[0])  # which compiles it
     error, spent = deviation(run(motion).x * turning, right), seconds(lambda: run(motion))

@@ -266,7 +266,7 @@ def cost(task: Task) -> float:
 
     def seconds(task: Task) -> float:
         begin = clock()
-        carry_out([task])
+        carry_out(task)
         return clock() - begin
 
     half = replace(task, t_end=task.t_end / 2)

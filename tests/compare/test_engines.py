@@ -52,8 +52,7 @@ def task_of(name, p, x0, t_end, step, interval=None):
 
 
 def simulated(*given, **more):
-    (trajectory,) = carry_out([task_of(*given, **more)])
-    return trajectory
+    return carry_out(task_of(*given, **more))
 
 
 @pytest.mark.parametrize("name", [name for name, each in ENGINES.items() if "timestep" in each.options])
@@ -267,7 +266,7 @@ def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monk
     monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
     monkeypatch.setattr(siconos.subprocess, "Popen", lambda *a, **b: started.append(popen(*a, **b)) or started[-1])
     task = Task(engine="siconos", parameters=P, x0=(0.0,) * 6, t_end=0.01, settings=Settings())
-    (run,) = carry_out([task])
+    run = carry_out(task)
     assert run.header.failure.startswith(says)
     assert run.header.versions["siconos"] == "4.4.0"
     assert not run.complete

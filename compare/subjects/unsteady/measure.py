@@ -4,7 +4,7 @@
   pulsation about a fixed part of the flow at which two-point rolling ends shows how the ball follows; every other run
   starts from there, so that it need not settle. With Stokes' law the response is linear; with another one the amplitude
   is raised step by step until the ball slips, and each time settled anew. The ball slips where the engine shows slip at
-  both contacts. Frequencies are powers of two, so that sets of about the same drag share batches.
+  both contacts. Frequencies are powers of two.
 * The flow changes once by a small jump. Half the difference of two runs, after a jump up and one down, is free of what
   goes with the square of the jump.
 * A ramp starts from settled slipping well below the end of it, and ends well above; the ball has left slipping once it
