@@ -73,18 +73,6 @@ def undisturbed(tmp_path_factory):
     return data(directory)
 
 
-def test_what_is_done_is_not_done_again(tmp_path):
-    seen = []
-    with Campaign(tmp_path, workers=0, report=lambda *now: seen.append(now), doing="it") as campaign:
-        campaign.complete(tasks(3))
-        before = written(tmp_path)
-        campaign.complete(tasks(4))
-    assert seen[-1] == ("it", 4, 4, 0)
-    assert completed(tmp_path, asked=tasks(4)) == []
-    assert before.items() < written(tmp_path).items()
-    assert (len(before), len(written(tmp_path))) == (1, 2)
-
-
 def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
     """Of runs of 201 samples each no file is read twice in a campaign, as long as there is room."""
     loaded, read = [], storage.load_runs

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 
-import mujoco
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -52,22 +51,6 @@ def test_a_case_is_whole(case):
 def test_the_list_that_is_shown_is_that_of_the_cases():
     """templates/cases.json spares the list the simulations."""
     assert {"version": VERSION, "cases": exact.listing()} == LISTED
-
-
-@pytest.mark.parametrize("case", NAMES, indirect=True)
-def test_mjcf_is_the_same_scene_at_the_same_start(case):
-    model = mujoco.MjModel.from_xml_string(case.mjcf())
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
-    body = data.body("body")
-    velocity = np.empty(6)
-    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body.id, velocity, 0)
-    assert np.allclose(body.xpos, case.body.position)
-    assert np.allclose(velocity, [*case.body.spin, *case.body.velocity], atol=1e-12)
-    assert model.body_mass[body.id] == case.body.mass
-    touched = {contact.friction[0] for contact in data.contact if abs(contact.dist) < 1e-9}
-    assert touched <= {*(surface.friction for surface in case.surfaces), case.between}
 
 
 # --- a second way to the motions, which knows nothing of the variables in which they are known ----------------

@@ -1,5 +1,9 @@
-"""The forecast of contacts stands beside what MuJoCo does in small scenes, and its advice does what it says."""
+"""Forecasts of contacts stand beside what MuJoCo does in small scenes, and their advice does what it says.
 
+Settings of an MJCF file reach the engine of the league as MuJoCo itself reads them.
+"""
+
+import dataclasses
 import itertools
 import json
 import math
@@ -9,13 +13,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from compare.bench import forecast, forecast_page
+from compare.adapters.mujoco_free import Bodies
+from compare.bench import forecast, forecast_page, native
+from compare.bench.native import Pair
 from compare.bench.settled import STILL, settle
 from model import InputError
-from tests.commands import carried_out
+from tests.commands import carried_out, told
+from tests.exact_cases import CASES
 
 FLOOR = '<geom name="floor" type="plane" size="20 20 .1" {}/>'
-SLOPE = FLOOR.format('euler="0 15 0"')
+GROUND, SLOPE = FLOOR.format(""), FLOOR.format('euler="0 15 0"')
 
 
 def box(place=".013 0 .0525", angle="0 15 0", name="box"):
@@ -155,7 +162,7 @@ def test_contact_is_lost_from_the_predicted_speed_on(name):
         assert (not all(carried)) == lost
 
 
-LEVEL = FLOOR.format("") + box(place="0 0 .0499", angle="0 0 0")
+LEVEL = GROUND + box(place="0 0 .0499", angle="0 0 0")
 ROUND = '<body name="ball" pos="0 0 .0499"><freejoint/><geom name="ball" type="sphere" size=".05" mass="1"/></body>'
 UNSAFE = '<flag refsafe="disable"/>'
 STEPS = {
@@ -224,7 +231,7 @@ REFUSED = {
     mjcf(""): (2, "nothing touches"),
     mjcf(FALLING): (2, "nothing touches.*body 'stone' at .* m/s"),
     mjcf(FALLING, rest='<equality><weld body1="stone"/></equality>'): (2, "nothing touches"),
-    mjcf(FLOOR.format("") + CLOTH): (2, "nothing touches.*16 contacts of flexible bodies are left out"),
+    mjcf(GROUND + CLOTH): (2, "nothing touches.*16 contacts of flexible bodies are left out"),
     mjcf(SLOPE + ROUND): (1, "still moves: body 'ball' at"),
     mjcf(LEVEL.replace('"/></body>', '" /><joint/></body>')): (2, "MuJoCo refuses it"),
     mjcf(LEVEL, 'timestep="0"'): (2, "scene.xml: timestep = 0 s is out of range: must be > 0"),
@@ -266,7 +273,7 @@ def test_a_pair_that_no_joint_can_part_has_a_forecast_nevertheless():
     turning = f'<body pos="0 0 .0499"><joint axis="0 0 1"/><geom name="box" {BLOCK} mass="1"/></body>'
     across = turning.replace("<joint ", '<joint type="slide" ').replace("0 0 1", "1 0 0")
     for body in (turning, across):
-        _, _, found = settled(mjcf(FLOOR.format("") + body))
+        _, _, found = settled(mjcf(GROUND + body))
         assert not found.pairs[0].parts
         assert any("No joint can part these" in line for line in forecast_page.sentences(found))
 
@@ -302,7 +309,7 @@ def test_a_robot_that_falls_is_said_to_and_one_that_its_controller_holds_is_not(
     def hold(model, data):
         data.ctrl[0] = -50 * data.qpos[0] - 5 * data.qvel[0]
 
-    text = mjcf(FLOOR.format("") + POLE + LEVEL.removeprefix(FLOOR.format("")).replace('pos="0', 'pos="1'), rest=HIP)
+    text = mjcf(GROUND + POLE + LEVEL.removeprefix(GROUND).replace('pos="0', 'pos="1'), rest=HIP)
     _, _, fallen = settled(text)
     assert re.match("body 'pole' by .* m, its joint 'hip' by 1.* rad", fallen.settled.collapsed[0])
     assert "floor / pole" in [pair.name for pair in fallen.pairs]
@@ -358,3 +365,106 @@ def test_where_no_option_helps_coulomb_does(forecasts):
     assert "coulomb = mjsim.Coulomb(model)" in shown
     (ball,) = re.findall(r"floor / ball +(.*)", shown.partition("With mjsim.Coulomb")[2])
     assert ball.split()[:4] == ["0"] * 4  # creep and turning, predicted and found
+
+
+SMALL = '<body name="ball"><freejoint/><geom name="ball" type="sphere" size="0.01"/></body>'
+WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Settings read from a file with this text."""
+
+    def read(text):
+        (tmp_path / "scene.xml").write_text(text)
+        return native.read(tmp_path / "scene.xml")
+
+    return read
+
+
+def test_the_league_takes_the_settings_of_a_file(tmp_path, capsys, monkeypatch):
+    """A block on a slope creeps as MuJoCo comes and holds with a cone; the step is that of the file."""
+    monkeypatch.setattr("compare.bench.league.cases", lambda: [CASES["block-rests"], CASES["rolls-on-both"]])
+    (tmp_path / "mine.xml").write_text(mjcf(GROUND + SMALL, 'timestep="0.001" cone="elliptic" impratio="100"'))
+    words = f"league --settings {tmp_path / 'mine.xml'} --engine mujoco-defaults -o {tmp_path} --json"
+    found = json.loads(told(capsys, words))["engines"]
+    assert list(found) == ["mine", "mujoco-defaults"]
+    mine, usual = ({result["case"]: result for result in results}["block-rests"] for results in found.values())
+    assert mine["steps"] == [0.001]
+    assert "no wall" in mine["engine"]["note"]
+    assert mine["errors"][-1] < usual["errors"][-1] / 30
+
+
+def test_settings_come_through_to_the_engine(read):
+    text = (
+        'integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" tolerance="1e-5" '
+        'noslip_iterations="2"'
+    )
+    A, B = Pair(solref=(0.005, 0.8), margin=1e-4), Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3))
+    given = dataclasses.replace(read(mjcf(GROUND + WALL + SMALL, text)), A=A, B=B)
+    body = Bodies("mine", "", tune=given.tune)
+    body.build(CASES["rolls-on-both"], 0.0015)
+    option = body.model.opt
+    assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
+    assert (option.impratio, option.iterations, option.cone) == (7.0, 33, mujoco.mjtCone.mjCONE_ELLIPTIC)
+    assert (option.integrator, option.solver) == (mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtSolver.mjSOL_CG)
+    for k, geom in enumerate(body.model.pair_geom1):
+        if body.model.geom(geom).name == "floor":
+            assert (*body.model.pair_solref[k], body.model.pair_margin[k]) == (0.005, 0.8, 1e-4)
+        else:
+            assert body.model.pair_solimp[k].tolist() == [0.2, 0.3, 0.01, 0.4, 3]
+
+
+def test_geoms_are_mixed_as_the_engine_does(read):
+    """Against the contact that MuJoCo itself makes."""
+    text = mjcf(
+        '<geom name="floor" type="plane" size="1 1 1" solref="0.01 0.9" solmix="3" margin="0.001"/>'
+        '<geom name="wall" type="box" size="0.1 1 1" pos="0.1095 0 0" solimp="0.5 0.6 0.01" priority="1"/>'
+        '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 1.1"/></body>'
+    )
+    of_scene, model = read(text), mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 2
+    for contact in data.contact:
+        pair = of_scene.A if model.geom("floor").id in contact.geom else of_scene.B
+        assert pair.solref == pytest.approx(tuple(contact.solref))
+        assert pair.solimp == pytest.approx(tuple(contact.solimp))
+        assert pair.margin == pytest.approx(contact.includemargin)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<mujoco", "MuJoCo refuses it"),
+        (mjcf(GROUND), "there is no ball"),
+        (mjcf(SMALL), "the ball has no contacts"),
+        (mjcf(GROUND + SMALL, flag='<flag contact="disable"/>'), "the ball has no contacts"),
+        (mjcf(GROUND + SMALL.replace("ball", "a") + SMALL.replace("ball", "b")), "there are 2 spheres that move"),
+        ("\0\1\2", "MuJoCo refuses it"),
+        (mjcf(GROUND + SMALL, rest='<contact><pair geom1="ball" geom2="wall"/></contact>'), "MuJoCo refuses it"),
+        (mjcf(GROUND + SMALL, 'tolerance="-1"'), "tolerance = -1 is out of range: must be >= 0"),
+    ],
+)
+def test_files_without_such_contacts(read, text, message):
+    with pytest.raises(InputError, match=message) as refused:
+        read(text)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("world", "lacks"),
+    [
+        *(
+            (GROUND + SMALL.replace(">", f' pos="0 0 {z}">', 1), "no wall .* its floor")
+            for z in (-0.004, 0.0, 0.0099, 1)
+        ),
+        (WALL + SMALL, "no floor .* its wall"),
+        (GROUND + WALL + SMALL, "^$"),
+    ],
+)
+def test_what_stands_for_what_is_missing(read, world, lacks):
+    of_scene = read(mjcf(world))
+    assert re.search(lacks, of_scene.note)
+    assert "\n" not in of_scene.note
+    assert (of_scene.A == of_scene.B) is bool(of_scene.note)

@@ -32,24 +32,29 @@ from tests.measured import thresholds as known
 
 P, HOPPING = Parameters.named("reference"), Parameters.named("hopping")
 QUICK = sets(Level.QUICK)
-SETS = {"reference": P}
+SETS, WALL, THICK = {"reference": P}, {"rough-wall": QUICK["rough-wall"]}, P.replace(c=10.0)
+ROUGH, SAMPLES = QUICK["high-wall-friction"], 50
 PROTOCOLS = {
     "field": lambda lab: motions.field(lab, SETS, Records()),
     "growth": lambda lab: growth.measure(lab, SETS, Records()),
     "bounds": lambda lab: onset.bounds(lab, SETS, known("reference", P, "omega_01", "omega_02")),
     "lift": lambda lab: onset.lift(lab, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
     "impacts": lambda lab: motions.impacts(lab, SETS, Records()),
+    "pulsation": lambda lab: unsteady.pulsation(
+        lab, WALL, known("rough-wall", QUICK["rough-wall"], "omega_01", "omega_02", "omega_04", uncertainty=0.0)
+    ),
 }
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, monkeypatch):
-    """The first group of runs is said to; validation shows what all of them measure."""
+    """The first group is said to, in pulsations the first run; validation shows what all of them measure."""
     groups, tried = Lab.groups, []
 
     def breaking(lab, asked):
         for group, runs in zip(asked, groups(lab, asked), strict=True):
-            tried.extend([group] if len(group) > 1 else [])  # not a run that has to settle first
+            if len(group) > 1 or name == "pulsation":  # not a run that has to settle first
+                tried.append(group)
             yield "diverged at once" if tried == [group] else runs
 
     monkeypatch.setattr(Lab, "groups", breaking)
@@ -58,10 +63,22 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, mo
     assert sum(missing.rows for missing in left.missing if "at once" in missing.reason) < len(left.measurements)
 
 
-def test_without_friction_nothing_rolls_and_the_reader_is_told(lab):
-    smooth = {"ice": P.replace(eta=0.0)}
-    for protocol, measure in (("growth", growth.measure), ("bounds", onset.bounds)):
-        assert list(measure(lab, smooth, Records())) == [Missing(protocol, "ice", growth.FRICTIONLESS)]
+@pytest.mark.parametrize(
+    ("measure", "p", "said"),
+    [
+        (growth.measure, P.replace(eta=0.0), growth.FRICTIONLESS),
+        (onset.bounds, P.replace(eta=0.0), growth.FRICTIONLESS),
+        (unsteady.pulsation, ROUGH, "no flow was measured at which two-point rolling ends by slipping"),
+        (unsteady.jumps, ROUGH, "no flows were measured between which the ball slips at both points"),
+        (thresholds.measure, P, "ends two-point rolling"),
+        (flowmeter.hysteresis, THICK, "no flow at which slipping on the floor gives way to riding the wall"),
+    ],
+)
+def test_what_is_not_there_is_said(lab, measure, p, said):
+    """Without friction, slip, settled states, or a change from slipping to riding."""
+    rows = list(measure(lab, {"mine": p}, Records()))
+    assert {(type(row), row.set) for row in rows} == {(Missing, "mine")}
+    assert any(said in row.reason for row in rows)
 
 
 @pytest.mark.parametrize(("share", "turns"), [(1.1, True), (0.9, False)])
@@ -76,21 +93,6 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
     assert motions.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
 
 
-def test_a_run_that_breaks_down_leaves_out_its_own_pulsation(lab, monkeypatch):
-    each, tried, name = Lab.each, [], "rough-wall"
-    before = known(name, QUICK[name], "omega_01", "omega_02", "omega_04", uncertainty=0.0)
-
-    def breaking(lab, tasks):
-        tried.append(tasks)
-        runs = list(each(lab, tasks))
-        return ["diverged", *runs[1:]] if len(tried) == 1 else runs
-
-    monkeypatch.setattr(Lab, "each", breaking)
-    left = Records.of(unsteady.pulsation(lab, {name: QUICK[name]}, before))
-    assert [missing.reason.endswith("the run diverged") for missing in left.missing] == [True]
-    assert {m.quantity for m in left.measurements} == {"gain", "phase_lag", "slip_amplitude", "mean_error"}
-
-
 @pytest.mark.slow
 def test_a_mean_may_depend_on_more_than_the_state(lab):
     """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is none, blind."""
@@ -102,18 +104,6 @@ def test_a_mean_may_depend_on_more_than_the_state(lab):
     driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, lead=float(begin) / a)
     (row,) = unsteady.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
     assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolves * 0.9 * abs(row.value)
-
-
-def test_sets_without_slip_say_why(lab):
-    wall = {"wall": Parameters.named("high-wall-friction")}
-    rows = [*unsteady.pulsation(lab, wall, Records()), *unsteady.jumps(lab, wall, Records())]
-    assert [row.reason for row in rows] == [
-        "no flow was measured at which two-point rolling ends by slipping",
-        "no flows were measured between which the ball slips at both points",
-    ]
-
-
-ROUGH, SAMPLES = QUICK["high-wall-friction"], 50
 
 
 def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
@@ -156,19 +146,20 @@ def test_first_top_lies_between_samples():
     assert abs(top.value - float(fine.y.max())) <= top.uncertainty < p.g * 0.01**2 * p.c * 0.01
 
 
-THICK = P.replace(c=10.0)
+def make(patch, **effort):
+    """Another effort at the quick level."""
+    patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, **effort))
 
 
-def _measured(lab, patch, p, *flows):
-    starts = tuple((how, flows) for how in ("rest", "with the fluid", "on the wall"))
-    patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, settled_starts=starts))
+def measure_settled(lab, patch, p, *flows):
+    make(patch, settled_starts=tuple((how, flows) for how in ("rest", "with the fluid", "on the wall")))
     return Records.of(settled.measure(lab, {"thick": p}, Records()))
 
 
 def test_what_does_not_settle_is_missing(lab, monkeypatch):
-    monkeypatch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, settling_rounds=(1.0,)))
+    make(monkeypatch, settling_rounds=(1.0,))
     monkeypatch.setattr(settling, "SOLVED", 1e-3)
-    found = _measured(lab, monkeypatch, THICK, 0.6)
+    found = measure_settled(lab, monkeypatch, THICK, 0.6)
     assert not found.measurements
     starts = [each for each in found.missing if " still drifts" in each.reason]
     states = [each for each in found.missing if "no values of it" in each.reason]
@@ -186,7 +177,7 @@ def test_a_state_that_depends_on_the_step_is_missing(lab, monkeypatch):
         return [replace(each, case=Case.SN) for each in states] if patience.refine == 2 else states
 
     monkeypatch.setattr(settling, "settle", other_case)
-    found = _measured(lab, monkeypatch, THICK, 0.6)
+    found = measure_settled(lab, monkeypatch, THICK, 0.6)
     assert {m.quantity for m in found.measurements} == {"case"}
     assert len(found.missing) == 3
     assert all("is SN with half the time step" in each.reason and each.rows > 10 for each in found.missing)
@@ -194,7 +185,7 @@ def test_a_state_that_depends_on_the_step_is_missing(lab, monkeypatch):
 
 def test_what_quadratic_drag_does_not_settle_has_no_values(lab, monkeypatch):
     """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
-    found = _measured(lab, monkeypatch, sets(Level.QUICK)["blunt"], 0.6, 2.0)
+    found = measure_settled(lab, monkeypatch, QUICK["blunt"], 0.6, 2.0)
     cases = {m.conditions["case"] for m in found.measurements if m.quantity == "omega_c"}
     assert cases == {"SS", "NS"}
     assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
@@ -202,10 +193,8 @@ def test_what_quadratic_drag_does_not_settle_has_no_values(lab, monkeypatch):
 
 def test_what_swings_for_ever_settles_by_going_on_from_its_mean(lab, monkeypatch):
     """A ball that sinks along the wall: also where a round is rounded to another length than the usual one."""
-    monkeypatch.setattr(
-        levels, "AT_QUICK", replace(levels.AT_QUICK, settling_rounds=(0.45, 1.0, 1.0), settling_steps=512)
-    )
-    p = sets(Level.QUICK)["rough-floor"].replace(omega_0=21.74)
+    make(monkeypatch, settling_rounds=(0.45, 1.0, 1.0), settling_steps=512)
+    p = QUICK["rough-floor"].replace(omega_0=21.74)
     (state,) = settling.settle(lab, [settling.named_start("rough-floor", p, "on the wall")])
     assert (state.case, state.failure) == (Case.NS, "")
 
@@ -235,13 +224,19 @@ def test_a_ball_keeps_to_its_branch_of_the_loop(Omega_0, case, before, outcome):
     assert outcome_of("fig-13-left", *rows) is outcome
 
 
-def test_a_slope_of_a_state_that_theory_does_not_know_is_a_refutation():
-    row = measured("slope", "slope", 1.0, 1e-6, P.replace(omega_0=24.0), by="neighbours", case="NR")
-    assert outcome_of("slope-rolling", row) is Outcome.REFUTED
-
-
-def test_no_loop_without_a_change_from_slipping_to_riding(lab):
-    assert [type(row) for row in flowmeter.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
+def test_numbers_that_no_quick_set_has_are_judged_too():
+    strong, smooth = P.replace(c=20 * P.c), P.replace(eta=0.99 * P.j)
+    born, end = analytic.bifurcation.diagram.critical_drag(strong), analytic.thresholds(smooth).omega_01
+    unknown = measured("slope", "slope", 1.0, 1e-6, P.replace(omega_0=24.0), by="neighbours", case="NR")
+    for claim, row, outcome in (
+        # The drag at which a fold is born, of a set whose own is too strong for one.
+        ("double-points", measured("birth", "critical_drag", born, 1e-4 * born, strong), Outcome.CONFIRMED),
+        ("double-points", measured("birth", "critical_drag", 1.01 * born, 1e-4 * born, strong), Outcome.REFUTED),
+        ("slope-rolling", unknown, Outcome.REFUTED),
+        # A range that another threshold may end is not held against the tolerances of this one.
+        ("design-limit", measured("thresholds", "omega_01", end, 1e-9, smooth), Outcome.CONFIRMED),
+    ):
+        assert outcome_of(claim, row) is outcome
 
 
 NUMBERS = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
@@ -293,14 +288,6 @@ def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(et
     assert run.force_A[-1, 1] < settling.PRESSES * p.m * p.g
 
 
-def test_the_drag_at_which_a_fold_is_born_is_judged_where_that_of_the_set_is_too_strong_for_one():
-    p = P.replace(c=20 * P.c)
-    born = analytic.bifurcation.diagram.critical_drag(p)
-    for value, outcome in (born, Outcome.CONFIRMED), (1.01 * born, Outcome.REFUTED):
-        row = measured("birth", "critical_drag", value, 1e-4 * born, p, "mine")
-        assert outcome_of("double-points", row) is outcome
-
-
 @pytest.mark.parametrize("power", [1.3, 1.687, 2.0])
 def test_a_bent_line_has_its_zero_and_slope(power):
     """Of growth along a line, where drag isn't linear: few claims of few sets would notice."""
@@ -322,7 +309,7 @@ def test_a_line_has_no_maximum(bend):
 def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):
     """Of a set without fold, and the cases in which balls settle there."""
     monkeypatch.setattr(thresholds, "extrapolated", lambda *what: None)
-    p, rows = sets(Level.QUICK)["thick-fluid"], []
+    p, rows = QUICK["thick-fluid"], []
     for flow in (0.6, 1.4, 2.5):
         q = p.replace(omega_0=flow / time_unit(p))
         cases = {s.case for s in analytic.stable_solutions(q)}
@@ -333,18 +320,6 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monke
     records = Records.of(thresholds.measure(lab, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
     assert [m.value for m in records.select("thresholds", "folds")] == [1.0]  # an end is seen, and no smooth one
-
-
-def test_protocol_without_settled_states(lab):
-    rows = list(thresholds.measure(lab, SETS, Records()))
-    assert all(isinstance(row, Missing) for row in rows)
-    assert any("ends two-point rolling" in row.reason for row in rows)
-
-
-def test_a_range_that_another_threshold_may_end_is_not_held_against_the_tolerances_of_this_one():
-    p = P.replace(eta=0.99 * P.j)
-    row = measured("thresholds", "omega_01", analytic.thresholds(p).omega_01, 1e-9, p, "mine")
-    assert outcome_of("design-limit", row) is Outcome.CONFIRMED
 
 
 def run_of(time, y, theta):

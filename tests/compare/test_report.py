@@ -1,4 +1,4 @@
-"""The report says what was found, shows where results are missing, and works in a real browser."""
+"""Pages say what was found, show where results are missing, and hold pictures that a real browser plays with."""
 
 import base64
 import dataclasses
@@ -16,14 +16,17 @@ from matplotlib.figure import Figure
 from compare import gallery
 from compare.claim import Claim, Outcome, Text, Verdict
 from compare.commands import validate
+from compare.commands.bench import LEAGUE_PAGE
 from compare.kit.drawing import Drawing, Evidence, GapError
 from compare.kit.levels import Level
 from compare.kit.pages import typeset
+from compare.kit.pictures import embedded, plain, svg
 from compare.kit.record import Check, Missing, Records
 from compare.report import report, results, wording
 from compare.report.results import Summary
 from model import Parameters, StorageError
 from tests import measured as made
+from tests.commands import ROOT, told
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 P = Parameters.named("reference")
@@ -133,13 +136,10 @@ def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page):
     for said in (wording.headline(RAN), wording.coarse_and_missing(RAN), *map(" ".join, wording.totals(RAN))):
         assert said in summary
         assert said in re.sub("</?b>", " ", text)
-
-
-@pytest.mark.parametrize(("predicted", "said"), [(12.0, "none: all equal"), (1.0, "not equal: case, reference")])
-def test_counts_are_equal_or_not(predicted, said):
     m = dataclasses.replace(checks(1)[0].measurement, quantity="case")
-    check = Check(measurement=m, predicted=predicted, tolerance=0.0, scale=1.0)
-    assert wording.findings(dataclasses.replace(RAN[0], checks=(check,))) == {"Largest deviation": said}
+    for predicted, said in (12.0, "none: all equal"), (1.0, "not equal: case, reference"):  # counts have no tolerance
+        check = Check(measurement=m, predicted=predicted, tolerance=0.0, scale=1.0)
+        assert wording.findings(dataclasses.replace(RAN[0], checks=(check,))) == {"Largest deviation": said}
 
 
 def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypatch):
@@ -167,19 +167,18 @@ def test_a_summary_is_read_back(page):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("part", "other", "message"),
     [
-        (lambda text: "{", "holds no summary that this program reads: Expecting"),
-        (lambda text: "[]", "holds no summary that this program reads: list"),
-        (lambda text: text.replace('"schema_version": 5', '"schema_version": 4'), "in another format"),
-        (lambda text: re.sub(r'"dualball": "[^"]*"', '"dualball": "0.0.0"', text), "holds results of dualball 0.0.0"),
+        (".*", "{", "holds no summary that this program reads: Expecting"),
+        (".*", "[]", "holds no summary that this program reads: list"),
+        ('"schema_version": 5', '"schema_version": 4', "in another format"),
+        ('"dualball": "[^"]*"', '"dualball": "0.0.0"', "holds results of dualball 0.0.0"),
     ],
-    ids=["cut", "other", "old", "version"],
 )
-def test_a_foreign_summary_is_refused_in_one_line(tmp_path, change, message):
+def test_a_foreign_summary_is_refused_in_one_line(tmp_path, part, other, message):
     results.save(Summary.of([], Level.QUICK, {}), tmp_path)
     path = tmp_path / results.SUMMARY
-    path.write_text(change(path.read_text("utf-8")))
+    path.write_text(re.sub(part, other, path.read_text("utf-8"), count=1, flags=re.DOTALL))
     with pytest.raises(StorageError, match=message) as refusal:
         results.open_directory(tmp_path)
     assert "\n" not in str(refusal.value)
@@ -187,24 +186,24 @@ def test_a_foreign_summary_is_refused_in_one_line(tmp_path, change, message):
 
 def test_a_picture_is_drawn_once(tmp_path, monkeypatch):
     drawing = Drawing("t", lambda _: None, lambda data: (Figure(figsize=(1, 1)), f"<&> {data}"))
-    path = tmp_path / "made.svg"
-    assert gallery.kept(path, drawing, ("a", 1.0)) is None
-    first = gallery.drawn((path, drawing, ("a", 1.0)))
+    given = path, _, data = tmp_path / "made.svg", drawing, ("a", 1.0)
+    assert gallery.kept(*given) is None
+    first = gallery.drawn(given)
     ElementTree.parse(path)
     assert first["picture"].startswith("<svg")
-    assert first["caption"] == "<&> ('a', 1.0)"
+    assert first["caption"] == f"<&> {data}"
     assert "desc" not in first["picture"]
-    assert gallery.kept(path, drawing, ("a", 1.0)) == first
+    assert gallery.kept(*given) == first
     assert gallery.kept(path, drawing, ("a", 2.0)) is None
-    monkeypatch.setattr(gallery, "sources", lambda *packages: " ".join(packages))  # the program changes
-    assert gallery.kept(path, drawing, ("a", 1.0)) is None
+    with monkeypatch.context() as changed:  # the program changes
+        changed.setattr(gallery, "sources", lambda *packages: " ".join(packages))
+        assert gallery.kept(*given) is None
     path.write_text("something else")
-    assert gallery.kept(path, drawing, ("a", 1.0)) is None
+    assert gallery.kept(*given) is None
 
 
 def test_errata_are_the_documented_ones():
-    text = report.errata()
-    documented = (Path(__file__).parents[2] / "docs" / "errata.md").read_text("utf-8")
+    text, documented = report.errata(), (ROOT / "docs" / "errata.md").read_text("utf-8")
     assert text.count("<tr>") == sum(line.startswith("|") for line in documented.splitlines()) - 1
     assert "<a href" not in re.sub(r'<a href="https?:', "", text)
     assert "<h1>" not in text
@@ -292,3 +291,69 @@ def test_an_address_opens_its_row_and_the_page_prints(opened):
 )
 def test_symbols_are_typeset_and_names_of_programs_are_not(text, shown):
     assert typeset(text) == shown
+
+
+def figure_of_two():
+    figure = Figure(figsize=(4, 3))
+    axes = figure.add_subplot()
+    axes.plot([1.0, 10.0], [0.0, 4.0], label="_a line")
+    axes.errorbar([1.0, 10.0], [1.0, 3.0], [0.1, 0.2], ls="none", marker="o", label="$ω_0$ marks")
+    axes.set(xscale="log", xlabel="$\\omega_0$ (rad/s)", ylabel="height", xlim=(0.5, 20), ylim=(-1, 5))
+    return figure
+
+
+def test_series_and_scales_are_in_the_picture():
+    text = svg(figure_of_two())
+    assert text == svg(figure_of_two())  # equal figures give equal text
+    assert plain("$\\tilde{ω}_{x}$ (rad/s)") == "ω̃_x (rad/s)"
+    assert plain("$\\Omega_0 = \\omega_0\\sqrt{R/g}$") == "Ω_0 = ω_0√(R/g)"
+    series = re.findall('data-series="([^"]*)"', text)
+    assert series.count("a line") == 1
+    assert series.count("&lt;i&gt;ω&lt;/i&gt;&lt;sub&gt;0&lt;/sub&gt; marks") == 2  # and bars
+    (axes,) = re.findall('data-axes="([^"]*)"', text)
+    assert "&lt;i&gt;ω&lt;/i&gt;&lt;sub&gt;0&lt;/sub&gt; (rad/s)" in axes
+    ElementTree.fromstring(text)
+    figure = Figure(figsize=(2, 2))
+    figure.add_subplot().plot(range(30), range(30), "o", label="many")
+    text = svg(figure)  # marks that look alike are one path
+    (way,) = re.findall('data-series="many">.*?<path d="(M[^"]*)" fill="none"', text)
+    assert len(way.split()) == 1 + 2 * 30
+    assert text.count("<use") < 20  # of ticks
+
+
+def test_pictures_of_a_page_share_letters_and_nothing_else():
+    pictures, letters = embedded({"a": svg(figure_of_two()), "b": svg(figure_of_two())})
+    of = {name: set(re.findall('id="([^"]*)"', text)) for name, text in pictures.items()}
+    there = set(re.findall('id="([^"]*)"', letters))
+    assert of["a"]
+    assert there
+    assert not of["a"] & of["b"]
+    for name, text in pictures.items():
+        assert set(re.findall(r'(?:url\(|href=")#([\w-]+)', text)) <= of[name] | there
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_the_league_page_answers(browser, tab, tmp_path, capsys):
+    """Values under the pointer, a series switched off, zoom; without scripts the picture."""
+    names = [f"tests.compare.test_runner:{name}" for name in ("EXACT", "ROUGH")]
+    told(capsys, f"league --quick --engine {names[0]} --engine {names[1]} --workers 1 --quiet -o {tmp_path}")
+    page = tmp_path / LEAGUE_PAGE
+    assert "Copyright Timmy Willison" in page.read_text("utf-8")  # of what zooms
+    tab.goto(page.as_uri())
+    figure = tab.locator("figure.plot")
+    figure.scroll_into_view_if_needed()
+    figure.locator(".series label").first.wait_for()  # a figure answers from when it is first seen
+    assert figure.locator(".series label").all_inner_texts() == names
+    mark = figure.locator(f'[data-series="{names[1]}"] use').first
+    place = mark.bounding_box()
+    tab.mouse.move(place["x"] + place["width"] / 2, place["y"] + place["height"] / 2)
+    assert figure.locator("output").inner_text().startswith(names[1])
+    figure.get_by_label(names[1]).uncheck()
+    assert not mark.is_visible()
+    figure.get_by_label("closer").click()
+    tab.wait_for_timeout(300)
+    assert "scale(1" in figure.locator("svg").evaluate("picture => picture.style.transform")
+    dumb = browser.new_context(java_script_enabled=False).new_page()
+    dumb.goto(page.as_uri())
+    assert dumb.locator("figure.plot svg").bounding_box()["height"] > 100
+    dumb.context.close()

@@ -15,7 +15,6 @@ from compare.commands import signals
 from tests.commands import COMMANDS, started
 
 SIGNALS = signal.SIGINT, signal.SIGTERM
-BOTH = pytest.mark.parametrize("number", SIGNALS)
 LONG = {
     "validate": "--quick --set reference --claim prop-1",
     "figures": "--format svg --format png --format pdf",
@@ -123,56 +122,50 @@ def test_ctrl_c_ends_every_long_call() -> None:
     assert "Traceback" not in done.stderr
 
 
-@pytest.fixture
-def hears(number):
-    """Also where a shell runs the tests in the background, and has SIGINT ignored."""
-    before = signal.signal(number, signal.SIG_DFL)
-    yield
-    signal.signal(number, before)
+@pytest.fixture(params=SIGNALS)
+def heard(request):
+    """A signal, also where a shell runs the tests in the background, and has SIGINT ignored."""
+    before = signal.signal(request.param, signal.SIG_DFL)
+    yield request.param
+    signal.signal(request.param, before)
 
 
-@BOTH
-@pytest.mark.usefixtures("hears")
-def test_a_signal_that_python_loses_comes_again(number):
+def test_a_signal_that_python_loses_comes_again(heard):
     """As in a callback of an object's end, whose errors go nowhere."""
 
     class Ends:
         def __del__(self):
-            os.kill(os.getpid(), number)
+            os.kill(os.getpid(), heard)
             time.sleep(1e-3)
 
     with pytest.raises(signals.Interrupted) as ended, signals.raised():
         time.sleep(60 if Ends() else 0)
-    assert ended.value.code == 128 + number
+    assert ended.value.code == 128 + heard
 
 
-@BOTH
-@pytest.mark.usefixtures("hears")
 @pytest.mark.parametrize("lasts", ["0.2", "60"])
-def test_an_import_is_not_cut_short(number, lasts, tmp_path, monkeypatch):
+def test_an_import_is_not_cut_short(heard, lasts, tmp_path, monkeypatch):
     """Unless it doesn't end."""
-    text = f"import os, time\nos.kill(os.getpid(), {int(number)})\ntime.sleep({lasts})\nwhole = True\n"
-    (tmp_path / f"slow_{number}.py").write_text(text)
+    text = f"import os, time\nos.kill(os.getpid(), {int(heard)})\ntime.sleep({lasts})\nwhole = True\n"
+    (tmp_path / f"slow_{heard}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
 
     def work():
-        __import__(f"slow_{number}")
+        __import__(f"slow_{heard}")
         time.sleep(60)
 
     with pytest.raises(signals.Interrupted), signals.raised():
         work()
-    assert hasattr(sys.modules.pop(f"slow_{number}", None), "whole") is (lasts == "0.2")
+    assert hasattr(sys.modules.pop(f"slow_{heard}", None), "whole") is (lasts == "0.2")
 
 
-@BOTH
-@pytest.mark.usefixtures("hears")
-def test_what_should_stop_by_itself_and_does_not_is_stopped(number):
+def test_what_should_stop_by_itself_and_does_not_is_stopped(heard):
     """As a compiler that a run waits for, on a machine where nothing is compiled yet."""
 
     def work():
-        os.kill(os.getpid(), number)
+        os.kill(os.getpid(), heard)
         time.sleep(60)
 
-    with pytest.raises(signals.Interrupted), signals.raised(), signals.noted() as heard:
+    with pytest.raises(signals.Interrupted), signals.raised(), signals.noted() as noted:
         work()
-    assert heard == [number]
+    assert noted == [heard]

@@ -11,12 +11,10 @@ import pytest
 import analytic
 import mjsim
 from mjsim import ContactSettings
-from model import SimulationError
 from tests.random_motions import random_start
 
 SETS = int(os.environ.get("DUALBALL_SETS", "250"))
-DURATION, STEP = 2.0, 1.25e-4
-"""Of a run, and of one of its time steps, s."""
+STEP = 1.25e-4
 AGREE = 0.005
 """Difference of omega_c at the end, in units of omega_0, up to which simulators agree."""
 BY_CHANCE = 2
@@ -25,38 +23,24 @@ BY_CHANCE = 2
 
 
 def ends(seed):
-    """omega_c/omega_0 after the run by each simulator, or what went wrong with it."""
+    """omega_c/omega_0 after a run of 2 s by each simulator, and by theory if the ball rolls on as long as it can."""
     p, x0 = random_start(seed, on_wall=True)
-    simulators = {
-        "event": analytic.simulate,
-        "event, rolling on": partial(analytic.simulate, leave_rolling="infeasible"),
-        "time-stepping": partial(analytic.simulate, method="time-stepping", timestep=STEP),
-        "mujoco": partial(mjsim.simulate, settings=ContactSettings.for_problem(p, STEP)),
-    }
-    found = {}
     warnings.simplefilter("ignore", UserWarning)  # of contacts that chatter: what comes of it is to be seen
-    for name, simulate in simulators.items():
-        try:
-            found[name] = float(simulate(p, x0, DURATION, sample_interval=DURATION / 100).omega_c[-1]) / p.omega_0
-        except SimulationError as error:
-            found[name] = str(error)
-    return found
+    simulators = (
+        analytic.simulate,
+        partial(analytic.simulate, method="time-stepping", timestep=STEP),
+        partial(mjsim.simulate, settings=ContactSettings.for_problem(p, STEP)),
+        partial(analytic.simulate, leave_rolling="infeasible"),
+    )
+    return [float(simulate(p, x0, 2.0, sample_interval=0.02).omega_c[-1]) / p.omega_0 for simulate in simulators]
 
 
 @pytest.mark.slow
 def test_three_simulators_agree_on_random_sets(capsys):
-    differ, failed, unexplained = {}, {}, []
     with ProcessPoolExecutor() as pool:
-        for seed, found in enumerate(pool.map(ends, range(SETS))):
-            if any(isinstance(each, str) for each in found.values()):
-                failed[seed] = found
-                continue
-            rolls_on = found.pop("event, rolling on")
-            if np.ptp(list(found.values())) > AGREE:
-                differ[seed] = found
-                unexplained += [seed] if abs(rolls_on - found["event"]) < AGREE else []
+        found = np.array(list(pool.map(ends, range(SETS))))
+    (differ,) = np.nonzero(np.ptp(found[:, :3], axis=1) > AGREE)
     with capsys.disabled():
-        print(f"\nseeds whose omega_c/omega_0 differ: {differ}; that failed: {failed}", flush=True)
-    assert not failed
-    assert not unexplained
+        print(f"\nomega_c/omega_0 of seeds that differ: { {int(k): found[k] for k in differ} }", flush=True)
+    assert (np.abs(found[differ, 3] - found[differ, 0]) > AGREE).all()  # there it is a question of rolling on
     assert len(differ) <= BY_CHANCE * max(1, SETS / 250)
