@@ -347,13 +347,6 @@ def _gravity(m: int) -> float:
     return size if size > 0 else 9.81
 
 
-@compiled
-def _resets(d: int) -> int:
-    """How often the engine has reset the state as positions, velocities or accelerations were bad."""
-    warnings = _int32(d + _at(WARNING))
-    return int(warnings[1] + warnings[3] + warnings[5])
-
-
 # -- the law -----------------------------------------------------------------------------------------------------------
 
 
@@ -361,7 +354,8 @@ def _resets(d: int) -> int:
 def control(m: int, d: int, head: int) -> None:
     """Between the reference accelerations of a step and its forces: see `law`."""
     counts, numbers = _int64(head), _real(head)
-    time, resets = _value(d, TIME), _resets(d)
+    time, warnings = _value(d, TIME), _int32(d + _at(WARNING))
+    resets = int(warnings[1] + warnings[3] + warnings[5])  # by the engine, since the state was bad
     elapsed, since = time - numbers[MOMENT], time - numbers[CALLED]
     known = 0 <= elapsed <= 1.5 * numbers[LASTED] and counts[RESETS] in (resets, -1)
     over = elapsed > 0.75 * numbers[LASTED]  # not in the stages of a Runge-Kutta step, nor in a second call
@@ -418,7 +412,8 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
     kept, start, last = _block(head, KEPT), _array(d, START), math.inf
     mj_fwdActuation(m, d)
     mj_fwdAcceleration(m, d)
-    slides = numbers[RIGID] > 0
+    rows, rigid = _block(head, ROWS), numbers[RIGID] > 0
+    slides = rigid
     for _ in range(int(numbers[MOST])):
         for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
             kept[W * i + law.GUESS] = -1.0
@@ -429,8 +424,11 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
         for i in range(_number(m, DOFS)):
             start[i] = qacc[i]
         worst = _weigh(m, d, head)
-        _take_over(m, d, head)
-        if worst <= 1e-6 * enough or (worst <= enough and (not numbers[RIGID] or worst > 0.1 * last)):
+        for i in range(counts[COUNT]):  # what was found is foreseen next
+            kept[W * i + law.SLIP] = kept[W * i + law.SEEN]
+        for r in range(0, ROW * counts[COUNT_ROWS] if rigid else 0, ROW):
+            rows[r + HELD] = rows[r + MEMORY] = rows[r + FOUND]
+        if worst <= 1e-6 * enough or (worst <= enough and (not rigid or worst > 0.1 * last)):
             if not slides:
                 break
             _multiply(m, head, qacc)
@@ -1139,17 +1137,6 @@ def _share(rows: Any, r: int, length: int, edges: bool, axes: Any, a: int) -> in
 
 
 @compiled
-def _take_over(m: int, d: int, head: int) -> None:
-    """Take slip, and forces of rigid contacts, that were found as what is foreseen next."""
-    counts, kept, rows = _int64(head), _block(head, KEPT), _block(head, ROWS)
-    for i in range(counts[COUNT]):
-        kept[W * i + law.SLIP] = kept[W * i + law.SEEN]
-    if _real(head)[RIGID]:
-        for r in range(0, ROW * counts[COUNT_ROWS], ROW):
-            rows[r + HELD] = rows[r + MEMORY] = rows[r + FOUND]
-
-
-@compiled
 def retain(m: int, d: int, head: int) -> None:
     """Find the forces that the step came to."""
     counts = _int64(head)
@@ -1270,34 +1257,22 @@ if COMPILES:
 
 
 @compiled
-def step(m: int, d: int, head: int) -> None:
-    """Take one of MuJoCo's steps under the law."""
-    mj_step1(m, d)
-    control_linked(m, d, head)
-    mj_step2(m, d)
-    retain_linked(m, d, head)
-
-
-@compiled
 def advance(m: int, d: int, head: int, nstep: int) -> None:
-    """Advance by `nstep` steps."""
+    """Take so many of MuJoCo's steps under the law."""
     for _ in range(nstep):
-        step(m, d, head)
+        mj_step1(m, d)
+        control_linked(m, d, head)
+        mj_step2(m, d)
+        retain_linked(m, d, head)
 
 
 @compiled
 def step_of(m: int, d: int, head: int, duration: float, anew: bool) -> None:
-    """Take a step of so many seconds, with the memory, or anew without it."""
+    """Take a step of so many seconds, with what is remembered of the last one, or `anew` without it."""
     _real(m + _at(STEP))[0] = duration
     if anew:
-        _reset(head)
-    step(m, d, head)
-
-
-@compiled
-def _reset(head: int) -> None:
-    """Forget what is remembered from the last step."""
-    _real(head)[MOMENT], _int64(head)[PENDING], _int64(head)[TURNED] = math.nan, 0, 0
+        _real(head)[MOMENT], _int64(head)[PENDING], _int64(head)[TURNED] = math.nan, 0, 0
+    advance(m, d, head, 1)
 
 
 _FIND = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
@@ -1400,18 +1375,15 @@ class Simulation:
         self._data = data
         return int(self.address)
 
-    def _meet(self, data: Any) -> None:
-        self._alive, self._data = data, data._address
-
     def control(self, model: Any, data: Any) -> None:
-        self._meet(data)
+        self._alive, self._data = data, data._address
         control(model._address, data._address, self.address)
 
     def retain(self, model: Any, data: Any) -> None:
         retain(model._address, data._address, self.address)
 
     def advance(self, model: Any, data: Any, nstep: int) -> None:
-        self._meet(data)
+        self._alive, self._data = data, data._address
         advance(model._address, data._address, self.address, nstep)
 
     def _array(self, block: int, numbers: int) -> Array:
