@@ -174,9 +174,9 @@ def sweep(parser: Parser) -> None:
 def collect(parser: Parser) -> None:
     """Gather the runs of a directory into one file for xarray.
 
-    Of each run the file holds the parameters, the mean over the last quarter and how sure that is, the last case, and why it
-    failed, if it did; no samples. The parameters that vary are its dimensions if the runs make a grid, else it has the
-    dimension run.
+    Of each run the file holds the parameters, the mean over the last quarter and how sure that is, the last case, and
+    why it failed, if it did; no samples. The parameters that vary are its dimensions if the runs make a grid, else it
+    has the dimension run.
     """
     of = "directory of a sweep, or any with files of runs in it"
     parser.add_argument("directory", type=Path, metavar="DIR", help=of)
@@ -233,7 +233,7 @@ def design(parser: Parser) -> None:
     tables = (
         "TOML, SI units: [fluid] nu_f, rho_f (drag, C_D, gravity); [flow] slowest, fastest, rad/s (response, s); "
         "[bounds] r, R, rho_b, mu, eta (j), each a number or [lowest, highest], or several [[material]] with a name "
-        "and bounds of their own; [tolerances] of mu, eta, r, R, relative; what stands in round brackets may be left out"
+        "and bounds of their own; [tolerances] of mu, eta, r, R, relative; what is in round brackets may be left out"
     )
     parser.add_argument("file", type=Path, metavar="FILE.toml", help=tables)
     parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write (default: none)")
