@@ -21,7 +21,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     Two workers begin there: each compiles what the other one then loads.
     """
-    first = ("test_many_runs", "test_orbits", "test_basins", "test_figures", "test_time_stepping")
+    first = ("test_many_runs", "test_orbits", "test_basins", "test_figures")
     theory = [item for item in items if item.path.stem in first]
     coulomb = [item for item in items if item.path.stem.startswith("test_coulomb")]
     others = [item for item in items if item not in {*theory, *coulomb}]

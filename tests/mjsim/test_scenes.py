@@ -1,8 +1,8 @@
-"""Small scenes of what users build, and robots that others wrote: what memory holds still, and what it leaves alone."""
+"""Small scenes of what users build: what memory holds still, and what it leaves alone."""
 
 import pytest
 
-from docs.studies import robot_scenes, small_scenes
+from docs.studies import small_scenes
 from docs.studies.scenes import SCENES, WORSE
 from docs.studies.ways import CREEP, SLIP, WAYS
 
@@ -65,26 +65,6 @@ def test_flexes_are_left_to_mujoco():
     for run in (one, other):
         run.advance(0.1)
     assert other.data.qpos == pytest.approx(one.data.qpos, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("package", "name"),
-    [("gymnasium", "ant"), ("dm_control", "quadruped"), ("metaworld", "sawyer"), ("gymnasium_robotics", "egg")],
-)
-def test_robots_hold_still(package, name):
-    pytest.importorskip(package, reason=f"the scene comes with {package}")
-    plain, soft = both(SCENES[name].run)
-    assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
-    assert not soft.wrong
-
-
-@pytest.mark.slow
-def test_a_panda_lifts_and_lets_go():
-    pytest.importorskip("robosuite", reason="the scene comes with robosuite")
-    plain, soft = both(robot_scenes.lift)
-    assert soft.values[CREEP] < 1e-7
-    assert soft.values[SLIP] < plain.values[SLIP]
-    assert not soft.wrong
 
 
 def test_a_scene_says_what_failed():
