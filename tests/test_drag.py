@@ -17,20 +17,6 @@ from tests.drag_laws import BALL, BY_LAW, resistance
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("Re", [1e-6, 0.3, 50.0, 800.0, 985.0, 1200.0, 1e5])
-def test_the_drag_is_that_of_its_coefficient(law, Re):
-    p = BY_LAW[law]
-    speed = Re * p.nu_f / (2 * p.r)
-    force = p.m * float(resistance(speed, p)) * speed
-    assert p.m * drag.coefficient(speed, p) * speed == pytest.approx(force, rel=1e-12)
-    assert drag.reynolds(speed, p) == pytest.approx(Re, rel=1e-14)
-    assert drag.speed_of(force / p.m, p) == pytest.approx(speed, rel=1e-12)
-    step = 1e-100  # derivatives by complex steps, exact
-    whole = np.complex128(speed + 1j * step)
-    assert drag.slope(speed, p) == pytest.approx((drag.coefficient(whole, p) * whole).imag / step, rel=1e-12)
-
-
-@pytest.mark.parametrize("law", LAWS)
 def test_the_force_in_mujoco_is_that_of_the_law(law):
     p = BY_LAW[law]
     ball = Ball.of(p, ContactSettings.at(1e-3))

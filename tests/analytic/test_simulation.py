@@ -184,7 +184,7 @@ def test_the_end_is_always_a_sample():
     assert run.time.tolist() == [0.0, 1 / frequency]
 
 
-# --- time stepping settles in every step, or says that it does not; claim two-methods has its limit of no step --------------------
+# --- time stepping settles in every step, or says so; claim two-methods has its limit of no step
 
 
 @pytest.mark.parametrize(
