@@ -108,8 +108,8 @@ _offsets: npt.NDArray[np.int64] = np.array(
 _offsets[WARNING] += int(mujoco.mjtWarning.mjWARN_BADQPOS) * ctypes.sizeof(_layout("mjWarningStat"))
 
 
-def _agrees() -> bool:
-    """Whether a small model lies in memory as `mujoco.introspect` says."""
+def _lies_as_said() -> bool:
+    """Whether a model and its data lie in memory as `mujoco.introspect` says: tried on a small one."""
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/><worldbody><geom type="plane" size="1 1 1"/>'
         '<body pos="0 0 .09"><freejoint/><geom size=".1" condim="4" friction=".7 .03 .01"/></body></worldbody></mujoco>'
@@ -134,7 +134,7 @@ def _agrees() -> bool:
     )
 
 
-if not _agrees():
+if not _lies_as_said():
     raise ImportError(f"MuJoCo {mujoco.__version__} doesn't lie in memory as its own mujoco.introspect says")
 
 _library = next(
@@ -148,33 +148,35 @@ _simulations = np.zeros(3 * 4096, np.int64)
 SIMULATIONS = len(_simulations) // 3 - 1
 
 
-def _function(name: str, source: Any = _engine, arguments: int = 2, returns: Any = None) -> Any:
-    """A function of integers, addresses and sizes, of a library: as compiled code calls it, or as Python does."""
+def _library_function(name: str, source: Any = _engine, arguments: int = 2, returns: Any = None) -> Any:
+    """A function of the engine's library, or another, for compiled code to call, or for Python if none is compiled."""
     function = getattr(source, name)
     if COMPILES:
         llvmlite.binding.add_symbol(f"coulomb_{name}", ctypes.cast(function, ctypes.c_void_p).value)
-        return _linked(name, arguments, {None: types.void, ctypes.c_int: types.int32}.get(returns, types.intp))
+        return _called_by_address(
+            name, arguments, {None: types.void, ctypes.c_int: types.int32}.get(returns, types.intp)
+        )
     function.argtypes, function.restype = [ctypes.c_void_p] * arguments, returns
     return function
 
 
-def _linked(name: str, arguments: int, returns: Any) -> Any:
-    """A function of the compiled law that other compiled functions call by its address."""
+def _called_by_address(name: str, arguments: int, returns: Any) -> Any:
+    """What compiled code calls in the place of a function that stands at an address, given to the linker by name."""
     return types.ExternalFunction(f"coulomb_{name}", returns(*[types.intp] * arguments))
 
 
-mj_step, mj_step1, mj_step2 = _function("mj_step"), _function("mj_step1"), _function("mj_step2")
-mj_fwdActuation, mj_fwdAcceleration = _function("mj_fwdActuation"), _function("mj_fwdAcceleration")
-mj_fwdConstraint, mj_fwdVelocity = _function("mj_fwdConstraint"), _function("mj_fwdVelocity")
-mj_makeConstraint, mj_island = _function("mj_makeConstraint"), _function("mj_island")
-mj_projectConstraint = _function("mj_projectConstraint")
-mj_isSparse = _function("mj_isSparse", arguments=1, returns=ctypes.c_int)
-mj_addContact = _function("mj_addContact", arguments=3, returns=ctypes.c_int)
-realloc = _function("PyMem_RawRealloc", ctypes.pythonapi, returns=ctypes.c_void_p)
+mj_step, mj_step1, mj_step2 = _library_function("mj_step"), _library_function("mj_step1"), _library_function("mj_step2")
+mj_fwdActuation, mj_fwdAcceleration = _library_function("mj_fwdActuation"), _library_function("mj_fwdAcceleration")
+mj_fwdConstraint, mj_fwdVelocity = _library_function("mj_fwdConstraint"), _library_function("mj_fwdVelocity")
+mj_makeConstraint, mj_island = _library_function("mj_makeConstraint"), _library_function("mj_island")
+mj_projectConstraint = _library_function("mj_projectConstraint")
+mj_isSparse = _library_function("mj_isSparse", arguments=1, returns=ctypes.c_int)
+mj_addContact = _library_function("mj_addContact", arguments=3, returns=ctypes.c_int)
+realloc = _library_function("PyMem_RawRealloc", ctypes.pythonapi, returns=ctypes.c_void_p)
 
 
-def _address(name: str, values: npt.NDArray[np.int64]) -> Any:
-    """A function that gives the address of an array, which compiled code in numba's cache finds anew."""
+def _address_of_array(name: str, values: npt.NDArray[np.int64]) -> Any:
+    """A function that returns an array's address in this process, also in code that another process has compiled."""
     where = values.ctypes.data
     if not COMPILES:
         return lambda: where
@@ -192,7 +194,10 @@ def _address(name: str, values: npt.NDArray[np.int64]) -> Any:
     return address
 
 
-_offsets_address, _simulations_address = _address("offsets", _offsets), _address("simulations", _simulations)
+_offsets_address, _simulations_address = (
+    _address_of_array("offsets", _offsets),
+    _address_of_array("simulations", _simulations),
+)
 
 
 def _pointer(kind: Any) -> Any:
@@ -216,7 +221,10 @@ _int32, _int64, _real = (_pointer(kind) for kind in (ctypes.c_int32, ctypes.c_in
 
 
 def compiled(function: Any) -> Any:
-    """Compiled, once for all constants; a name with an underscore only for others that are compiled."""
+    """A decorator: compile a function by numba, once whatever constants it is called with.
+
+    One whose name begins with an underscore can be called by compiled functions only.
+    """
     if not COMPILES:
         return function
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
@@ -234,7 +242,7 @@ def compiled(function: Any) -> Any:
 
 @contextlib.contextmanager
 def alone(function: Any) -> Iterator[None]:
-    """Of processes that begin at once one compiles a function, and the others wait for what it keeps on disk."""
+    """Within this no other process compiles a function: those that wait then take what this one keeps on disk."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(ImportError, OSError, TypeError):  # no such locks here, or no place for a cache
             import fcntl
@@ -251,25 +259,25 @@ def _at(name: int) -> int:
 
 
 @compiled
-def _array(struct: int, name: int) -> Any:
+def _reals(struct: int, name: int) -> Any:
     """An array of reals of `mjData` or `mjModel`."""
     return _real(_int64(struct + _at(name))[0])
 
 
 @compiled
-def _whole(struct: int, name: int) -> Any:
+def _integers(struct: int, name: int) -> Any:
     """An array of integers of `mjData` or `mjModel`."""
     return _int32(_int64(struct + _at(name))[0])
 
 
 @compiled
-def _number(struct: int, name: int) -> int:
+def _integer(struct: int, name: int) -> int:
     """An integer in `mjData` or `mjModel`."""
     return int(_int32(struct + _at(name))[0])
 
 
 @compiled
-def _value(struct: int, name: int) -> float:
+def _scalar(struct: int, name: int) -> float:
     """A real in `mjData` or `mjModel`."""
     return float(_real(struct + _at(name))[0])
 
@@ -279,10 +287,10 @@ def _value(struct: int, name: int) -> float:
 KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMN, DRY, POSES, NOW, SCRATCH, CHAINS, FREE, SPINS = range(0, 28, 2)
 """Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their
 axes in those of both bodies, friction and regular friction (24); their places (4); rows (`ROW`); Jacobians and their
-columns; what dry friction bore; poses at which these were taken, and those now (`_poses`); a contact; contacts by their
-geoms (`_chain`); bodies that nothing joins to others (`law.free_bodies`), and of each how much angular momentum other
-moments than gyroscopic ones gave it in the last step, in world axes, and the one that it would have without them now,
-in its own, N m s."""
+columns; what dry friction bore; poses at which these were taken, and those now (`_store_poses`); a contact; contacts
+by their geoms (`_chain_contacts`); bodies that nothing joins to others (`law.free_bodies`), and of each how much
+angular momentum other moments than gyroscopic ones gave it in the last step, in world axes, and the one that it would
+have without them now, in its own, N m s."""
 (
     COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, COUNT_FREE, TURNED, PENDING, RESETS,
     SOLVES,
@@ -305,7 +313,7 @@ W = law.WIDTH
 
 
 @compiled
-def _room(head: int, block: int, numbers: int) -> Any:
+def _grown(head: int, block: int, numbers: int) -> Any:
     """A block of the simulation's memory, grown to so many reals if it is smaller."""
     blocks = _int64(head)
     if blocks[block + 1] < numbers:
@@ -315,15 +323,15 @@ def _room(head: int, block: int, numbers: int) -> Any:
 
 
 @compiled
-def room(head: int, block: int, numbers: int) -> None:
+def grow(head: int, block: int, numbers: int) -> None:
     """Grow a block of the simulation's memory to so many reals if it is smaller."""
-    _room(head, block, numbers)
+    _grown(head, block, numbers)
 
 
 @compiled
-def _integers(head: int, block: int, numbers: int) -> Any:
+def _grown_integers(head: int, block: int, numbers: int) -> Any:
     """A block of the simulation's memory as integers, grown to so many if it is smaller."""
-    _room(head, block, numbers)
+    _grown(head, block, numbers)
     return _int64(_int64(head)[block])
 
 
@@ -336,7 +344,7 @@ def _block(head: int, block: int) -> Any:
 @compiled
 def _elliptic(m: int) -> bool:
     """Whether the model's friction cone is elliptic."""
-    return bool(_number(m, CONE) == 1)
+    return bool(_integer(m, CONE) == 1)
 
 
 @compiled
@@ -352,9 +360,9 @@ def _gravity(m: int) -> float:
 
 @compiled
 def control(m: int, d: int, head: int) -> None:
-    """Between the reference accelerations of a step and its forces: see `law`."""
+    """Apply Coulomb's law in the middle of a step: velocities are known, and the engine hasn't found the forces yet."""
     counts, numbers = _int64(head), _real(head)
-    time, warnings = _value(d, TIME), _int32(d + _at(WARNING))
+    time, warnings = _scalar(d, TIME), _int32(d + _at(WARNING))
     resets = int(warnings[1] + warnings[3] + warnings[5])  # by the engine, since the state was bad
     elapsed, since = time - numbers[MOMENT], time - numbers[CALLED]
     known = 0 <= elapsed <= 1.5 * numbers[LASTED] and counts[RESETS] in (resets, -1)
@@ -363,53 +371,53 @@ def control(m: int, d: int, head: int) -> None:
     if known and over:
         retain(m, d, head)
     if over or not known:
-        numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _value(m, STEP), resets
+        numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _scalar(m, STEP), resets
     numbers[CALLED] = time
-    start, last = _array(d, START), _array(d, QACC)
-    for i in range(_number(m, DOFS)):
+    start, last = _reals(d, START), _reals(d, QACC)
+    for i in range(_integer(m, DOFS)):
         last[i] = start[i] if counts[COUNT_FOUND] < 0 else last[i]  # of restored states MuJoCo keeps but that
         start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
     if known and over:
-        _go_along(m, d, head)
-    still = known and _still(m, d, head)
+        _turn_accelerations(m, d, head)
+    still = known and _nothing_moved(m, d, head)
     if still:
         rows = _block(head, ROWS)
         for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
             rows[r + MEMORY] = rows[r + source]
     else:
-        _turn_in(m, d, head, source, known)
-        _find(m, d, head)
-        if _hand_on(m, d, head) > numbers[LEAST] and _put_back(m, d, head):
-            _find(m, d, head)
-            _hand_on(m, d, head)
-        _copy_rows(m, d, head)
+        _remember_last_step(m, d, head, source, known)
+        _find_contacts(m, d, head)
+        if _match_contacts(m, d, head) > numbers[LEAST] and _put_points_back(m, d, head):
+            _find_contacts(m, d, head)
+            _match_contacts(m, d, head)
+        _copy_jacobians(m, d, head)
     if counts[COUNT_FREE]:
-        _gyrate(m, d, head, known, over)
+        _add_gyroscopic_forces(m, d, head, known, over)
     if counts[COUNT] + counts[COUNT_DRY] == 0:
         counts[PENDING] = 0
         return
-    _multiply(m, head, _array(d, QACC))
+    _multiply_rows(m, head, _reals(d, QACC))
     if numbers[RIGID]:
         _stiffen(m, d, head)
     elif numbers[SERVO]:
-        _lift(m, d, head)
+        _take_depth_away(m, d, head)
     if since > 0 and known and not still:
-        _turn(m, d, head, since)
-    _hold(m, d, head)
+        _add_turning(m, d, head, since)
+    _set_rows(m, d, head)
     enough = numbers[SHARE] * _gravity(m)
-    if _foresee(m, d, head, enough) or not known:
+    if _foresee_slip(m, d, head, enough) or not known:
         _solve(m, d, head, enough)
     elif numbers[RIGID]:
-        _slide_on(m, d, head)
-    _refer(m, d, head)
+        _oppose_slip_at_mid_step(m, d, head)
+    _write_references(m, d, head)
     counts[PENDING] = 1
 
 
 @compiled
 def _solve(m: int, d: int, head: int, enough: float) -> None:
-    """Solve the step until slip is as foreseen, to `enough`, m s-2."""
+    """Let the engine solve for the accelerations until contacts slip as was foreseen, to `enough`, m s-2."""
     counts, numbers = _int64(head), _real(head)
-    kept, start, last = _block(head, KEPT), _array(d, START), math.inf
+    kept, start, last = _block(head, KEPT), _reals(d, START), math.inf
     mj_fwdActuation(m, d)
     mj_fwdAcceleration(m, d)
     rows, rigid = _block(head, ROWS), numbers[RIGID] > 0
@@ -417,13 +425,13 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
     for _ in range(int(numbers[MOST])):
         for i in range(counts[COUNT]):  # what a blow does says nothing of the next step
             kept[W * i + law.GUESS] = -1.0
-        _refer(m, d, head)
+        _write_references(m, d, head)
         mj_fwdConstraint(m, d)
         counts[SOLVES] += 1
-        qacc = _array(d, QACC)
-        for i in range(_number(m, DOFS)):
+        qacc = _reals(d, QACC)
+        for i in range(_integer(m, DOFS)):
             start[i] = qacc[i]
-        worst = _weigh(m, d, head)
+        worst = _find_forces(m, d, head)
         for i in range(counts[COUNT]):  # what was found is foreseen next
             kept[W * i + law.SLIP] = kept[W * i + law.SEEN]
         for r in range(0, ROW * counts[COUNT_ROWS] if rigid else 0, ROW):
@@ -431,19 +439,19 @@ def _solve(m: int, d: int, head: int, enough: float) -> None:
         if worst <= 1e-6 * enough or (worst <= enough and (not rigid or worst > 0.1 * last)):
             if not slides:
                 break
-            _multiply(m, head, qacc)
-            _lack(head)
-            if not _slide_on(m, d, head):
+            _multiply_rows(m, head, qacc)
+            _subtract_references(head)
+            if not _oppose_slip_at_mid_step(m, d, head):
                 break
             slides, worst = False, math.inf
         last = worst
 
 
 @compiled
-def _poses(m: int, d: int, head: int, block: int) -> int:
-    """Store the poses that axes and Jacobians depend on, `POSE` numbers of each contact; return how many numbers."""
-    ngeom, ncon, contact, size = _number(m, NGEOM), _number(d, NCON), _int64(d + _at(CONTACT))[0], _at(SIZE)
-    xpos, xmat, poses = _array(d, XPOS), _array(d, XMAT), _room(head, block, 12 * ngeom + POSE * ncon)
+def _store_poses(m: int, d: int, head: int, block: int) -> int:
+    """Store where geoms and contacts are, on which axes and Jacobians depend; return how many numbers that is."""
+    ngeom, ncon, contact, size = (_integer(m, NGEOM), _integer(d, NCON), _int64(d + _at(CONTACT))[0], _at(SIZE))
+    xpos, xmat, poses = _reals(d, XPOS), _reals(d, XMAT), _grown(head, block, 12 * ngeom + POSE * ncon)
     for i in range(3 * ngeom):
         poses[i] = xpos[i]
     for i in range(9 * ngeom):
@@ -462,30 +470,30 @@ def _poses(m: int, d: int, head: int, block: int) -> int:
 
 
 @compiled
-def _still(m: int, d: int, head: int) -> bool:
-    """Whether bodies and contacts are where their axes and Jacobians were taken last."""
+def _nothing_moved(m: int, d: int, head: int) -> bool:
+    """Whether geoms and contacts are where they were as their axes and Jacobians were stored."""
     counts, kept, contact = _int64(head), _block(head, KEPT), _int64(d + _at(CONTACT))[0]
-    if counts[COUNT_FOUND] != _number(d, NCON) or counts[COUNT_ALL] != _number(d, NEFC):
+    if counts[COUNT_FOUND] != _integer(d, NCON) or counts[COUNT_ALL] != _integer(d, NEFC):
         return False
-    if counts[COUNT_DRY] != _number(d, NF):
+    if counts[COUNT_DRY] != _integer(d, NF):
         return False
-    count = _poses(m, d, head, NOW)
+    count = _store_poses(m, d, head, NOW)
     now, then, places = _block(head, NOW), _block(head, POSES), _int64(counts[PLACES])
     for i in range(count):
         if not abs(now[i] - then[i]) < law.STILL:
             return False
     for i in range(counts[COUNT]):
-        kept[W * i + law.GAP] = _value(contact + places[4 * i + INDEX] * _at(SIZE), DIST)
+        kept[W * i + law.GAP] = _scalar(contact + places[4 * i + INDEX] * _at(SIZE), DIST)
     return True
 
 
 @compiled
-def _turn_in(m: int, d: int, head: int, source: int, known: bool) -> None:
-    """Begin a step: what contacts bore in the last one becomes what is remembered, friction in the bodies' axes."""
+def _remember_last_step(m: int, d: int, head: int, source: int, known: bool) -> None:
+    """Make the contacts of the last step, with the forces that they bore, those that are remembered."""
     counts = _int64(head)
     if known and not counts[TURNED]:
-        convert(m, head, source)
-        carry_on(m, d, head)
+        store_forces(m, head, source)
+        store_slip(m, d, head)
     counts[TURNED] = 0
     if not known:
         counts[COUNT_BEFORE] = counts[DRY_BEFORE] = 0
@@ -496,8 +504,8 @@ def _turn_in(m: int, d: int, head: int, source: int, known: bool) -> None:
 
 
 @compiled
-def convert(m: int, head: int, source: int) -> None:
-    """Convert forces of constraint rows to forces of contacts, with friction in the axes of both bodies."""
+def store_forces(m: int, head: int, source: int) -> None:
+    """Store what each contact bears, from the forces of its constraint rows; friction turns with both bodies."""
     counts, elliptic = _int64(head), _elliptic(m)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
     for i in range(counts[COUNT]):
@@ -512,18 +520,18 @@ def convert(m: int, head: int, source: int) -> None:
             else:
                 plus, minus = rows[r + 2 * ROW * t], rows[r + 2 * ROW * t + ROW]
                 kept[load + t], force = plus + minus, axes[a + 18 + t] * (plus - minus)
-            other, kind = a + _axis(t), 1 if t >= 2 else 0
+            other, kind = a + _axis_of(t), 1 if t >= 2 else 0
             for j in range(6):
                 kept[k + law.FORCE + 2 * j + kind] += axes[other + 3 * j] * force
-    dry = _room(head, DRY, counts[COUNT_DRY])
+    dry = _grown(head, DRY, counts[COUNT_DRY])
     for i in range(counts[COUNT_DRY]):
         dry[i] = rows[ROW * (counts[COUNT_ROWS] + i) + source]
 
 
 @compiled
-def carry_on(m: int, d: int, head: int) -> None:
-    """Store the slip velocity of each contact by the last Jacobian and the present speeds, along its last axes."""
-    counts, edges, ngeom, speeds = _int64(head), not _elliptic(m), _number(m, NGEOM), _array(d, QVEL)
+def store_slip(m: int, d: int, head: int) -> None:
+    """Store the velocity at which each contact slips, by the Jacobian of the last step and the speeds now."""
+    counts, edges, ngeom, speeds = _int64(head), not _elliptic(m), _integer(m, NGEOM), _reals(d, QVEL)
     kept, axes, poses, places = _block(head, KEPT), _block(head, AXES), _block(head, POSES), _int64(counts[PLACES])
     for i in range(counts[COUNT]):
         k, r, at = W * i + law.SPEED, ROW * places[4 * i + AT], 12 * ngeom + POSE * places[4 * i + INDEX] + 3
@@ -539,22 +547,24 @@ def carry_on(m: int, d: int, head: int) -> None:
 
 @compiled
 def _tangential(head: int, r: int, t: int, edges: bool, friction: float, vector: Any) -> float:
-    """What a vector of all degrees of freedom is along a tangent of the contact whose rows begin at `r`."""
+    """Velocity of a contact along its tangent t, from speeds of all degrees of freedom; its rows begin at `r`."""
     rows = _block(head, ROWS)
     if edges:
         edge = r + 2 * ROW * t
-        return float((_along(head, rows, edge, vector) - _along(head, rows, edge + ROW, vector)) / (2 * friction))
-    return float(_along(head, rows, r + ROW * (t + 1), vector))
+        return float(
+            (_row_times(head, rows, edge, vector) - _row_times(head, rows, edge + ROW, vector)) / (2 * friction)
+        )
+    return float(_row_times(head, rows, r + ROW * (t + 1), vector))
 
 
 @compiled
-def _turn(m: int, d: int, head: int, elapsed: float) -> None:
-    """Add to reference accelerations of contacts that stick on turning bodies what the rows leave out.
+def _add_turning(m: int, d: int, head: int, elapsed: float) -> None:
+    """Let contacts that stick turn along with their bodies: the rows leave out that Jacobians change.
 
-    Of soft contacts that is -dJ/dt v; of rigid ones, which lose the velocity that the turning shows, half of it."""
+    What is added is -dJ/dt v; for rigid contacts, which lose the velocity that the turning shows, half of it."""
     counts, edges, rigid = _int64(head), not _elliptic(m), _real(head)[RIGID] > 0
     kept, axes, places = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES])
-    contact, reference, speeds = _int64(d + _at(CONTACT))[0], _array(d, AREF), _array(d, QVEL)
+    contact, reference, speeds = _int64(d + _at(CONTACT))[0], _reals(d, AREF), _reals(d, QVEL)
     for i in range(counts[COUNT]):
         k, a, r = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT]
         if kept[k + law.SPEED] > 1e300 or places[4 * i + LENGTH] == 1:
@@ -575,13 +585,17 @@ def _turn(m: int, d: int, head: int, elapsed: float) -> None:
 
 
 @compiled
-def _find(m: int, d: int, head: int) -> None:
+def _find_contacts(m: int, d: int, head: int) -> None:
     """Find the contacts of a step, their places on both bodies, and their constraint rows."""
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
-    xpos, xmat, contact, kbip = _array(d, XPOS), _array(d, XMAT), _int64(d + _at(CONTACT))[0], _array(d, KBIP)
-    ncon, count, rows, size = _number(d, NCON), 0, 0, _at(SIZE)
-    kept, axes, places = _room(head, KEPT, ncon * W), _room(head, AXES, 24 * ncon), _integers(head, PLACES, 4 * ncon)
-    _poses(m, d, head, POSES)
+    xpos, xmat, contact, kbip = (_reals(d, XPOS), _reals(d, XMAT), _int64(d + _at(CONTACT))[0], _reals(d, KBIP))
+    ncon, count, rows, size = _integer(d, NCON), 0, 0, _at(SIZE)
+    kept, axes, places = (
+        _grown(head, KEPT, ncon * W),
+        _grown(head, AXES, 24 * ncon),
+        _grown_integers(head, PLACES, 4 * ncon),
+    )
+    _store_poses(m, d, head, POSES)
     at = _at(POS), _at(FRAME), _at(FRICTION), _at(GEOM), _at(DIM), _at(ADDRESS), _at(DIST), _at(MU)
     for i in range(ncon):
         c = contact + i * size
@@ -615,14 +629,14 @@ def _find(m: int, d: int, head: int) -> None:
         places[p + INDEX], places[p + FIRST], places[p + LENGTH], places[p + AT] = i, address, length, rows
         count += 1
         rows += length
-    counts[COUNT], counts[COUNT_ROWS], counts[COUNT_DRY] = count, rows, _number(d, NF)
-    counts[COUNT_FOUND], counts[COUNT_ALL] = ncon, _number(d, NEFC)
-    _room(head, ROWS, ROW * (rows + counts[COUNT_DRY]))
+    counts[COUNT], counts[COUNT_ROWS], counts[COUNT_DRY] = count, rows, _integer(d, NF)
+    counts[COUNT_FOUND], counts[COUNT_ALL] = ncon, _integer(d, NEFC)
+    _grown(head, ROWS, ROW * (rows + counts[COUNT_DRY]))
 
 
 @compiled
-def _apart(one: Any, k: int, other: Any, m: int) -> float:
-    """Square of the distance of two contacts, by their places on both bodies, m^2; of other geoms: infinite."""
+def _square_apart(one: Any, k: int, other: Any, m: int) -> float:
+    """Square of how far apart two contacts are on their bodies, m^2; infinite if their geoms are others."""
     if one[k] != other[m] or one[k + 1] != other[m + 1]:
         return math.inf
     square = 0.0
@@ -632,60 +646,60 @@ def _apart(one: Any, k: int, other: Any, m: int) -> float:
 
 
 @compiled
-def _smaller(bound: Any, contacts: Any, k: int) -> float:
-    """The smaller radius of a contact's geoms, m; planes have none."""
+def _smaller_radius(bound: Any, contacts: Any, k: int) -> float:
+    """The smaller radius of the two geoms in contact, m; planes have none."""
     one, other = bound[int(contacts[k])], bound[int(contacts[k + 1])]
     return float(min(one, other) or max(one, other))
 
 
 @compiled
-def _axis(t: int) -> int:
-    """Axis of a direction of friction: tangents 1 and 2, then spinning about 0 and rolling about 1 and 2."""
+def _axis_of(t: int) -> int:
+    """Number of the axis that belongs to a kind of friction: tangents 1 and 2, spin about 0, rolling about 1 and 2."""
     return t + 1 if t < 2 else t - 2
 
 
 @compiled
-def _chain(head: int) -> int:
-    """Chain the contacts of each pair of geoms; return the number of links.
+def _chain_contacts(head: int) -> int:
+    """List the contacts of each pair of geoms, so that they are found at once; return the number of lists.
 
-    `CHAINS` has the first at `_link`, and the next of each after so many links; -1: no more. Others may be between."""
+    `CHAINS` has the first at `_chain_start`, and the next of each that far on; -1: no more. Others may be between."""
     counts, kept, links = _int64(head), _block(head, KEPT), 16
     while links < 2 * counts[COUNT]:
         links *= 2
-    chains = _integers(head, CHAINS, links + counts[COUNT])
+    chains = _grown_integers(head, CHAINS, links + counts[COUNT])
     for i in range(links):
         chains[i] = -1
     for i in range(counts[COUNT] - 1, -1, -1):
-        link = _link(kept, W * i, links)
+        link = _chain_start(kept, W * i, links)
         chains[links + i], chains[link] = chains[link], i
     return links
 
 
 @compiled
-def _link(contacts: Any, k: int, links: int) -> int:
-    """Index at which the chain of a contact's pair of geoms begins."""
+def _chain_start(contacts: Any, k: int, links: int) -> int:
+    """Where in `CHAINS` the first contact of a pair of geoms is told."""
     return (int(contacts[k]) * 2654435761 + int(contacts[k + 1]) * 40503) >> 3 & (links - 1)
 
 
 @compiled
-def _hand_on(m: int, d: int, head: int) -> float:
-    """Give what is remembered to the nearest contact of the same geoms; how far any has moved, if some are fewer, m.
+def _match_contacts(m: int, d: int, head: int) -> float:
+    """Give remembered forces to the nearest contact of the same geoms; how far one has moved, if some are gone, m.
 
     What was before gets the square of that way as its `law.SEEN`, m^2."""
     counts, elliptic = _int64(head), _elliptic(m)
     count, kept, before = counts[COUNT], _block(head, KEPT), _block(head, BEFORE)
     axes, places, rows = _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    numbers, bound, moved, fewer = _real(head), _array(m, RBOUND), 0.0, False
-    bodies, spins = _whole(m, BODY_OF), _array(d, SPIN)
-    links = _chain(head)
+    numbers, bound, moved, fewer = _real(head), _reals(m, RBOUND), 0.0, False
+    bodies, spins = _integers(m, BODY_OF), _reals(d, SPIN)
+    links = _chain_contacts(head)
     chains = _int64(counts[CHAINS])
     for i in range(counts[COUNT_BEFORE]):
         b, nearest, least = W * i, -1, math.inf
-        if i < count and _apart(kept, W * i, before, b) < law.UNMOVED**2:
+        if i < count and _square_apart(kept, W * i, before, b) < law.UNMOVED**2:
             nearest, least = i, 0.0
-        k = chains[_link(before, b, links)] if nearest < 0 else -1
+        k = chains[_chain_start(before, b, links)] if nearest < 0 else -1
         while k >= 0:
-            distance = _apart(kept, W * k, before, b)
+            distance = _square_apart(kept, W * k, before, b)
             if distance < least:
                 nearest, least = k, distance
             k = chains[links + k]
@@ -705,8 +719,8 @@ def _hand_on(m: int, d: int, head: int) -> float:
         for side in range(2):
             spin = 6 * bodies[int(before[b + side])]
             turning = max(turning, spins[spin] ** 2 + spins[spin + 1] ** 2 + spins[spin + 2] ** 2)
-        turned = numbers[FIXED] * math.sqrt(turning) * _smaller(bound, before, b)
-        fixed = alone and least <= 2 * (_value(m, STEP) * (turned + math.sqrt(creep))) ** 2
+        turned = numbers[FIXED] * math.sqrt(turning) * _smaller_radius(bound, before, b)
+        fixed = alone and least <= 2 * (_scalar(m, STEP) * (turned + math.sqrt(creep))) ** 2
         kept[k + law.MISS] = before[b + law.MISS] if alone else 0.0
         for j in range(3):  # a contact that wanders over its bodies, or is made of several, has none
             kept[k + law.SPEED + j] = before[b + law.SPEED + j] if fixed else math.inf
@@ -726,10 +740,10 @@ def _hand_on(m: int, d: int, head: int) -> float:
         if elliptic or length == 1:
             rows[r] = kept[k + law.LOAD]
             for t in range(length - 1):
-                rows[r + ROW * (t + 1)] = kept[k + law.FORCE + 2 * _axis(t) + (t >= 2)]
+                rows[r + ROW * (t + 1)] = kept[k + law.FORCE + 2 * _axis_of(t) + (t >= 2)]
             continue
         for t in range(length // 2):
-            lean = kept[k + law.FORCE + 2 * _axis(t) + (t >= 2)] / axes[mu + t]
+            lean = kept[k + law.FORCE + 2 * _axis_of(t) + (t >= 2)] / axes[mu + t]
             pair = max(kept[k + law.LOAD + t], abs(lean))
             rows[r + 2 * ROW * t], rows[r + 2 * ROW * t + ROW] = (pair + lean) / 2, (pair - lean) / 2
     for i in range(counts[COUNT_DRY]):
@@ -740,17 +754,19 @@ def _hand_on(m: int, d: int, head: int) -> float:
 
 @compiled
 def _cross(a: Any, b: Any) -> Any:
+    """The cross product of two vectors."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @compiled
 def _dot(a: Any, b: Any) -> float:
+    """The scalar product of two vectors."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @compiled
-def _sum(a: Any, x: float, b: Any) -> Any:
-    """a + x b."""
+def _add_multiple(a: Any, x: float, b: Any) -> Any:
+    """The vector a + x b."""
     return a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
 
 
@@ -759,34 +775,36 @@ def _rotated(a: Any, turn: Any) -> Any:
     """A vector turned about an axis, by an angle as long as the axis, rad."""
     square, across = _dot(turn, turn) + 1e-300, _cross(turn, a)
     angle = math.sqrt(square)
-    return _sum(_sum(a, math.sin(angle) / angle, across), (1 - math.cos(angle)) / square, _cross(turn, across))
+    return _add_multiple(
+        _add_multiple(a, math.sin(angle) / angle, across), (1 - math.cos(angle)) / square, _cross(turn, across)
+    )
 
 
 @compiled
-def _go_along(m: int, d: int, head: int) -> None:
-    """Turn angular accelerations of free bodies from the axes that these had to those that they have now."""
-    counts, h, speeds = _int64(head), _value(m, STEP), _array(d, QVEL)
+def _turn_accelerations(m: int, d: int, head: int) -> None:
+    """Turn the angular accelerations of the last step along with the bodies, in whose axes MuJoCo has them."""
+    counts, h, speeds = _int64(head), _scalar(m, STEP), _reals(d, QVEL)
     free = _int64(counts[FREE])
     for i in range(counts[COUNT_FREE]):
         a = free[2 * i + 1] + 3
         back = -h * speeds[a], -h * speeds[a + 1], -h * speeds[a + 2]
-        for accelerations in (_array(d, QACC), _array(d, START)):
+        for accelerations in (_reals(d, QACC), _reals(d, START)):
             turned = _rotated((accelerations[a], accelerations[a + 1], accelerations[a + 2]), back)
             for j in range(3):
                 accelerations[a + j] = turned[j]
 
 
 @compiled
-def _gyrate(m: int, d: int, head: int, known: bool, over: bool) -> None:
+def _add_gyroscopic_forces(m: int, d: int, head: int, known: bool, over: bool) -> None:
     """Gyroscopic forces on free bodies by the implicit midpoint rule, under the moments of the step before.
 
     A body that turns freely keeps its energy and the size of its angular momentum; and its centre of mass keeps its
     velocity where it is not the body's origin.
     """
-    counts, h, bias = _int64(head), _value(m, STEP), _array(d, BIAS)
+    counts, h, bias = _int64(head), _scalar(m, STEP), _reals(d, BIAS)
     free, spins = _int64(counts[FREE]), _block(head, SPINS)
-    inertias, speeds, centres = _array(d, INERTIA), _array(d, SPIN), _array(d, CENTRE)
-    origins, axes = _array(d, ORIGIN), _array(d, AXES_OF)
+    inertias, speeds, centres = _reals(d, INERTIA), _reals(d, SPIN), _reals(d, CENTRE)
+    origins, axes = _reals(d, ORIGIN), _reals(d, AXES_OF)
     for i in range(counts[COUNT_FREE]):
         body, dof, twist, coasting = free[2 * i], free[2 * i + 1], 6 * i, 6 * i + 3
         b, c, o = 10 * body, 3 * body, 9 * body
@@ -805,24 +823,30 @@ def _gyrate(m: int, d: int, head: int, known: bool, over: bool) -> None:
             u = axes[o], axes[o + 1], axes[o + 2]
             v = axes[o + 3], axes[o + 4], axes[o + 5]
             w = axes[o + 6], axes[o + 7], axes[o + 8]
-            gained = _sum(momentum, -1.0, (_dot(u, was), _dot(v, was), _dot(w, was)))
-            pushed = _rotated(gained, _sum((0.0, 0.0, 0.0), -h, spin))
-        half, middle, change = _sum(momentum, 0.5, pushed), spin, pushed
+            gained = _add_multiple(momentum, -1.0, (_dot(u, was), _dot(v, was), _dot(w, was)))
+            pushed = _rotated(gained, _add_multiple((0.0, 0.0, 0.0), -h, spin))
+        half, middle, change = _add_multiple(momentum, 0.5, pushed), spin, pushed
         for _ in range(law.ITERATIONS):
-            turn = _sum((0.0, 0.0, 0.0), h / 2, middle)
+            turn = _add_multiple((0.0, 0.0, 0.0), h / 2, middle)
             size = _dot(turn, turn)
-            change = _sum(_sum(_cross(half, turn), 0.5, pushed), -size, momentum)
-            change = _sum((0.0, 0.0, 0.0), 1 / (1 + size), _sum(change, _dot(turn, half), turn))
-            last, middle = middle, _sum(spin, 1 / volume, (_dot(one, change), _dot(two, change), _dot(three, change)))
-            moved = _sum(middle, -1.0, last)
+            change = _add_multiple(_add_multiple(_cross(half, turn), 0.5, pushed), -size, momentum)
+            change = _add_multiple((0.0, 0.0, 0.0), 1 / (1 + size), _add_multiple(change, _dot(turn, half), turn))
+            last, middle = (
+                middle,
+                _add_multiple(spin, 1 / volume, (_dot(one, change), _dot(two, change), _dot(three, change))),
+            )
+            moved = _add_multiple(middle, -1.0, last)
             if _dot(moved, moved) <= 1e-32 * _dot(middle, middle):  # soon of a body that is round
                 break
-        change = _sum(change, 1.0, _sum(change, -1.0, pushed))
-        coasts, after = _sum(momentum, 1.0, change), _sum(middle, 1.0, _sum(middle, -1.0, spin))
+        change = _add_multiple(change, 1.0, _add_multiple(change, -1.0, pushed))
+        coasts, after = (
+            _add_multiple(momentum, 1.0, change),
+            _add_multiple(middle, 1.0, _add_multiple(middle, -1.0, spin)),
+        )
         across = _cross(after, arm)
-        swung = _sum(_rotated(across, _sum((0.0, 0.0, 0.0), h, after)), -1.0, across)
-        force = _sum(_sum((0.0, 0.0, 0.0), mass / h, swung), -mass, _cross(spin, _cross(spin, arm)))
-        moment = _sum(_sum(_cross(arm, force), -1 / h, change), -1.0, _cross(spin, momentum))
+        swung = _add_multiple(_rotated(across, _add_multiple((0.0, 0.0, 0.0), h, after)), -1.0, across)
+        force = _add_multiple(_add_multiple((0.0, 0.0, 0.0), mass / h, swung), -mass, _cross(spin, _cross(spin, arm)))
+        moment = _add_multiple(_add_multiple(_cross(arm, force), -1 / h, change), -1.0, _cross(spin, momentum))
         for j in range(3):
             bias[dof + j] += force[j]
             spins[twist + j], spins[coasting + j] = pushed[j], 0.0
@@ -833,14 +857,14 @@ def _gyrate(m: int, d: int, head: int, known: bool, over: bool) -> None:
 
 @compiled
 def _stiffen(m: int, d: int, head: int) -> None:
-    """Set rows of rigid contacts as stiff as `Law.softness`, for the velocities of Moreau and Jean's time stepping."""
-    counts, numbers, elliptic, h = _int64(head), _real(head), _elliptic(m), _value(m, STEP)
+    """Make rigid contacts stiff, and let them ask for the velocities of Moreau and Jean's time stepping."""
+    counts, numbers, elliptic, h = _int64(head), _real(head), _elliptic(m), _scalar(m, STEP)
     kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
-    softness, stiffness, diagonal = _array(d, R), _array(d, D), _array(d, DIAG)
-    velocity, reference, bound = _array(d, VEL), _array(d, AREF), _array(m, RBOUND)
-    islands = _at(ISLAND_R) >= 0 and _number(d, NISLAND) > 0  # they have copies, but not in MuJoCo 3.3.0
-    place = _whole(d, ISLAND_PLACE if islands else COLIND)
-    island_softness, island_stiffness = _array(d, ISLAND_R if islands else R), _array(d, ISLAND_D if islands else D)
+    softness, stiffness, diagonal = _reals(d, R), _reals(d, D), _reals(d, DIAG)
+    velocity, reference, bound = _reals(d, VEL), _reals(d, AREF), _reals(m, RBOUND)
+    islands = _at(ISLAND_R) >= 0 and _integer(d, NISLAND) > 0  # they have copies, but not in MuJoCo 3.3.0
+    place = _integers(d, ISLAND_PLACE if islands else COLIND)
+    island_softness, island_stiffness = (_reals(d, ISLAND_R if islands else R), _reals(d, ISLAND_D if islands else D))
     slow, depth = h * _gravity(m), numbers[DEPTH] * (h / law.USUAL) ** 2
     for i in range(counts[COUNT]):
         a, length, gap = places[4 * i + FIRST], places[4 * i + LENGTH], kept[W * i + law.GAP]
@@ -850,7 +874,7 @@ def _stiffen(m: int, d: int, head: int) -> None:
         load = rows[held] + rows[held + ROW] if edges else rows[held]
         lasting = min(load, kept[W * i + law.BORE])  # not the force of a blow
         kept[W * i + law.BORE] = load
-        deep = max(-gap - depth * _smaller(bound, kept, W * i), 0.0)
+        deep = max(-gap - depth * _smaller_radius(bound, kept, W * i), 0.0)
         goal = -gap / h if gap > 0 else min(numbers[PUSH] * deep / h, max(slow, h * diagonal[a] * lasting))
         r, above = ROW * places[4 * i + AT] + RESIDUAL, max(gap, 0.0)
         fall = h * max(-(rows[r] + rows[r + ROW]) / 2 if edges else -rows[r], 0.0)
@@ -866,20 +890,20 @@ def _stiffen(m: int, d: int, head: int) -> None:
             reference[r] = ((goal if edges or r == a else 0.0) - velocity[r]) / h
             if islands:
                 island_softness[place[r]], island_stiffness[place[r]] = softness[r], stiffness[r]
-    if _number(m, SOLVER) == 0:  # PGS has it in its matrix
+    if _integer(m, SOLVER) == 0:  # PGS has it in its matrix
         mj_projectConstraint(m, d)
 
 
 @compiled
-def _lift(m: int, d: int, head: int) -> None:
-    """Servo: move the distances that contacts hold, so that loaded ones come to have no depth."""
+def _take_depth_away(m: int, d: int, head: int) -> None:
+    """Move the distance that a soft contact holds, step by step, until under its load it has no depth."""
     counts, numbers, elliptic = _int64(head), _real(head), _elliptic(m)
-    kept, places, kbip, reference = _block(head, KEPT), _int64(counts[PLACES]), _array(d, KBIP), _array(d, AREF)
+    kept, places, kbip, reference = (_block(head, KEPT), _int64(counts[PLACES]), _reals(d, KBIP), _reals(d, AREF))
     contact = _int64(d + _at(CONTACT))[0]
     for i in range(counts[COUNT]):
         k, a, length = W * i, places[4 * i + FIRST], places[4 * i + LENGTH]
-        margin, gap = _value(contact + places[4 * i + INDEX] * _at(SIZE), INCLUDE), kept[k + law.GAP]
-        lift = min(max(kept[k + law.LIFT] - _value(m, STEP) / numbers[SERVO] * gap, 0.0), margin)
+        margin, gap = _scalar(contact + places[4 * i + INDEX] * _at(SIZE), INCLUDE), kept[k + law.GAP]
+        lift = min(max(kept[k + law.LIFT] - _scalar(m, STEP) / numbers[SERVO] * gap, 0.0), margin)
         kept[k + law.LIFT] = lift
         spring = kbip[4 * a] * kbip[4 * a + 2] * (margin - lift) if lift > 0 or gap <= 0 else law.APART
         for r in range(a, a + (1 if elliptic else length)):
@@ -887,23 +911,23 @@ def _lift(m: int, d: int, head: int) -> None:
 
 
 @compiled
-def _copy_rows(m: int, d: int, head: int) -> None:
-    """Keep the Jacobians: the engine's own arrays are gone when the next step wants to know what forces there were."""
-    counts, nv, sparse = _int64(head), _number(m, DOFS), mj_isSparse(m)
+def _copy_jacobians(m: int, d: int, head: int) -> None:
+    """Copy the Jacobians of all rows: the engine's own are gone when the next step asks what forces there were."""
+    counts, nv, sparse = _int64(head), _integer(m, DOFS), mj_isSparse(m)
     places, rows, count = _int64(counts[PLACES]), _block(head, ROWS), ROW * counts[COUNT_ROWS]
     for i in range(counts[COUNT]):
         for r in range(places[4 * i + LENGTH]):
             rows[ROW * (places[4 * i + AT] + r) + ADDRESS_OF] = places[4 * i + FIRST] + r
-    ne, loss = _number(d, NE), _array(d, LOSS)
+    ne, loss = _integer(d, NE), _reals(d, LOSS)
     for i in range(counts[COUNT_DRY]):
         rows[count + ROW * i + ADDRESS_OF], rows[count + ROW * i + LIMIT] = ne + i, loss[ne + i]
-    total, length = 0, _whole(d, ROWNNZ)
+    total, length = 0, _integers(d, ROWNNZ)
     count += ROW * counts[COUNT_DRY]
     for r in range(0, count, ROW):
         rows[r + BEGIN], rows[r + NONZEROS] = total, length[int(rows[r + ADDRESS_OF])] if sparse else nv
         total += int(rows[r + NONZEROS])
-    jacobian, columns = _room(head, JACOBIAN, total), _integers(head, COLUMN, total)
-    given, column, begin = _array(d, J), _whole(d, COLIND), _whole(d, ROWADR)
+    jacobian, columns = _grown(head, JACOBIAN, total), _grown_integers(head, COLUMN, total)
+    given, column, begin = _reals(d, J), _integers(d, COLIND), _integers(d, ROWADR)
     for r in range(0, count, ROW):
         address, to = int(rows[r + ADDRESS_OF]), int(rows[r + BEGIN])
         source = begin[address] if sparse else address * nv
@@ -913,10 +937,10 @@ def _copy_rows(m: int, d: int, head: int) -> None:
 
 
 @compiled
-def _hold(m: int, d: int, head: int) -> None:
-    """Set softness, reference and remembered force of rows: of soft ones friction, of pyramids less the mean."""
+def _set_rows(m: int, d: int, head: int) -> None:
+    """Set softness, reference acceleration and remembered force of all rows; of soft contacts, of friction alone."""
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
-    places, rows, softness, reference = _int64(counts[PLACES]), _block(head, ROWS), _array(d, R), _array(d, AREF)
+    places, rows, softness, reference = (_int64(counts[PLACES]), _block(head, ROWS), _reals(d, R), _reals(d, AREF))
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
         address = int(rows[r + ADDRESS_OF])
         rows[r + SOFT], rows[r + REFERENCE], rows[r + HELD] = softness[address], reference[address], rows[r + MEMORY]
@@ -932,18 +956,18 @@ def _hold(m: int, d: int, head: int) -> None:
 
 
 @compiled
-def _multiply(m: int, head: int, vector: Any) -> None:
-    """Set `RESIDUAL` of all rows to J times a vector."""
+def _multiply_rows(m: int, head: int, vector: Any) -> None:
+    """Set `RESIDUAL` of all rows to the Jacobian times a vector of all degrees of freedom."""
     counts, rows, moves = _int64(head), _block(head, ROWS), False
-    for i in range(_number(m, DOFS)):
+    for i in range(_integer(m, DOFS)):
         moves |= vector[i] != 0
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
-        rows[r + RESIDUAL] = _along(head, rows, r, vector) if moves else 0.0
+        rows[r + RESIDUAL] = _row_times(head, rows, r, vector) if moves else 0.0
 
 
 @compiled
-def _along(head: int, rows: Any, r: int, vector: Any) -> float:
-    """A row of J times a vector."""
+def _row_times(head: int, rows: Any, r: int, vector: Any) -> float:
+    """One row of the Jacobian times a vector of all degrees of freedom."""
     jacobian, columns, total, begin = _block(head, JACOBIAN), _int64(_int64(head)[COLUMN]), 0.0, int(rows[r + BEGIN])
     for n in range(begin, begin + int(rows[r + NONZEROS])):
         total += jacobian[n] * vector[columns[n]]
@@ -951,8 +975,8 @@ def _along(head: int, rows: Any, r: int, vector: Any) -> float:
 
 
 @compiled
-def _slip(rows: Any, r: int, length: int, elliptic: bool, axes: Any, mu: int) -> float:
-    """By how much slip lifts a contact in the engine's convex law, from the rows' `RESIDUAL` plus R f, m s-2."""
+def _lift_by_slip(rows: Any, r: int, length: int, elliptic: bool, axes: Any, mu: int) -> float:
+    """By how much slip would lift a contact, since the engine's law is convex, m s-2 (De Saxce's correction)."""
     square, most = 0.0, 0.0
     if elliptic:
         for t in range(length - 1):
@@ -969,8 +993,8 @@ def _slip(rows: Any, r: int, length: int, elliptic: bool, axes: Any, mu: int) ->
 
 
 @compiled
-def _lack(head: int) -> None:
-    """Set `RESIDUAL` of rows to J a less the reference acceleration."""
+def _subtract_references(head: int) -> None:
+    """Make `RESIDUAL`, accelerations of contacts, what they differ by from the reference ones."""
     counts, rows = _int64(head), _block(head, ROWS)
     for r in range(0, ROW * counts[COUNT_ROWS], ROW):
         rows[r + RESIDUAL] -= rows[r + REFERENCE]
@@ -978,15 +1002,15 @@ def _lack(head: int) -> None:
 
 
 @compiled
-def _foresee(m: int, d: int, head: int, enough: float) -> bool:
-    """Foresee slip from the velocities now and the accelerations of the last step; whether that is in doubt."""
+def _foresee_slip(m: int, d: int, head: int, enough: float) -> bool:
+    """Foresee how contacts slip, as if accelerations stayed those of the last step; whether that is in doubt."""
     counts, elliptic, rigid, gravity = _int64(head), _elliptic(m), _real(head)[RIGID] > 0, _gravity(m)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    diagonal, doubt = _array(d, DIAG), False
-    _lack(head)
+    diagonal, doubt = _reals(d, DIAG), False
+    _subtract_references(head)
     for i in range(counts[COUNT]):
         k, r, length, state = W * i, ROW * places[4 * i + AT], places[4 * i + LENGTH], kept[W * i + law.STATE]
-        slip = _slip(rows, r, length, elliptic, axes, 24 * i + 18)
+        slip = _lift_by_slip(rows, r, length, elliptic, axes, 24 * i + 18)
         edges = length > 1 and not elliptic
         normal = (rows[r + RESIDUAL] + rows[r + ROW + RESIDUAL]) / 2 if edges else rows[r + RESIDUAL]
         error = kept[k + law.ERROR] > enough
@@ -1003,7 +1027,7 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
                 ahead += rows[e + MEMORY] * rows[e + RESIDUAL]
         if state == law.STICKS or ahead >= 0:
             kept[k + law.SLIP] = 0.0
-            doubt |= slip > enough and not _holds(rows, r, length, edges, axes, 24 * i + 18, diagonal)
+            doubt |= slip > enough and not _would_hold(rows, r, length, edges, axes, 24 * i + 18, diagonal)
         else:
             kept[k + law.GUESS], kept[k + law.SLIP] = slip, max(slip + kept[k + law.MISS], 0.0)
             doubt |= error
@@ -1013,11 +1037,11 @@ def _foresee(m: int, d: int, head: int, enough: float) -> bool:
 
 
 @compiled
-def _slide_on(m: int, d: int, head: int) -> bool:
-    """Let friction of contacts that slide on oppose slip at mid step, see `Law.fast`; return whether there are any."""
-    counts, elliptic, h = _int64(head), _elliptic(m), _value(m, STEP)
+def _oppose_slip_at_mid_step(m: int, d: int, head: int) -> bool:
+    """Let friction of contacts that slide fast oppose their slip at mid step, not at its end; whether there are any."""
+    counts, elliptic, h = _int64(head), _elliptic(m), _scalar(m, STEP)
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    velocity, some = _array(d, VEL), False
+    velocity, some = _reals(d, VEL), False
     for i in range(counts[COUNT]):
         k, a, r, length = W * i, places[4 * i + FIRST], ROW * places[4 * i + AT], places[4 * i + LENGTH]
         if kept[k + law.STATE] != law.SLIDES or kept[k + law.SLIP] == 0:
@@ -1037,14 +1061,14 @@ def _slide_on(m: int, d: int, head: int) -> bool:
             more = (velocity[a + e] - normal) / h
             rows[r + ROW * e + REFERENCE] -= more
             rows[r + ROW * e + RESIDUAL] += more
-        kept[k + law.GUESS] = _slip(rows, r, length, elliptic, axes, mu)
+        kept[k + law.GUESS] = _lift_by_slip(rows, r, length, elliptic, axes, mu)
         kept[k + law.SLIP], some = max(kept[k + law.GUESS] + kept[k + law.MISS], 0.0), True
     return some
 
 
 @compiled
-def _holds(rows: Any, r: int, length: int, edges: bool, axes: Any, mu: int, diagonal: Any) -> bool:
-    """Whether forces of a contact would stay inside the cone if they alone did what accelerations lack to hold it."""
+def _would_hold(rows: Any, r: int, length: int, edges: bool, axes: Any, mu: int, diagonal: Any) -> bool:
+    """Whether a contact would stick: the forces that this takes, from it alone, are within the friction cone."""
     square, load = 0.0, 0.0
     for e in range(r, r + ROW * length, ROW):
         lacks = rows[e + RESIDUAL] + rows[e + SOFT] * (rows[e + MEMORY] - rows[e + HELD])
@@ -1059,9 +1083,9 @@ def _holds(rows: Any, r: int, length: int, edges: bool, axes: Any, mu: int, diag
 
 
 @compiled
-def _refer(m: int, d: int, head: int) -> None:
-    """Write the engine's reference accelerations: with memory, less the lift by slip in the normal direction."""
-    counts, elliptic, reference = _int64(head), _elliptic(m), _array(d, AREF)
+def _write_references(m: int, d: int, head: int) -> None:
+    """Tell the engine reference accelerations that hold remembered forces, and don't let slip lift contacts."""
+    counts, elliptic, reference = _int64(head), _elliptic(m), _reals(d, AREF)
     kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
         reference[int(rows[r + ADDRESS_OF])] = rows[r + REFERENCE] + rows[r + SOFT] * rows[r + HELD]
@@ -1072,11 +1096,11 @@ def _refer(m: int, d: int, head: int) -> None:
 
 
 @compiled
-def _weigh(m: int, d: int, head: int) -> float:
-    """Forces and slip that follow from the accelerations; by how much what was foreseen is wrong at most, m s-2."""
+def _find_forces(m: int, d: int, head: int) -> float:
+    """Find the contacts' forces, states and slip from the accelerations; how wrong what was foreseen was, m s-2."""
     counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
     kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
-    _multiply(m, head, _array(d, QACC))
+    _multiply_rows(m, head, _reals(d, QACC))
     for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
         rows[r + RESIDUAL] -= rows[r + REFERENCE] + rows[r + SOFT] * rows[r + HELD]
     most = 0.0
@@ -1085,8 +1109,8 @@ def _weigh(m: int, d: int, head: int) -> float:
         edges, foreseen = length > 1 and not elliptic, kept[k + law.SLIP]
         for e in range(r, r + ROW * (length if edges else 1), ROW):
             rows[e + RESIDUAL] += foreseen
-        state, error = _share(rows, r, length, edges, axes, a), 0.0
-        slip = _slip(rows, r, length, elliptic, axes, a) if state != law.STICKS else 0.0
+        state, error = _contact_forces(rows, r, length, edges, axes, a), 0.0
+        slip = _lift_by_slip(rows, r, length, elliptic, axes, a) if state != law.STICKS else 0.0
         if state == law.OPEN:  # its slip matters if without it the contact would have closed
             approach = rows[r + RESIDUAL] + rows[r + SOFT] * rows[r + HELD] - foreseen
             if edges:
@@ -1107,8 +1131,8 @@ def _weigh(m: int, d: int, head: int) -> float:
 
 
 @compiled
-def _share(rows: Any, r: int, length: int, edges: bool, axes: Any, a: int) -> int:
-    """Forces of a contact's rows, as the engine's solver has them, and its state."""
+def _contact_forces(rows: Any, r: int, length: int, edges: bool, axes: Any, a: int) -> int:
+    """Set the forces of a contact as the engine's solver has them; return whether it is open, sticks or slides."""
     if edges or length == 1:
         idle = 0
         for e in range(r, r + ROW * length, ROW):
@@ -1138,21 +1162,21 @@ def _share(rows: Any, r: int, length: int, edges: bool, axes: Any, a: int) -> in
 
 @compiled
 def retain(m: int, d: int, head: int) -> None:
-    """Find the forces that the step came to."""
+    """Find the contact forces at the end of a step, for the next one to remember."""
     counts = _int64(head)
     if counts[PENDING]:
         counts[PENDING] = 0
-        _weigh(m, d, head)
+        _find_forces(m, d, head)
 
 
 @compiled
-def _put_back(m: int, d: int, head: int) -> bool:
-    """Put back points that the collider has dropped, corners of patches that have others, if still overlapping."""
+def _put_points_back(m: int, d: int, head: int) -> bool:
+    """Put back corners of flat contacts which the collider has dropped while they overlap; whether there were any."""
     counts, share, rigid = _int64(head), _real(head)[NEAR], _real(head)[RIGID] > 0
-    ncon, size, contact = _number(d, NCON), _at(SIZE), _int64(d + _at(CONTACT))[0]
-    xpos, xmat, bound = _array(d, XPOS), _array(d, XMAT), _array(m, RBOUND)
+    ncon, size, contact = _integer(d, NCON), _at(SIZE), _int64(d + _at(CONTACT))[0]
+    xpos, xmat, bound = _reals(d, XPOS), _reals(d, XMAT), _reals(m, RBOUND)
     before, count = _block(head, BEFORE), counts[COUNT_BEFORE]
-    point, added = _integers(head, SCRATCH, size // 8 + 12 + ncon), 0
+    point, added = _grown_integers(head, SCRATCH, size // 8 + 12 + ncon), 0
     address = counts[SCRATCH]
     normal, across, along = _real(address + size), _real(address + size + 24), _real(address + size + 48)
     middle, angle = _real(address + size + 72), _real(address + size + 96)
@@ -1243,7 +1267,7 @@ def _put_back(m: int, d: int, head: int) -> bool:
 
 @functools.cache
 def link() -> None:
-    """Compile the law, and let those that follow call it by its address: once is enough."""
+    """Compile the law once, and give its address to those that call it by that."""
     for function in (control, retain) if COMPILES else ():
         with alone(function):
             function.compile((types.intp,) * 3)
@@ -1253,7 +1277,7 @@ def link() -> None:
 
 control_linked, retain_linked = control, retain
 if COMPILES:
-    control_linked, retain_linked = (_linked(name, 3, types.void) for name in ("control", "retain"))
+    control_linked, retain_linked = (_called_by_address(name, 3, types.void) for name in ("control", "retain"))
 
 
 @compiled
@@ -1278,15 +1302,15 @@ def step_of(m: int, d: int, head: int, duration: float, anew: bool) -> None:
 _FIND = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
-def _adopt(function: int, m: int, d: int) -> int:
-    """Call the function `_FIND` at an address, and return what it returns."""
+def _ask_python(function: int, m: int, d: int) -> int:
+    """Call a Python function of two integers by its address."""
     return int(_FIND(function)(m, d))
 
 
 if COMPILES:
 
     @intrinsic  # type: ignore[untyped-decorator]
-    def _adopt(typing: Any, function: Any, m: Any, d: Any) -> Any:
+    def _ask_python(typing: Any, function: Any, m: Any, d: Any) -> Any:
         def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
             integer = ir.IntType(64)
             pointer = builder.inttoptr(args[0], ir.FunctionType(integer, [integer, integer]).as_pointer())
@@ -1297,21 +1321,21 @@ if COMPILES:
 
 @compiled
 def _serve(m: int, d: int) -> None:
-    """`control` for a simulation of a model that is under `doors.Coulomb.installed`; others are left alone."""
+    """Apply `control` to a simulation whose model is under `doors.Coulomb.installed`; leave others alone."""
     table = _int64(_simulations_address())
     for i in range(3, 3 + 3 * table[0], 3):
         if table[i] == m and table[i + 1] == d:
             head = table[i + 2]
             break
     else:
-        head = _adopt(table[1], m, d)
+        head = _ask_python(table[1], m, d)
     if head:
         control_linked(m, d, head)
 
 
 @functools.cache
 def callback(find: Callable[[int, int], int]) -> Any:
-    """A control callback that asks `find` for the head of a simulation which it sees for the first time; 0: none.
+    """A control callback for MuJoCo, which applies the law; of a simulation that is new to it it asks `find`.
 
     `find` is a Python function of the addresses of model and data.
     """
@@ -1332,7 +1356,7 @@ _kept: list[Any] = []
 
 
 def remember(m: int, d: int, head: int) -> None:
-    """Know a simulation of the callback by its addresses, as long as there is room."""
+    """Note where the callback finds what a simulation remembers; 0 if it isn't under the law. While there is room."""
     count = int(_simulations[0])
     if count < SIMULATIONS:
         _simulations[3 + 3 * count : 6 + 3 * count] = m, d, head
@@ -1355,23 +1379,23 @@ class Simulation:
         self._real[RIGID:HEAD] = [float(value) for value in dataclasses.astuple(numbers)]
         self._real[LEAST] = numbers.near * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
         free = law.free_bodies(model) if numbers.rigid else np.empty((0, 2))
-        room(self.address, FREE, free.size)
+        grow(self.address, FREE, free.size)
         self._head[COUNT_FREE] = len(free)
         self._array(FREE, free.size).view(np.int64)[:] = free.ravel()
-        room(self.address, SPINS, 6 * len(free))
+        grow(self.address, SPINS, 6 * len(free))
         self.reset()
         weakref.finalize(self, _free, self._head)
 
     @property
     def solves(self) -> int:
-        """Solutions for what is foreseen, since the beginning."""
+        """How often the engine has solved a step again for the law, since the beginning."""
         return int(self._head[SOLVES])
 
     def reset(self) -> None:
         self._real[MOMENT], self._head[PENDING], self._head[TURNED] = math.nan, 0, 0
 
     def serve(self, data: int) -> int:
-        """The address of this, for the simulation at another."""
+        """Serve the simulation whose data are at an address; return that of what is remembered of it."""
         self._data = data
         return int(self.address)
 
@@ -1397,8 +1421,8 @@ class Simulation:
         if self._head[PENDING]:
             retain(self._model._address, self._data, self.address)
         if not self._head[TURNED]:  # what goes on from here does as what is restored
-            convert(self._model._address, self.address, FOUND)
-            carry_on(self._model._address, self._data, self.address)
+            store_forces(self._model._address, self.address, FOUND)
+            store_slip(self._model._address, self._data, self.address)
             self._head[TURNED], self._head[COUNT_FOUND] = 1, -1
         contacts = self._array(KEPT, W * self._head[COUNT]).reshape(-1, W)
         dry = self._array(DRY, self._head[COUNT_DRY])
@@ -1408,7 +1432,7 @@ class Simulation:
     def restore(self, contacts: Array, joints: Array, spins: Array, time: Array) -> None:
         self._array(SPINS, spins.size)[:] = spins.ravel()
         for block, count, values in ((KEPT, COUNT, contacts), (DRY, COUNT_DRY, joints)):
-            room(self.address, block, values.size)
+            grow(self.address, block, values.size)
             self._array(block, values.size)[:] = values.ravel()
             self._head[count] = len(values)
         self._real[[MOMENT, LASTED]] = time
