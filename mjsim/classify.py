@@ -163,12 +163,12 @@ class Classifier:
 
 
 def _code(states: Array) -> int:
-    """Of the case with such states of the contacts A and B."""
+    """Number of the case in which the contacts A and B are in such states."""
     return Case.of(*(_CONTACTS[int(state)] for state in states)).value
 
 
 def _carried_on(states: Array, known: npt.NDArray[np.bool_]) -> Array:
-    """States (steps, 2), in place of those that aren't known the last one that was."""
+    """States (steps, 2), each that isn't known replaced by the last one before it that is."""
     latest = np.maximum.accumulate(np.where(known, np.arange(len(states))[:, None], 0), axis=0)
     return np.take_along_axis(states, latest, axis=0)
 

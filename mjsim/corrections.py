@@ -198,13 +198,6 @@ def surface(v: tuple[float, float], change: tuple[float, float], ball: Ball) -> 
     return lag * change[0], lag * change[1]
 
 
-def eventful(h: float, y: float, v: Velocity, last: Velocity, normals: tuple[float, float], ball: Ball) -> bool:
-    """Whether a ball that lacks a contact lands in the coming step, or comes near the vessel's axis."""
-    floor = normals[0] == 0 and lands(y, v.v_y, last.v_y, ball)
-    wall = normals[1] == 0 and (lands(h, v.v_h, last.v_h, ball) or near_axis(ball.R - h, v, ball))
-    return floor or wall
-
-
 def near_axis(rho: float, v: Velocity, ball: Ball) -> bool:
     """Whether a ball at the distance rho from the axis, less than R/4, is less than `_NEAR` steps away from it."""
     along, reach = rho * v.omega_c, _NEAR * ball.step

@@ -203,8 +203,10 @@ def through(
 
 
 class FreeBall:
-    """One of them, with an engine of its own; arguments and methods as of `mjsim.stepping.JointedBall`, numbers of the
-    law as of `mjsim.Coulomb`."""
+    """A ball on a free joint, with an engine of its own; arguments and methods as of `mjsim.stepping.JointedBall`.
+
+    `law`: numbers of `mjsim.Coulomb`.
+    """
 
     def __init__(
         self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float, **law: float
@@ -258,7 +260,7 @@ class FreeBall:
 
 
 class Fine:
-    """One ball that takes steps of some settings in shorter ones."""
+    """A free ball that takes steps of a jointed one, in which that lands, in shorter ones."""
 
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
         self._p, self._whole, self._fall = p, settings.timestep, settings.slowest_fall(p.g)

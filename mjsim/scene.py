@@ -33,7 +33,17 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     spec.geom("floor").size = (4 * p.R, 4 * p.R, p.r)
     spec.geom("vessel").pos, spec.geom("vessel").size = (0.0, 0.0, height * 1.005), (p.R + p.r, height, 0.0)
     for name, friction in (("A", p.mu), ("B", p.eta)):
-        _set_pair(spec.pair(name), friction, settings)
+        pair = spec.pair(name)
+        # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one row.
+        pair.condim = 3 if friction > 0 else 1
+        pair.friction = (friction, friction, 0.0, 0.0, 0.0)
+        time, ratio = (
+            settings.solref
+        )  # as stiffness and damping: of times the engine would cut (d tc)^2 off at 1e-15 s2
+        pair.solref = -1 / (time * ratio) ** 2, -2 / time
+        pair.solreffriction = (settings.solreffriction, 1.0)
+        pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
+        pair.margin = pair.gap = 0.0
     if settings.rigid:
         for name in ("azimuth", "inward", "upward", "spin"):
             spec.delete(spec.joint(name))
@@ -80,14 +90,3 @@ def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[An
     # Without any in the scene, the engine looks at surface velocities and adhesion only if these flags say so.
     model.flg_surfacevel, model.flg_adhesion = settings.memory or settings.friction_lag != 0, settings.memory
     return model, text
-
-
-def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:
-    # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one row.
-    pair.condim = 3 if friction > 0 else 1
-    pair.friction = (friction, friction, 0.0, 0.0, 0.0)
-    time, ratio = settings.solref  # as stiffness and damping: of times the engine would cut (d tc)^2 off at 1e-15 s2
-    pair.solref = -1 / (time * ratio) ** 2, -2 / time
-    pair.solreffriction = (settings.solreffriction, 1.0)
-    pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
-    pair.margin = pair.gap = 0.0

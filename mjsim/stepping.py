@@ -21,7 +21,7 @@ import numpy as np
 from mjsim import recorder
 from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Velocity, corrections, eventful, near_axis
+from mjsim.corrections import Ball, Velocity, corrections, lands, near_axis
 from mjsim.coulomb import compiled as kernels
 from mjsim.free import Fine
 from mjsim.recorder import COORDINATES, HUGE, NORMALS, NSENSOR, SENSORS
@@ -71,7 +71,7 @@ class Joints(NamedTuple):
 
 
 def seen_forces(body: Joints) -> None:
-    """Take the contact forces of the last step from the engine, unless it wasn't the engine's."""
+    """Copy the contact forces of the last step from the engine, unless that step was taken in fine ones."""
     if body.marks[_HELD] == 0:
         for i in range(6):
             body.forces[i] = body.contact[i]
@@ -90,8 +90,10 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
     theta, h, y = float(qpos[0]), float(qpos[1]), float(qpos[2])
     given = float(forces[1]), float(forces[2]), float(forces[3]), float(forces[4])
     loads = float(forces[6]), float(forces[7])
-    if body.marks[_DUE] == NOT and loads[0] * loads[1] == 0 and eventful(h, y, v, before, loads, ball):
-        body.marks[_DUE] = LANDS
+    if body.marks[_DUE] == NOT and loads[0] * loads[1] == 0:
+        floor = loads[0] == 0 and lands(y, v.v_y, before.v_y, ball)
+        if floor or (loads[1] == 0 and (lands(h, v.v_h, before.v_h, ball) or near_axis(ball.R - h, v, ball))):
+            body.marks[_DUE] = LANDS
     if ball.gain > 0:  # a ball that sinks in rolls on a shorter lever: its contact point lies midway in the overlap
         margins[0], margins[1] = max(0.0, margins[0] - ball.gain * y), max(0.0, margins[1] - ball.gain * h)
     body.turn[0], body.turn[3] = math.cos(theta / 2), math.sin(theta / 2)
@@ -110,14 +112,6 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
     applied[2] -= lift_A
 
 
-def sound(body: Joints) -> bool:
-    """Whether place and velocities are numbers of a motion."""
-    found = True
-    for i in range(6):
-        found = found and abs(body.qpos[i]) < HUGE and abs(body.qvel[i]) < HUGE
-    return found
-
-
 def velocity_of(v: Any) -> Velocity:
     """Six numbers of the joints as named velocities."""
     return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
@@ -131,8 +125,12 @@ def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
     while done < len(fluid):
         row = rows[done]
         drive(float(fluid[done]), row, body)
-        if body.marks[_DUE] != NOT and sound(body):
-            return done
+        if body.marks[_DUE] != NOT:
+            sound = True
+            for i in range(6):
+                sound = sound and abs(body.qpos[i]) < HUGE and abs(body.qvel[i]) < HUGE
+            if sound:
+                return done
         for i in range(6):
             body.last[i] = body.qvel[i]
         body.marks[_DUE] = body.marks[_HELD] = 0
@@ -146,7 +144,7 @@ def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
 
 
 class JointedBall:
-    """One of them, with an engine of its own.
+    """A ball on joints, with an engine of its own.
 
     Parameters
     ----------
@@ -187,7 +185,7 @@ class JointedBall:
 
     @functools.cached_property
     def _fine(self) -> Fine:
-        """The ball in steps that are taken in fine ones."""
+        """A free ball for steps that are taken in fine ones, made once one is."""
         return Fine(self._p, self._settings)
 
     def _set(self, place: Array, v: Array, rates: Array) -> None:
@@ -198,32 +196,25 @@ class JointedBall:
         body.marks[_HELD] = 1
 
     def advance(self, fluid: Array, rows: Array) -> None:
-        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
-        done = 0
-        while (done := up_to_landing(self.body, fluid, rows, done)) < len(fluid):
-            self._land(float(fluid[done]), rows[done])
+        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`); those in which it lands in fine ones."""
+        p, body, done = self._p, self.body, 0
+        while (done := up_to_landing(body, fluid, rows, done)) < len(fluid):
+            how, v = int(body.marks[_DUE]), body.qvel.copy()
+            rates = (v - body.last) / self._h
+            place = body.qpos[:3] - self.lead * (v + rates * self.lead / 2)[:3]
+            x, theta = recorder.state(place, v, p), float(place[0])
+            step = self._fine.step(x, theta, rates, float(fluid[done]), how != LANDS)
+            place, v, rates, body.forces[:], change, rows[done, SENSORS:] = step
+            near = near_axis(p.R - place[1], Velocity(*v), body.ball) and body.forces[7] == 0
+            pace = max(abs(v[0]), math.sqrt(p.g / p.R))
+            most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(body.forces[[1, 2]]).max())
+            fast = change > _CHANGE * self._h * pace * most and how != BEGINS
+            body.marks[_DUE] = GOES_ON if near or fast else NOT  # on the joints where forces change slowly
+            self._set(place, v, rates * (not near))
+            if self._settings.servo:  # margins with which contacts bear their forces
+                loads = body.forces[6:] / p.m
+                body.margins[:] = np.maximum(place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
             done += 1
-
-    def _land(self, omega_0: float, row: Array) -> None:
-        """Take a step in fine ones, and go on upon the joints, if forces change slowly and the axis is far.
-
-        The contacts get margins with which they bear their forces.
-        """
-        p, body, how = self._p, self.body, int(self.body.marks[_DUE])
-        v = body.qvel.copy()
-        rates = (v - body.last) / self._h
-        place = body.qpos[:3] - self.lead * (v + rates * self.lead / 2)[:3]
-        x, theta = recorder.state(place, v, p), float(place[0])
-        place, v, rates, body.forces[:], change, row[SENSORS:] = self._fine.step(x, theta, rates, omega_0, how != LANDS)
-        near = near_axis(p.R - place[1], Velocity(*v), body.ball) and body.forces[7] == 0
-        pace = max(abs(v[0]), math.sqrt(p.g / p.R))
-        most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(body.forces[[1, 2]]).max())
-        fast = change > _CHANGE * self._h * pace * most and how != BEGINS
-        body.marks[_DUE] = GOES_ON if near or fast else NOT
-        self._set(place, v, rates * (not near))
-        if self._settings.servo:
-            loads = body.forces[6:] / p.m
-            body.margins[:] = np.maximum(place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""

@@ -210,7 +210,7 @@ _INSTALLED: dict[int, Coulomb] = {}
 
 
 def _simulation(model: int, data: int) -> Any:
-    """What serves a simulation that the callback meets for the first time, as its form tells it, or 0."""
+    """Address of what is remembered of a simulation that is new to the callback; 0 if it isn't under the law."""
     coulomb = _INSTALLED.get(model)
     if coulomb is None or coulomb._adopted is None:
         compiled.remember(model, data, 0)
