@@ -22,12 +22,12 @@ Drawn = Callable[[Array, Array], Array]
 
 
 def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
-    """The spin on the wall (91), rad s-1."""
+    """The spin about the wall's normal omega_x (91), rad s-1."""
     return np.asarray(bifurcation.wall_spin(State(omega_c=omega_c, slip_x=slip_x), p))
 
 
 def spin_of(case: Case, omega_0: float, p: Parameters) -> float:
-    """The spin on the wall omega_x^0 of a stationary solution at a flow, rad s-1, also where it is formal."""
+    """omega_x (91) of the stationary solution of a case at a flow, rad s-1, also where its forces are inadmissible."""
     p = p.replace(omega_0=float(omega_0))
     return float(bifurcation.wall_spin(analytic.solution(p, case, formal=True).state, p))
 

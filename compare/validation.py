@@ -163,13 +163,13 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
 
 
 def _judged(directory: Path, number: int) -> dict[str, Any]:
-    """In a worker: the verdict on a claim by its number, as fields, since claims don't go from process to process."""
+    """In a worker: judge a claim by its number; the verdict's fields, since claims can't be sent between processes."""
     judged = _in_time(CLAIMS[number], stored(directory))
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
 
 def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
-    """The verdict on a claim by what is stored, or one that says that it took too long."""
+    """The verdict on a claim; if judging it takes too long, one that says so."""
     try:
         with at_most(JUDGING):
             return full_verdict(claim, testimony)
@@ -184,14 +184,14 @@ def stored(directory: Path) -> RecordsByEngine:
 
 
 def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Evidence:
-    """The numbers and runs that figures show; those of engines beside the one on trial are at half the usual step."""
+    """Collect what figures draw: checks by claim, and each engine's measurements, at half the usual step if there."""
     checks = {v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts}
     first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [Records()]
     return Evidence(checks, first, directory, sum(others, Records()))
 
 
 def stored_evidence(directory: Path) -> Evidence:
-    """As `evidence`, from what a directory holds, judged again; without any numbers if it holds none."""
+    """As `evidence`, of a stored validation, which is judged again; empty if the directory holds none."""
     if not (directory / results.SUMMARY).exists():
         return Evidence()
     testimony = stored(directory)

@@ -110,7 +110,7 @@ class Classifier:
         alike = np.lib.stride_tricks.sliding_window_view(shown, min(PERSISTENCE, len(shown)), axis=0)
         lasts[: len(alike)] = (alike == alike[..., :1]).all(axis=-1)
         if not self._changes:  # the first that lasts, or the first of all
-            begin = _code(shown[lasts.argmax(axis=0), [0, 1]])
+            begin = _case_number(shown[lasts.argmax(axis=0), [0, 1]])
             self._changes.append((0, 0.0, begin, begin))
         now = divmod(self._changes[-1][-1], len(_CONTACTS))
         return _carried_on(np.vstack([now, shown]), np.vstack([[True, True], lasts]))
@@ -136,7 +136,7 @@ class Classifier:
             found = k - last + _vanishes(values[:k], ahead, within)
             (closes if old[contact] == _N else other).append(found)
         located = (step + (min(closes) if closes else max(other))) * self._timestep
-        self._changes.append((step, max(self._changes[-1][1], located), _code(old), _code(new)))
+        self._changes.append((step, max(self._changes[-1][1], located), _case_number(old), _case_number(new)))
 
     def cases(self, steps: npt.NDArray[np.int_]) -> npt.NDArray[np.int8]:
         """The case in some steps, in those not yet decided as in the last one that is."""
@@ -162,7 +162,7 @@ class Classifier:
         self._changes = [(int(step), time, int(before), int(after)) for step, time, before, after in changes]
 
 
-def _code(states: Array) -> int:
+def _case_number(states: Array) -> int:
     """Number of the case in which the contacts A and B are in such states."""
     return Case.of(*(_CONTACTS[int(state)] for state in states)).value
 

@@ -126,7 +126,7 @@ class ContactSettings:
 
     @property
     def softness(self) -> float:
-        """R/A of the normal rows, (1 - d)/d."""
+        """Regularisation of the normal rows divided by the diagonal of A, R/A = (1 - d)/d, with d from `solimp`."""
         return (1 - self.solimp) / self.solimp
 
     def margin(self, load: Real) -> Real:
@@ -141,7 +141,7 @@ class ContactSettings:
         return friction * max(0.0, self.b_f * slip_speed - kept) / (self.softness * load)
 
     def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f.
+        """Slip speed (m s-1) up to which regularised friction stays below a force of m times `load`: R_t f_t / b_f.
 
         Of rigid contacts it is what a step changes by a share `FORESEEN` of the force: so well they know their slip.
         """
@@ -149,11 +149,11 @@ class ContactSettings:
         return np.asarray(time * np.asarray(load, dtype=float))
 
     def dead_band(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) below which a contact under the friction force m `load` rolls, and may creep."""
+        """Slip speed (m s-1) below which a contact counts as rolling, for a friction force of m times `load`."""
         return self.regularisation_speed(load) * (1.0 if self.rigid else 1e-3 if self.memory else 0.4)
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory.
+        """Slip speed (m s-1) of a rolling contact's creep under a friction force of m times `load`; 0 with memory.
 
         Rigid contacts may slip so fast where two of them hold a ball by forces that the balances leave open.
         """
@@ -166,7 +166,7 @@ class ContactSettings:
 
     @property
     def friction_lag(self) -> float:
-        """How far in steps past the middle of a step friction takes its direction by itself, 1/(b_f h) - 1/2."""
+        """When the slip occurs that MuJoCo's friction alone opposes, in steps after mid step: 1/(b_f h) - 1/2, or 0."""
         corrected = self.order == 2 and self.cone == "elliptic"
         return 1 / (self.b_f * self.timestep) - 0.5 if corrected else 0.0
 
@@ -217,7 +217,7 @@ class ContactSettings:
         return cls(timestep=timestep, rigid=True, solimp=0.9, impratio=1.0, servo=0.0, memory=False, order=1)
 
     def suited(self, p: Parameters) -> Self:
-        """With slower contacts if the friction of a ball would make these chatter, else as they are."""
+        """These settings, with slower contacts where friction between floor and wall would make the ball chatter."""
         if self.contact_decay(p.mu, p.eta) <= _LEFT:
             return self
         slower = [dataclasses.replace(self, solref=(steps * self.timestep, ratio)) for steps, ratio in _STURDY]

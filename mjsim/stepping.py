@@ -113,7 +113,7 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
 
 
 def velocity_of(v: Any) -> Velocity:
-    """Six numbers of the joints as named velocities."""
+    """The velocities of the six joints by name, from an array (6)."""
     return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
 
 
@@ -189,7 +189,7 @@ class JointedBall:
         return Fine(self._p, self._settings)
 
     def _set(self, place: Array, v: Array, rates: Array) -> None:
-        """Go on from a place and velocities at one time, with such accelerations and the forces it has."""
+        """Set place, velocities and accelerations, all at one time, from which to go on; contact forces are kept."""
         body = self.body
         body.qvel[:], body.last[:], body.start[:] = v, v - self._h * rates, rates
         body.qpos[:3] = place + self.lead * (v + rates * self.lead / 2)[:3]

@@ -50,14 +50,14 @@ def spun(turned: Any, velocity: Any) -> tuple[float, float, float]:
 
 
 def outwards(place: Any, velocity: Any, ahead: float) -> tuple[float, float]:
-    """Direction away from the vessel's axis where the ball is `ahead` s before."""
+    """Unit vector (2) from the vessel's axis to where the ball was `ahead` s before."""
     x, y = place[0] - ahead * velocity[0], place[1] - ahead * velocity[1]
     rho = math.hypot(x, y)
     return (x / rho, y / rho) if rho > 0 else (0.0, 0.0)
 
 
 def joint_velocities(place: Any, turned: Any, velocity: Any, ahead: float) -> tuple[float, ...]:
-    """Velocities of the joint chain, as `recorder.joint_state` has them, along the axes of where the ball was."""
+    """Velocities of a free ball as the joints of `recorder.joint_state` have them, (6), `ahead` s before its place."""
     out_x, out_y = outwards(place, velocity, ahead)
     (o_x, o_y, o_z), (v_x, v_y) = spun(turned, velocity), (velocity[0], velocity[1])
     v_h = -out_x * v_x - out_y * v_y
@@ -70,7 +70,7 @@ def joint_velocities(place: Any, turned: Any, velocity: Any, ahead: float) -> tu
 
 
 def against(place: Any, velocity: Any, spin: Any, ahead: float, R: float, r: float) -> tuple[float, float, float]:
-    """Velocity inwards, onwards, upwards, m/s, that a plane needs to stand for a cylinder in a step.
+    """Surface velocity (inwards, along, up), m/s, that makes a tangent plane act like the cylinder during a step.
 
     What is at rest against it is so against the cylinder `ahead` s later, when velocities are where the place is now.
     By then the normal has turned by ahead Omega: of the velocity Omega R along the wall the share ahead Omega will
@@ -85,7 +85,7 @@ def against(place: Any, velocity: Any, spin: Any, ahead: float, R: float, r: flo
 
 
 def slip(place: Any, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tuple[float, float, float, float]:
-    """Velocities along floor (2) and wall (round, up) at the points of contact where the ball is `ahead` s before."""
+    """Slip velocities, m/s, at floor (x, y) and wall (round, up) where the ball was `ahead` s before its place."""
     (out_x, out_y), r = outwards(place, velocity, ahead), ball.r
     return (
         velocity[0] - r * spin[1],
@@ -96,5 +96,5 @@ def slip(place: Any, velocity: Any, spin: Any, ahead: float, ball: Ball) -> tupl
 
 
 def unwrapped(azimuth: float, last: float) -> float:
-    """The turn of an azimuth that is nearest to the last one; that one in a run that has diverged."""
+    """An azimuth plus the whole turns that bring it nearest to the last one; the last one if it isn't finite."""
     return azimuth + math.tau * round((last - azimuth) / math.tau) if math.isfinite(azimuth) else last

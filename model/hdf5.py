@@ -94,6 +94,7 @@ class _Disk(io.FileIO):
     error: OSError | None = None
 
     def write(self, data: Any) -> int:
+        """Write to disk up to the first error, and from then on to memory."""
         view, at, done = memoryview(data).cast("B"), self.tell(), 0
         try:
             while self.error is None and done < len(view):
@@ -106,6 +107,7 @@ class _Disk(io.FileIO):
         return len(view)
 
     def readinto(self, buffer: Any) -> int:
+        """Read from disk, with what is only in memory laid over it."""
         view, at = memoryview(buffer).cast("B"), self.tell()
         count = super().readinto(view) or 0
         if self.error:
@@ -118,6 +120,7 @@ class _Disk(io.FileIO):
         return count
 
     def truncate(self, size: int | None = None) -> int:
+        """Set the length of the file; an error is stored, as of `write`."""
         try:
             return super().truncate(size)
         except OSError as error:
@@ -165,7 +168,7 @@ def dataset(file: h5py.File, name: str) -> h5py.Dataset:
 
 
 def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
-    """All of a dataset: numbers, or text as `str`."""
+    """Read all of a dataset: numbers, or text as `str`."""
     return np.asarray((stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...])
 
 

@@ -154,7 +154,7 @@ def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
 
 
 def contents(path: str | Path) -> tuple[str, list[str]]:
-    """The version of dualball that wrote a file, and the names of the runs that it is of; none if it is of one run.
+    """The version of dualball that wrote a file, and the names of the runs in it; no names if it holds a single run.
 
     Raises `StorageError` as `load` does.
     """
@@ -185,7 +185,7 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
 
 
 def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
-    """Write schema and axes, which all files have; return the scales of dimensions by name: so far that of the axes."""
+    """Write schema and axes, which all files have; return the HDF5 dimension scales by name, so far of axes."""
     file.attrs.update(schema=schema, schema_version=version)
     axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
     axis.attrs.update(AXIS_ATTRIBUTES)
@@ -208,7 +208,7 @@ def _create_column(
 
 
 def _read(file: h5py.File, part: slice) -> Trajectory:
-    """Part of the samples of a file of one run, with all events."""
+    """Read a part of the samples of a file of one run, with all events."""
     if file.attrs.get("schema") == BATCH:
         raise StorageError("it holds the runs of a batch: name one of them, as FILE/NAME")
     _check_schema(file, SCHEMA, SCHEMA_VERSION)
@@ -243,7 +243,7 @@ def _trajectory(
 
 
 def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
-    """A text, or the table that it is in JSON."""
+    """The attribute `name` of a file: a text as it is (kind str), or a dict decoded from JSON; `StorageError` else."""
     value = texts.get(name)
     if not isinstance(value, str):
         raise StorageError(f"its attribute {name!r} is missing")
@@ -261,7 +261,7 @@ def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
 def _table(
     file: h5py.File, of: type[Trajectory] | type[Events], leading: int, part: slice = slice(None)
 ) -> dict[str, npt.NDArray[Any]]:
-    """All columns of a table, checked: so many dimensions come before those of one entry."""
+    """Read and check all columns of a table whose arrays have `leading` dimensions before those of one entry."""
     values = {}
     for column, meta in columns(of).items():
         name, stored = meta["name"], dataset(file, meta["name"])

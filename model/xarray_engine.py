@@ -24,7 +24,7 @@ class RunBackend(BackendEntrypoint):
     def open_dataset(
         self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
     ) -> xarray.Dataset:
-        """The columns of `Trajectory.table` over the time, cases by name; not the events, which have another time.
+        """Open a run's file: the columns of `Trajectory.table` along the time, cases by name, without the events.
 
         Raises `StorageError`, in one line, for a file that isn't a run or is damaged.
         """

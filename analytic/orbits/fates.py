@@ -177,7 +177,9 @@ def attractors(
 def _follow_to_attractor(
     p: Parameters, x: Array, lasting: float, run: Runs, known: Sequence[Sequence[Fate]]
 ) -> Generator[Array, Trajectory, Fate]:
-    """The attractor that the motion from x approaches within `lasting` seconds: asks for windows from states.
+    """Decide which attractor the motion from x approaches within `lasting` seconds.
+
+    A generator: it yields the state from which it needs the next window of the run, is sent that, and returns the fate.
 
     Stationary is what hardly moves, and less than before. Where two windows are alike the motion is recurrent: it has
     the fate of one of the `known` groups, or closes; if it does neither, its largest Lyapunov exponent decides.

@@ -82,7 +82,7 @@ class Record(NamedTuple):
 
     @classmethod
     def of(cls, times: Array, x: Array, case: Any, landings: Any, stop: Stop, whole: bool) -> Self:
-        """Empty arrays for a run that begins, with those for paths and events if it is to be kept as a `whole`."""
+        """A new record that fills the arrays given; paths and events are kept only if the `whole` run is wanted."""
         n, events = (len(times), 3 * STRIDES) if whole else (0, 0)
         path, z = np.empty((n, 5)), np.empty(len(times) * charts.MOST)
         reached = [0.0, _quiet_from(0.0, times, stop.quiet)]
@@ -220,7 +220,7 @@ def _keep_event(run: Record, at: Moment, case: int, after: int, impulse: Forces)
 
 
 def _quiet_from(landed: float, times: Array, quiet: float) -> float:
-    """The sample at which a run is quiet if nothing lands after a time; inf if there is none."""
+    """Time of the first sample at which nothing has landed for `quiet` seconds, if nothing does from now on; or inf."""
     row = np.searchsorted(times, landed + quiet, side="right")
     return float(times[row]) if row < len(times) else math.inf
 
@@ -241,7 +241,7 @@ def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tupl
 def carry_out(
     start: Moment, k: Motion, pieces: Array, rows: Callable[[], Record], look: Callable[[Record], None] | None = None
 ) -> tuple[Record, Exception | None]:
-    """Simulate a run into new arrays: these, and why it broke down, if it did; `look` sees them from time to time.
+    """Simulate a run into new arrays; return these and the error it broke down with, or None; `look` sees progress.
 
     In plain Python where the compiled text isn't there or can't go on.
     """
@@ -266,7 +266,7 @@ def carry_out(
 
 
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
-    """Simulate from state x0 and record; the contract of `simulation.simulate`.
+    """Simulate a run, event-driven, from state x0 and azimuth theta_0, and write it to the recorder.
 
     Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the sequence of cases gets
     stuck.

@@ -211,7 +211,7 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
 
 
 def _old_slip(at: BallState, dt: float, p: Constants) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Slip at floor and wall as a step begins, m s-1; none where it may stop within the step.
+    """Slip velocities of A and B before the step, m s-1; set to zero where slip may stop within the step.
 
     It is added to the new one, since friction opposes the mean of both where a contact slides on; where it may stop,
     friction opposes the final slip, so that it can't reverse.
@@ -228,7 +228,7 @@ def _old_slip(at: BallState, dt: float, p: Constants) -> tuple[tuple[float, floa
 
 
 def _first_guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impulse]:
-    """The impulses per mass from which a solution is looked for; none at an open contact."""
+    """Impulses divided by the mass with which the solver starts; zero at an open contact."""
     A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
     if touching.A:
         A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
@@ -246,7 +246,7 @@ def _sum(a: Forces, b: Forces) -> Forces:
 
 
 def _moved(at: BallState, dt: float, s: StepSolution, touching: Touching, R: float) -> BallState:
-    """Where the ball comes within dt; a closed contact that carries load stays, or is now, closed."""
+    """The ball's place after dt; a contact that carries load is set to a gap of exactly zero."""
     u, new = mean(at.u, s.new), s.new
     y = 0.0 if touching.A and s.P.A_y > 0 else at.y + dt * u.v_y
     if touching.B:
@@ -343,7 +343,7 @@ def _case_of(s: StepSolution, touching: Touching, p: Constants) -> int:
 
 
 def _larger_or_nan(new: float, residual: float) -> float:
-    """The larger one, or nan."""
+    """The larger of two numbers; nan if either is."""
     return new if new > residual or math.isnan(new) else residual
 
 

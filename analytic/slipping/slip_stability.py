@@ -44,14 +44,14 @@ class SlipStability(Enum):
 
 
 def normals(inner: Case, outer: Case) -> tuple[str, ...]:
-    """The variables that span W (51): what may slip in `outer` and doesn't in `inner`."""
+    """Names of the components of slip that the case `outer` frees and `inner` holds at zero; they span W (51)."""
     return tuple(name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active)
 
 
 def slip_rates(
     inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters
 ) -> tuple[Array, Array, Array]:
-    """lim f_Z(x* + eps n) in W, and the normal forces A_y, B_x in N there: (..., d), (...), (...).
+    """Rates (..., d) of the slips that begin along n, (52) by component, and the normal forces A_y, B_x in N (...).
 
     x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative normal force means that
     the contact opens instead of slipping that way.

@@ -201,7 +201,7 @@ _offsets_address, _simulations_address = (
 
 
 def _pointer(kind: Any) -> Any:
-    """A function that makes an address a pointer to numbers of a kind."""
+    """A function that turns an address into a pointer to numbers of a C type."""
     if not COMPILES:
         pointer_to = ctypes.POINTER(kind)
         return lambda address: pointer_to.from_buffer(ctypes.c_void_p(address))
@@ -1392,6 +1392,7 @@ class Simulation:
         return int(self._head[SOLVES])
 
     def reset(self) -> None:
+        """Forget all contacts, as at the start."""
         self._real[MOMENT], self._head[PENDING], self._head[TURNED] = math.nan, 0, 0
 
     def serve(self, data: int) -> int:
@@ -1400,21 +1401,26 @@ class Simulation:
         return int(self.address)
 
     def control(self, model: Any, data: Any) -> None:
+        """Apply the law between the engine's reference accelerations and its solver: `control` of this simulation."""
         self._alive, self._data = data, data._address
         control(model._address, data._address, self.address)
 
     def retain(self, model: Any, data: Any) -> None:
+        """Store the contact forces that the last step came to."""
         retain(model._address, data._address, self.address)
 
     def advance(self, model: Any, data: Any, nstep: int) -> None:
+        """Take `nstep` of MuJoCo's steps under the law."""
         self._alive, self._data = data, data._address
         advance(model._address, data._address, self.address, nstep)
 
     def _array(self, block: int, numbers: int) -> Array:
+        """A view of so many reals of a block of memory."""
         pointer = ctypes.cast(int(self._head[block]), ctypes.POINTER(ctypes.c_double))
         return np.ctypeslib.as_array(pointer, (numbers,)) if numbers else np.empty(0)
 
     def state(self) -> dict[str, Array]:
+        """Copies of all that the law remembers from one step to the next, as `restore` takes them."""
         if math.isnan(self._real[MOMENT]):
             spins = np.zeros((self._head[COUNT_FREE], 6))
             return {"contacts": np.empty((0, W)), "joints": np.empty(0), "spins": spins, "time": np.full(2, math.nan)}
@@ -1430,6 +1436,7 @@ class Simulation:
         return {"contacts": contacts.copy(), "joints": dry.copy(), "spins": spins.copy(), "time": time}
 
     def restore(self, contacts: Array, joints: Array, spins: Array, time: Array) -> None:
+        """Go on from what `state` returned."""
         self._array(SPINS, spins.size)[:] = spins.ravel()
         for block, count, values in ((KEPT, COUNT, contacts), (DRY, COUNT_DRY, joints)):
             grow(self.address, block, values.size)

@@ -105,12 +105,12 @@ class Pushed:
 
     @property
     def record(self) -> tuple[int, int]:
-        """`record`, or a brief one where a large push soon changes the state itself."""
+        """Length of a run after a push, in coarse steps, and its samples; short for RS, which a large push changes."""
         return (2, 16) if self.case is Case.RS else Pushes.record
 
     @property
     def order(self) -> int:
-        """Order of the remaining error in the size of a push: second, where up and down are subtracted."""
+        """The power of the push's size with which its error shrinks: 2 where pushes up and down are subtracted."""
         return 1 if self.case is Case.SR else 2
 
     @property

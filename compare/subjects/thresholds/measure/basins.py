@@ -139,7 +139,7 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
             yield Missing("edge", name, f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}")
         else:
-            a, b = _on_floor(slipping.mean), _on_floor(lifted.mean)
+            a, b = _on_floor_and_wall(slipping.mean), _on_floor_and_wall(lifted.mean)
             edges.append(Edge(name, p, a, b, a, b - a))
     for _ in range(lab.effort.edge_lines):
         lines = [_next_line(edge) for edge in edges]
@@ -184,15 +184,15 @@ class Edge:
         return np.asarray(self.centre + self.bracket.place.value * self.line)
 
     def crossed(self, line: Edge, bracket: Bracket) -> Edge:
-        """The edge once it was looked for on one more line."""
+        """The edge with the bracket of its crossing on one more line added."""
         if None in bracket.runs:
             return replace(self, moves=(), missed=self.missed + 1)
         crossed = replace(line, bracket=bracket, missed=0)
         return replace(crossed, moves=(*self.moves, np.abs(crossed.crossing - self.crossing)) if self.bracket else ())
 
 
-def _on_floor(x: Array) -> Array:
-    """The state put on the floor: the motion of a lifted ball doesn't depend on its height."""
+def _on_floor_and_wall(x: Array) -> Array:
+    """The state put on floor and wall, with y, v_y, h and v_h zero: a lifted ball moves alike at every height."""
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
 
@@ -213,7 +213,7 @@ def _search(lab: Lab, edge: Edge) -> Search:
 
 
 def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
-    """Whether a ball ends up slipping: by the way it goes, or where it would come to rest.
+    """Whether a run tends to slipping: by the direction in which it moves, or the rest state it is extrapolated to.
 
     None while it moves by little, ever more slowly, and to neither attractor: then it isn't the border's instability
     that moves it.
@@ -230,7 +230,7 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
 
 
 def _next_line(edge: Edge) -> Edge:
-    """The edge with the line to cross it on next: where the last two runs stayed together, the way they part.
+    """The edge with the next line to search: from where the last two runs still agreed, along which they part.
 
     Together they are within 2e-3 of the distance of the attractors.
     """
@@ -243,9 +243,9 @@ def _next_line(edge: Edge) -> Edge:
     length = max(together - together // 4, 1)
     weights = taper(length)
     mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
-    parting = _on_floor((high - low)[together - 1])
+    parting = _on_floor_and_wall((high - low)[together - 1])
     line = parting * float(edge.line @ edge.line) / float(parting @ edge.line)
-    return replace(edge, centre=_on_floor(mean), line=line)
+    return replace(edge, centre=_on_floor_and_wall(mean), line=line)
 
 
 def _uncertainty(edge: Edge) -> Array:
