@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 
@@ -120,19 +119,15 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
         ours = error
     with reading(path, sealed=False) as file:
         if "schema" not in file.attrs:
-            names = [name for name in ("t", *UNITS) if file.get(name, getlink=True)]
-            return {name: _numbers(dataset(file, name)) for name in names}
+            found = {name: dataset(file, name) for name in ("t", *UNITS) if file.get(name, getlink=True)}
+            for name, stored in found.items():
+                if stored.dtype.kind not in "fiu" or len(stored.shape or ()) != 1:
+                    raise StorageError(f"{name!r} is no column of numbers")
+                if len(stored) > SAMPLES:
+                    most = f"{SAMPLES:g} are the most that are compared"
+                    raise StorageError(f"{name!r} has {len(stored):g} samples, and {most}")
+            return {name: np.asarray(stored[...], float) for name, stored in found.items()}
     raise ours
-
-
-def _numbers(stored: h5py.Dataset) -> Array:
-    """A column of another program's file; `StorageError` for what is no column of numbers, or too long."""
-    name = stored.name.removeprefix("/")
-    if stored.dtype.kind not in "fiu" or len(stored.shape or ()) != 1:
-        raise StorageError(f"{name!r} is no column of numbers")
-    if len(stored) > SAMPLES:
-        raise StorageError(f"{name!r} has {len(stored):g} samples, and {SAMPLES:g} are the most that are compared")
-    return np.asarray(stored[...], float)
 
 
 @dataclass(frozen=True)

@@ -72,8 +72,11 @@ def _number(value: float, factor: float = 1, endless: str = "any") -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
 
 
-def tables(f: Forecast) -> list[Table]:
-    """Two tables of the worst pairs in contact: at rest and in motion; what was measured is called found."""
+def tables(f: Forecast, after: Forecast | None = None, held: Forecast | None = None) -> list[Table]:
+    """Tables of the worst pairs in contact: at rest and in motion; what was measured is called found.
+
+    Then what the change was made for, once it was made, and the creep with the remedy, if these forecasts are given.
+    """
     rest = [["pair", "creep\nµm/s", "found\nµm/s", "turning\nµrad/s", "found\nµrad/s", "depth\nµm", "found\nµm"]]
     rest[0] += ["load\nN", "cone\n%"]
     motion = [["pair", "hover\nmm/s", "step\nms"]]
@@ -82,23 +85,16 @@ def tables(f: Forecast) -> list[Table]:
         rest.append([p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), _number(p.cone, 100)])
         motion.append([p.name, _number(p.hover, 1e3), _number(p.largest_step, 1e3)])
     title = f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
-    return [(title, _without_empty_columns(rest)), ("In motion", _without_empty_columns(motion))]
+    shown = [(title, _without_empty_columns(rest)), ("In motion", _without_empty_columns(motion))]
+    if after and f.change:
+        shown.append((f"With {f.change.written}", tables(after)[f.change.quantity == "largest_step"][1]))
+    return shown + ([("With mjsim.Coulomb", tables(held)[0][1])] if held else [])
 
 
 def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
     """A table without the columns in which there is nothing."""
     there = [any(cell != "–" for cell in column[1:]) for column in zip(*rows, strict=True)]
     return [[*itertools.compress(row, there)] for row in rows]
-
-
-def tables_after(f: Forecast, after: Forecast | None, held: Forecast | None) -> list[Table]:
-    """Tables of what the change was made for, once it was made, and of the creep with the remedy."""
-    shown = []
-    if after and f.change:
-        shown.append((f"With {f.change.written}", tables(after)[f.change.quantity == "largest_step"][1]))
-    if held:
-        shown.append(("With mjsim.Coulomb", tables(held)[0][1]))
-    return shown
 
 
 def snippets(f: Forecast) -> list[tuple[str, str]]:
@@ -109,6 +105,6 @@ def snippets(f: Forecast) -> list[tuple[str, str]]:
 
 def html(f: Forecast, after: Forecast | None, held: Forecast | None, file: str) -> str:
     """The forecast, and those after the change and with the remedy, as one self-contained page."""
-    shown = tables(f) + tables_after(f, after, held)
+    shown = tables(f, after, held)
     said = {"file": file, "sentences": list(sentences(f)), "paste": snippets(f), "faint": f"{FAINT:.1%}"}
     return pages.render("compare.bench", "forecast.html", tables=shown, **said)

@@ -182,10 +182,8 @@ class EngineProcess:
         about, found = self.about, Result(case.name, self.about)
         if about.missing:
             return replace(found, skipped=about.missing)
-        if lacking := [need for need in case.needs if need not in about.features]:
-            return replace(
-                found, skipped=f"{about.name} doesn't say in FEATURES that it can do this: {', '.join(lacking)}"
-            )
+        if lacking := ", ".join(need for need in case.needs if need not in about.features):
+            return replace(found, skipped=f"{about.name} doesn't say in FEATURES that it can do this: {lacking}")
         runs: list[tuple[Array | None, float, str]] = []
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:
@@ -232,18 +230,9 @@ def _load(given: Any) -> tuple[Any, About]:
     if lacking:
         raise InputError(f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}")
     check_choice("PRECISION", precision := getattr(engine, "PRECISION", "f64"), list(FLOORS))
-    about = About(
-        name=name,
-        precision=precision,
-        declared=getattr(engine, "DECLARED", ""),
-        features=tuple(getattr(engine, "FEATURES", ())),
-        note=getattr(engine, "NOTE", ""),
-        version=_version(given, engine),
-        steps=tuple(
-            check_number("TIMESTEPS", step, "s", POSITIVE) for step in getattr(engine, "TIMESTEPS", TIME_STEPS)
-        ),
-    )
-    return engine, about
+    declared, note, features = (getattr(engine, what, "") for what in ("DECLARED", "NOTE", "FEATURES"))
+    steps = (check_number("TIMESTEPS", step, "s", POSITIVE) for step in getattr(engine, "TIMESTEPS", TIME_STEPS))
+    return engine, About(name, precision, declared, note, _version(given, engine), tuple(steps), tuple(features))
 
 
 def _version(given: Any, engine: Any) -> str:

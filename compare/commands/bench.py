@@ -95,7 +95,7 @@ def run_forecast(args: argparse.Namespace) -> int:
         write_text(args.output, forecast_page.html(found, after, held, args.file.name))
     shown: list[Any] = [Text(f"• {line}") for line in forecast_page.sentences(found)]
     shown += [Text(f"\n{text}") for _, text in forecast_page.snippets(found)]
-    tables = forecast_page.tables(found) + forecast_page.tables_after(found, after, held)
+    tables = forecast_page.tables(found, after, held)
     shown += [Text(""), *(pages.table(title, rows, **LOOK) for title, rows in tables)]
     options.show({"before": found, "after": after, "held": held}, args.json, *shown)
     said = [f"{args.file}: {found.unsettled}"] if found.unsettled else []

@@ -55,11 +55,6 @@ def write(p: Parameters, speed: float, motion: dict[str, Any] | None = None, run
     about = {"cases": cases, "speed": speed, "size": p.r / p.R, "colours": {"ball": BALL, "force": FORCE, "slip": SLIP}}
     slips = run is not None and bool(np.any(run.slip_speed_A + run.slip_speed_B))
     told = {"p": p, "header": run and run.header, "force": FORCE, "slip": SLIP, "slips": slips}
-    return render("compare.view", "motion.html", three=_three(), about=about, motion=motion, **told)
-
-
-def _three() -> str:
-    """The library three.js with its controls, as a module in a data address."""
     nicegui = importlib.util.find_spec("nicegui")
     if nicegui is None or nicegui.origin is None:
         raise InputError("a page needs NiceGUI, which has three.js: pip install 'dualball[explore]'")
@@ -67,4 +62,5 @@ def _three() -> str:
         source = (Path(nicegui.origin).parent / "elements/scene/dist/index.js").read_bytes()
     except FileNotFoundError:
         raise InputError("this NiceGUI has no three.js where version 3 has it: pip install 'nicegui>=3.18'") from None
-    return "data:text/javascript;base64," + base64.b64encode(source).decode()
+    three = "data:text/javascript;base64," + base64.b64encode(source).decode()  # with its controls, as a module
+    return render("compare.view", "motion.html", three=three, about=about, motion=motion, **told)
