@@ -305,7 +305,12 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
             follow()
 
         plot.on("plotly_click", clicked)
-    draw.extend(partial(lambda name: plots[name].update_figure(figures[name]()), name) for name in figures)
+
+    def redraw() -> None:
+        for name, plot in plots.items():
+            plot.update_figure(figures[name]())
+
+    draw.append(redraw)
     hint = "A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η and ω₀."
     ui.html(typeset(hint), sanitize=False)
 
