@@ -23,7 +23,7 @@ from analytic.orbits.periodic import NoOrbitError, Orbit, active_variables, exte
 from analytic.simulation.ensemble import interval, random_starts
 from analytic.simulation.simulator import simulate
 from analytic.stationary.solutions import StationarySolution, stable_solutions
-from model import InputError, Parameters, SimulationError, Trajectory
+from model import Case, InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.errors import check_type
@@ -203,7 +203,7 @@ def _follow_to_attractor(
     if not recurrent:
         return Fate(Kind.UNDECIDED, seen[-1])
     try:
-        exponent, deviation = lyapunov(p, _highest_state(seen[-1]), GROWING * unit, unit, run=run)
+        exponent, deviation = lyapunov(p, *_highest_state(seen[-1]), GROWING * unit, unit, run)
     except (SimulationError, InputError) as reason:
         return Fate(Kind.UNDECIDED, seen[-1], failure=str(reason))
     return Fate(Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC, seen[-1], exponent=exponent)
@@ -245,7 +245,7 @@ def periodic_fate(last: Trajectory) -> Fate | None:
     seen = [(float(k * interval), float(away[k])) for k in good[:3]]
     for period, _ in seen:
         try:
-            orbit = orbits.refine(p, _highest_state(last), period)
+            orbit = orbits.refine(p, _highest_state(last)[0], period)
         except NoOrbitError:
             continue
         if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
@@ -254,17 +254,17 @@ def periodic_fate(last: Trajectory) -> Fate | None:
     return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
 
 
-def _highest_state(last: Trajectory) -> Array:
-    """The state of a window in which the ball is highest; what its case holds at zero is set to exactly that."""
+def _highest_state(last: Trajectory) -> tuple[Array, Case]:
+    """Where in a window the ball is highest: the state, with exact zeros where the case has them, and the case."""
     k = int(np.argmax(last.y))
-    held = TRAITS[last.cases[k]].constraints
-    return np.where([name in held for name in VARIABLES], 0.0, last.x[k])
+    case = Case(last.case[k])
+    return np.where([name in TRAITS[case].constraints for name in VARIABLES], 0.0, last.x[k]), case
 
 
 def lyapunov(
-    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, run: Runs = event_driven
+    p: Parameters, x: npt.ArrayLike, case: Case, duration: float, renewed: float, run: Runs
 ) -> tuple[float, float]:
-    """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
+    """Largest Lyapunov exponent of the motion from x, in a case, over a duration, and its standard error, s-1.
 
     A second motion starts beside the first, a distance `APART` away in natural units, and is brought back to that
     distance every `renewed` seconds, as soon as both are in one case; the mean growth between is the exponent
@@ -272,7 +272,7 @@ def lyapunov(
     motion breaks down.
     """
     first = full_state(x)
-    active, push = active_variables(run(p, first[None], renewed, renewed)[0].cases[0]), np.zeros(8)
+    active, push = active_variables(case), np.zeros(8)
     push[active] = np.random.default_rng(0).normal(size=len(active))
     second = first + push * state_units(p) * APART / np.linalg.norm(push)
     growth, before = [], APART

@@ -119,22 +119,6 @@ def drag_rate(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
     return max(slow, blunt * speed)
 
 
-def rates(t: float, z: Any, k: Motion, out: Any) -> None:
-    """Rates of the coordinates of a case."""
-    if k.case == RN or k.case == SN or k.case == NN:
-        _rates_away(t, z, k, out)
-    else:
-        _rates_at_wall(t, z, k, out)
-
-
-def guards(t: float, z: Any, k: Motion, out: Any) -> None:
-    """What is positive while a case lasts, in natural units, in the order of `charts.ENDS`."""
-    if k.case == RN or k.case == SN or k.case == NN:
-        _guards_away(t, z, k, out)
-    else:
-        _guards_at_wall(t, z, k, out)
-
-
 def forces(case: int, omega_c: float, v_y: float, w_x: float, c: float, lag: float, s_A: float, c_A: float, s_B: float,
             c_B: float, k: Motion) -> tuple[float, float, float, float, float, float]:  # fmt: skip
     """Forces of floor and wall along i, j, k in the cases at the wall, N; in RR with B_y = 0.
@@ -185,7 +169,10 @@ def _wall_state(z: Any, k: Motion) -> tuple[float, ...]:
     return omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, q_B * s_B
 
 
-def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
+def rates(t: float, z: Any, k: Motion, out: Any) -> None:
+    """Rates of the coordinates of a case."""
+    if k.case % 3 == AWAY:
+        return _rates_away(t, z, k, out)
     omega_0 = fluid(t, k)
     omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, _ = _wall_state(z, k)
     lag = omega_c - omega_0
@@ -225,7 +212,10 @@ def _rates_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
     out[first] = power
 
 
-def _guards_at_wall(t: float, z: Any, k: Motion, out: Any) -> None:
+def guards(t: float, z: Any, k: Motion, out: Any) -> None:
+    """What is positive while a case lasts, in natural units, in the order of `charts.ENDS`."""
+    if k.case % 3 == AWAY:
+        return _guards_away(t, z, k, out)
     omega_c, v_y, w_x, _, q_A, s_A, c_A, q_B, s_B, c_B, _ = _wall_state(z, k)
     lag = omega_c - fluid(t, k)
     c = drag_rate(0.0, v_y, k.R * lag, k)

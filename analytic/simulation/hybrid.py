@@ -288,20 +288,14 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     recorder.time = max(recorder.time, float(done.reached[0]))
     if count := int(done.taken[0]):
         path = done.path[:count]
-        forces = path_forces(done.case[:count], done.x[:count], path, p)
-        recorder.add(times[:count], path[:, 0], done.x[:count], forces, done.case[:count], path[:, 3])
+        x, codes, forces = done.x[:count], done.case[:count], np.empty((count, 6))
+        for case in map(Case, np.unique(codes)):  # in RR those of least utilisation
+            here = codes == case
+            _, alpha, beta, _, omega_0 = path[here].T
+            slip_A = (np.sin(alpha), np.cos(alpha)) if case.A is Contact.S else None
+            slip_B = (np.sin(beta), np.cos(beta)) if case.B is Contact.S else None
+            f = dynamics.forces(case, State.of(x[here]), p, omega_0, slip_A, slip_B)
+            forces[here] = np.stack(np.broadcast_arrays(*f, alpha)[:6], axis=-1)
+        recorder.add(times[:count], path[:, 0], x, forces, codes, path[:, 3])
     if failure:
         raise failure
-
-
-def path_forces(case: npt.NDArray[np.int8], x: Array, path: Array, p: Parameters) -> Array:
-    """Contact forces at samples, shape (n, 6), N; in RR those of least utilisation. All of one case at once."""
-    forces = np.empty((len(case), 6))
-    for each in map(Case, np.unique(case)):
-        here = case == each
-        _, alpha, beta, _, omega_0 = path[here].T
-        slip_A = (np.sin(alpha), np.cos(alpha)) if each.A is Contact.S else None
-        slip_B = (np.sin(beta), np.cos(beta)) if each.B is Contact.S else None
-        f = dynamics.forces(each, State.of(x[here]), p, omega_0, slip_A, slip_B)
-        forces[here] = np.stack(np.broadcast_arrays(*f, alpha)[:6], axis=-1)
-    return forces

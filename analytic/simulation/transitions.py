@@ -55,10 +55,18 @@ def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Fo
     x, A, B = at.x, case // 3, case % 3
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
     if guard in (A_SLIPS, B_SLIPS):
-        alpha, beta = _slip_directions(case, at, k)
+        # Slip sets in against the friction of the contact that rolls so far.
+        lag = x.omega_c - equations.fluid(at.time, k)
+        if case == RN:
+            return 3 * SLIPS + B, with_directions(at, x, math.atan2((k.R - x.h) * lag, -x.v_h), at.beta), NOTHING
+        c = equations.drag_rate(x.v_h, x.v_y, k.R * lag, k)
+        A_x, _, A_z, _, B_y, B_z = equations.forces(
+            case, x.omega_c, x.v_y, x.slip_x, c, lag, math.sin(at.alpha), math.cos(at.alpha), math.sin(at.beta),
+            math.cos(at.beta), k,
+        )  # fmt: skip
         if guard == A_SLIPS:
-            return 3 * SLIPS + B, with_directions(at, x, alpha, at.beta), NOTHING
-        return 3 * A + SLIPS, with_directions(at, x, at.alpha, beta), NOTHING
+            return 3 * SLIPS + B, with_directions(at, x, math.atan2(A_z, -A_x), at.beta), NOTHING
+        return 3 * A + SLIPS, with_directions(at, x, at.alpha, math.atan2(-B_z, B_y)), NOTHING
     if guard == A_LIFTS:
         return 3 * AWAY + B, with_directions(at, x, math.nan, at.beta), NOTHING
     if guard == B_OPENS:
@@ -94,20 +102,6 @@ def settle(at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
 def with_directions(at: Moment, x: State, alpha: float, beta: float) -> Moment:
     """The moment with another state and directions of slip."""
     return Moment(at.time, at.theta, x, alpha, beta, at.work)
-
-
-def _slip_directions(case: int, at: Moment, k: Motion) -> tuple[float, float]:
-    """Directions alpha, beta in which contacts that roll will begin to slip: against their friction, rad."""
-    x = at.x
-    lag = x.omega_c - equations.fluid(at.time, k)
-    if case == RN:
-        return math.atan2((k.R - x.h) * lag, -x.v_h), math.nan
-    c = equations.drag_rate(x.v_h, x.v_y, k.R * lag, k)
-    A_x, _, A_z, _, B_y, B_z = equations.forces(
-        case, x.omega_c, x.v_y, x.slip_x, c, lag, math.sin(at.alpha), math.cos(at.alpha), math.sin(at.beta),
-        math.cos(at.beta), k,
-    )  # fmt: skip
-    return math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
 
 
 def choose(at: Moment, k: Motion) -> tuple[int, Moment]:
@@ -220,7 +214,8 @@ def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
         v_h = 0.0
     left = Velocities(v_h, v_y, u.v_k, u.o_x, u.o_y, u.o_z)
     y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = rigid_body.state(x.y, x.h, left, k)
-    still = AT_REST * _speed(before, k)
+    spin = k.r * k.r * (before.o_x * before.o_x + before.o_y * before.o_y + before.o_z * before.o_z)
+    still = AT_REST * math.sqrt(before.v_h * before.v_h + before.v_y * before.v_y + before.v_k * before.v_k + spin)
     (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(u, k), rigid_body.slip_at_B(u, k)
     if A.closed and P.A_y > 0 and math.hypot(s_A, t_A) <= still:
         slip_x, slip_z = 0.0, -(v_h + v_y) / k.r
@@ -228,9 +223,3 @@ def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
         slip_y = slip_z = 0.0
     after = State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h)
     return Moment(at.time, at.theta, after, math.nan, math.nan, work), P
-
-
-def _speed(u: Velocities, k: Motion) -> float:
-    """Root of the sum of squares of velocities, those of spin times r, m s-1."""
-    spin = k.r * k.r * (u.o_x * u.o_x + u.o_y * u.o_y + u.o_z * u.o_z)
-    return math.sqrt(u.v_h * u.v_h + u.v_y * u.v_y + u.v_k * u.v_k + spin)

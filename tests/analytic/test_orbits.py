@@ -147,11 +147,9 @@ def test_lyapunov_exponent_of_a_known_growth():
 
     def run(p, x0s, duration, interval):
         whole, growth = SimpleNamespace(failure=""), np.exp(0.3 * duration)
-        return [
-            SimpleNamespace(x=np.array([x, x * growth]), case=[Case.NN], cases=[Case.NN], header=whole) for x in x0s
-        ]
+        return [SimpleNamespace(x=np.array([x, x * growth]), case=[Case.NN], header=whole) for x in x0s]
 
-    assert fates.lyapunov(HOPPING, np.zeros(8), 20.0, 0.5, run) == pytest.approx((0.3, 0.0), abs=1e-6)
+    assert fates.lyapunov(HOPPING, np.zeros(8), Case.NN, 20.0, 0.5, run) == pytest.approx((0.3, 0.0), abs=1e-6)
 
 
 @pytest.mark.slow
