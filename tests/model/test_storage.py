@@ -103,28 +103,23 @@ def test_without_the_library_it_is_named(monkeypatch, library, needed):
         getattr(make(), f"to_{library}")()
 
 
-def test_a_table_for_pandas_has_a_row_for_each_sample():
-    trajectory = make(50, 2)
-    table = trajectory.to_pandas()
-    assert len(table) == 50
-    assert table.index.name == "time"
-    np.testing.assert_array_equal(table.force_By, trajectory.force_B[:, 1])
-    np.testing.assert_array_equal(table.omega_0, trajectory.omega_0)
-    assert list(table.case) == [case.name for case in trajectory.cases]
-    assert table.attrs["mu"] == trajectory.header.parameters.mu
-
-
-def test_xarray_reads_a_table_with_a_row_for_each_sample(tmp_path):
-    """By the entry point, which it looks up where dualball is installed."""
+def test_a_table_has_a_row_for_each_sample_in_pandas_and_in_xarray(tmp_path):
+    """Which reads it by the entry point that it looks up where dualball is installed."""
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     backend = EntryPoint("dualball", project["entry-points"]["xarray.backends"]["dualball"], "").load()
     trajectory = make(50, 2)
+    expected = trajectory.to_pandas()
+    assert expected.index.name == "time"
+    np.testing.assert_array_equal(expected.force_By, trajectory.force_B[:, 1])
+    np.testing.assert_array_equal(expected.omega_0, trajectory.omega_0)
+    assert list(expected.case) == [case.name for case in trajectory.cases]
+    assert expected.attrs["mu"] == trajectory.header.parameters.mu
     storage.save(trajectory, tmp_path / "run.h5")
     storage.save_batch({"KEY": trajectory}, tmp_path / "batch.h5")
     (tmp_path / "text.h5").write_text("time,omega_c")
     for path in ("run.h5", "batch.h5/KEY"):
         with xarray.open_dataset(tmp_path / path, engine=backend) as run:
-            table, expected = run.to_dataframe(), trajectory.to_pandas()
+            table = run.to_dataframe()
             assert run.force_Ay.units == "N"
             assert run.attrs["mu"] == trajectory.header.parameters.mu
             run.to_netcdf(tmp_path / "copy.nc")
@@ -179,13 +174,6 @@ def test_a_disk_that_fills_at_any_moment(tmp_path):
     assert answer.stderr == ""
     assert answer.stdout.splitlines() == [f"cannot write {tmp_path / 'run.h5'}: File too large"] * 14
     assert list(tmp_path.iterdir()) == []
-
-
-def test_no_directory_to_write_to(tmp_path):
-    with pytest.raises(StorageError, match=r"^cannot write .*: No such file or directory$"):
-        storage.save(make(), tmp_path / "absent" / "run.h5")
-    with pytest.raises(StorageError, match=r"^cannot read .*: there is no such file$"):
-        storage.load(tmp_path / "absent.h5")
 
 
 def edit(path, change):
@@ -270,8 +258,12 @@ def test_a_foreign_or_damaged_file_is_refused(tmp_path, name, change, says):
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_no_file_is_not_replaced(tmp_path):
-    """As the superuser, renaming a whole file to /dev/null would take it from everyone."""
+def test_where_nothing_is_read_or_written(tmp_path):
+    """What is no file is not replaced: as the superuser, renaming one to /dev/null would take it from everyone."""
+    with pytest.raises(StorageError, match=r"^cannot write .*: No such file or directory$"):
+        storage.save(make(), tmp_path / "absent" / "run.h5")
+    with pytest.raises(StorageError, match=r"^cannot read .*: there is no such file$"):
+        storage.load(tmp_path / "absent.h5")
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(StorageError, match="pipe: it is not a file"):
         write_text(tmp_path / "pipe", "")
