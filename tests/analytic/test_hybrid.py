@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import BDF, LSODA, solve_ivp
-from scipy.optimize import brentq
 
 from analytic import contact_forces, simulate, vector_field
 from analytic.mechanics import rolling_forces
@@ -76,33 +75,6 @@ def test_bounces_come_to_rest():
     np.testing.assert_allclose(run.events.impulse_A[:, 1], m_v * (1 + e) * e ** np.arange(count), rtol=1e-6, atol=1e-12)
     assert run.events.time[-1] == pytest.approx(t_0 * (1 + e) / (1 - e), rel=RTOL)
     assert changes(run)[-1] == (Case.NN, Case.RN)
-
-
-def test_spin_up_from_rest():
-    """From rest the ball slips at the wall while it rolls on the floor; (24) is a Riccati equation.
-
-    With a = c/(1+j): omega_c = phi'/(eta phi), phi = exp(-a t/2)(cosh(q t/2) + a/q sinh(q t/2)), q^2 = a^2 +
-    4 eta a omega_0; w_y = R/r (omega_c - eta (1+j)/j int omega_c^2), eta omega_c^2 = a (omega_0 - omega_c) - omega_c'.
-    """
-    p = P.replace(omega_0=12.0)
-    a = p.c / (1 + p.j)
-    q = math.sqrt(a**2 + 4 * p.eta * a * p.omega_0)
-
-    def omega_c(t):
-        return 2 * a * p.omega_0 * np.tanh(q * t / 2) / (q + a * np.tanh(q * t / 2))
-
-    def w_y(t):
-        log_phi = -a * t / 2 + np.log(np.cosh(q * t / 2) + a / q * np.sinh(q * t / 2))
-        eta_square = a * (p.omega_0 * t - log_phi / p.eta) - omega_c(t)
-        return p.R / p.r * (omega_c(t) - (1 + p.j) / p.j * eta_square)
-
-    run = simulate(p, np.zeros(6), 1.5, sample_interval=0.01)
-    assert changes(run) == [(Case.RS, Case.RR)]
-    end = brentq(w_y, 0.3, 2.0, xtol=1e-15)
-    assert run.events.time[0] == pytest.approx(end, rel=RTOL)
-    slipping = run.time < end
-    np.testing.assert_allclose(run.omega_c[slipping], omega_c(run.time[slipping]), atol=RTOL * 12)
-    np.testing.assert_allclose(run.slip_y[slipping], w_y(run.time[slipping]), atol=RTOL * 60)
 
 
 def test_rolling_ends_where_no_forces_are_left():

@@ -12,7 +12,7 @@ import pytest
 from mjsim.coulomb import Coulomb, compiled, doors
 
 G = 9.81
-CONES = pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+BOTH = "elliptic", "pyramidal"
 LAWS = [{}, {"servo": 0.1}, {"rigid": True}, {"rigid": True, "restitution": 0.5}]
 BALL, BOX = '<geom size=".05" mass="1"/>', '<geom type="box" size=".05 .05 .05" mass="1"/>'
 PILE = "".join(
@@ -77,7 +77,7 @@ def plain():
     return module
 
 
-def run(monkeypatch, form, model, law, steps, installed=False):
+def run(monkeypatch, form, model, law, steps, installed):
     """Positions and velocities after each step, and what is remembered at the end."""
     monkeypatch.setattr(doors, "compiled", form)
     data, path, coulomb = mujoco.MjData(model), [], Coulomb(model, **law)
@@ -89,32 +89,25 @@ def run(monkeypatch, form, model, law, steps, installed=False):
         return np.array(path), coulomb.state()
 
 
-def check_same(monkeypatch, plain, make, law, steps=40, installed=False):
-    (one, mine), (other, its) = (run(monkeypatch, form, make(), law, steps, installed) for form in (compiled, plain))
-    np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-8)
-    for name in mine:
-        np.testing.assert_allclose(its[name], mine[name], rtol=1e-3, atol=1e-3)
-
-
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("k", range(4))
-def test_steps_agree(monkeypatch, plain, name, k):
-    """Each scene under each law, with either cone in turn."""
-    law, cone = LAWS[k], ("elliptic", "pyramidal")[(k + k // 2 + list(SCENES).index(name)) % 2]
+@pytest.mark.parametrize(
+    ("name", "law", "cone", "option", "installed"),
+    [
+        *((name, LAWS[k], BOTH[(i + k + k // 2) % 2], "", False) for i, name in enumerate(SCENES) for k in range(4)),
+        *((name, {}, "elliptic", 'integrator="Euler"', True) for name in ("pile, condim 6", "dry joints")),
+        *((name, {}, "pyramidal", 'integrator="RK4"', True) for name in ("pile, condim 6", "dry joints")),
+        *(("sphere, condim 6", {"rigid": True}, cone, 'solver="PGS"', False) for cone in BOTH),
+    ],
+)
+def test_steps_agree(monkeypatch, plain, name, law, cone, option, installed):
+    """Each scene under each law, with either cone in turn; callbacks; the solver that holds softness in its matrix."""
     assert name != "sparse" or mujoco.mj_isSparse(scene(name, cone))
-    check_same(monkeypatch, plain, lambda: scene(name, cone), law)
-
-
-@pytest.mark.parametrize(("integrator", "cone"), [("Euler", "elliptic"), ("RK4", "pyramidal")])
-@pytest.mark.parametrize("name", ["pile, condim 6", "dry joints"])
-def test_callbacks_agree(monkeypatch, plain, name, integrator, cone):
-    check_same(monkeypatch, plain, lambda: scene(name, cone, f'integrator="{integrator}"'), {}, 20, installed=True)
-
-
-@CONES
-def test_projected_solver_agrees(monkeypatch, plain, cone):
-    """Rigid contacts of the solver that holds softness in its matrix, too."""
-    check_same(monkeypatch, plain, lambda: scene("sphere, condim 6", cone, 'solver="PGS"'), {"rigid": True})
+    (one, mine), (other, its) = (
+        run(monkeypatch, form, scene(name, cone, option), law, 20 if installed else 40, installed)
+        for form in (compiled, plain)
+    )
+    np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-8)
+    for kept, ours in zip(its.values(), mine.values(), strict=True):
+        np.testing.assert_allclose(kept, ours, rtol=1e-3, atol=1e-3)
 
 
 @pytest.mark.parametrize(("law", "cone"), [({}, "elliptic"), ({"rigid": True}, "pyramidal")], ids=str)
@@ -155,7 +148,7 @@ def test_other_time_forgets_once():
     assert np.array_equal(*ends)
 
 
-@CONES
+@pytest.mark.parametrize("cone", BOTH)
 def test_a_point_that_the_collider_drops_is_put_back(cone):
     """A corner of a box at rest, with the force it had."""
     model = scene("box", cone, margin=0.0)
