@@ -120,22 +120,6 @@ def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(cone, rigid, step
 
 
 @CONES
-@pytest.mark.parametrize("geom", [BOX, CYLINDER, BALL], ids=["box", "cylinder", "ball"])
-@pytest.mark.parametrize("step", [4e-3, 2e-3, 1e-3])
-def test_a_rigid_body_lands_in_one_step(cone, geom, step):
-    """The step in which it arrives ends where it touches, and in the next it has no speed left."""
-    model, data = scene(cone=cone, geom=geom, height=0.25, option=f'timestep="{step}"')
-    law, speeds = Coulomb(model, rigid=True), [0.0]
-    while data.qpos[2] > 0.0501:
-        law.step(data)
-        speeds.append(data.qvel[2])
-    for _ in range(20):
-        law.step(data)
-        assert abs(data.qvel[2]) < 1e-10 * abs(min(speeds))
-        assert data.qpos[2] > 0.05 - 1e-9
-
-
-@CONES
 def test_servo_takes_the_depth_away(cone):
     """A ball that rolls down has the lever r, so that it gains 5/7 g sin(slope): 1 % less without servo."""
     slope, ball = np.radians(5), '<geom size=".05" mass=".03" margin="2e-3"/>'
