@@ -33,7 +33,7 @@ def spin_of(case: Case, omega_0: float, p: Parameters) -> float:
 
 
 def round_with_fluid(p: Parameters, case: Case, begin: float, end: float) -> tuple[Array, Array]:
-    """slip_x and omega_c (n,) from one flow to another of RR, SR, NR or NS: the ball goes round with the fluid."""
+    """slip_x and omega_c (n,) of RR, SR, NR or NS, where omega_c = omega_0, over flows from `begin` to `end`."""
     flows = np.linspace(begin, end, 200)
     rolls, alike = p.R / p.r * flows, Case.NR if case is Case.SR else case
     spun = rolls if case is Case.RR else np.array([spin_of(alike, flow, p) for flow in flows])

@@ -116,12 +116,12 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
 
 
 def of_set(p: Parameters) -> Selected:
-    """Of each figure that theory alone can draw the function that selects its data for a set."""
+    """For each figure that theory alone can draw, by name, the function that selects its data for a set."""
     return {name: partial(each.of_set, p) for name, each in FIGURES.items() if each.of_set}
 
 
 def of_results(evidence: Evidence) -> Selected:
-    """Of each figure the function that selects its data from results."""
+    """For each figure, by name, the function that selects its data from results."""
     return {name: partial(each.select, evidence) for name, each in FIGURES.items()}
 
 

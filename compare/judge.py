@@ -86,7 +86,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
 
 
 def outcome(claim: Claim, checks: Sequence[Check], wanted: Counter[int]) -> Outcome:
-    """The outcome that checks come to, if so many are wanted of each bearing; see `verdict`."""
+    """The outcome of a claim by its checks; `wanted` is how many were to be made for each bearing. See `verdict`."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
     if undecided_bearings(checks, wanted):

@@ -31,7 +31,7 @@ class Case(IntEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> Case:
-        """``Case("SS")`` is the case of that name; `InputError` for what is none."""
+        """Let ``Case("SS")`` give the case of that name; raise `InputError` for a name or number of no case."""
         if isinstance(value, str) and value in cls.__members__:
             return cls[value]
         raise InputError(f"case = {value!r} must be one of {', '.join(cls.__members__)}")

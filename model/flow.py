@@ -24,8 +24,7 @@ _COLUMNS = {"time": ("s", ["t"]), "omega_0": ("rad s-1", ["omega0", "omega", "ω
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """omega_0(t): a piecewise linear function, with jumps where a piece doesn't start where the last one ended, and
-    sine waves on top of it.
+    """The flow omega_0(t): a piecewise linear function of time, which may jump between pieces, plus sine waves.
 
     Piece k holds from ``start[k]`` on and is ``value[k] + slope[k] (t - start[k])``; before the first start its
     value holds. Make one with `steady`, `ramp`, `staircase`, `sampled`, `sine`, `sines` or `from_csv`.
@@ -161,6 +160,7 @@ class Flow:
 
     @classmethod
     def _from_pieces(cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]) -> Self:
+        """A flow that is linear from each start on, without waves; `InputError` for values or times that cannot be."""
         t = [check_number(f"time of flow sample {k}", time, "s", REACH) for k, time in enumerate(start)]
         v = [check_number(f"omega_0 of flow sample {k}", omega, "rad s-1", REACH) for k, omega in enumerate(value)]
         if not v:

@@ -70,7 +70,7 @@ def check_number(name: str, value: Any, unit: str, allowed: Range = ANY, meaning
 
 
 def parse_number(name: str, text: str, unit: str, allowed: Range = ANY) -> float:
-    """The number that a text is; `InputError` as for `check_number`."""
+    """Convert a text to a number; `InputError` if it is none, or as for `check_number`."""
     try:
         number = float(text)
     except ValueError as error:

@@ -196,7 +196,7 @@ def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.
 def _create_column(
     file: h5py.File, meta: Mapping[str, Any], dimensions: Sequence[str], scales: dict[str, h5py.Dataset], **layout: Any
 ) -> None:
-    """Create a column whose dimensions are the first of these names; where one has no scale yet, the column is it."""
+    """Create a column along the first of these dimensions; it becomes the HDF5 scale of one that has none yet."""
     column = file.create_dataset(meta["name"], dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
     column.attrs.update(attributes(meta))
     for dimension, scale in zip(column.dims, dimensions, strict=False):

@@ -36,7 +36,7 @@ CONVENTIONS = "CF-1.11"
 def _column(
     units: str, long_name: str, equation: str = "", shape: tuple[int, ...] = (), dtype: Any = np.float64, **more: Any
 ) -> Any:
-    """Declare a column of a table."""
+    """Declare a field that is a column of the HDF5 file, with its metadata."""
     about = {"units": units, "long_name": long_name, "equation": equation, "shape": shape, "dtype": dtype}
     return field(repr=False, metadata=about, **more)
 
@@ -200,6 +200,7 @@ class Trajectory:
 
 
 def _event_column(units: str, long_name: str, shape: tuple[int, ...] = (), dtype: Any = np.float64) -> Any:
+    """As `_column`, of the table of events, which may be empty."""
     return _column(units, long_name, "", shape, dtype, default_factory=lambda: np.empty((0, *shape), dtype))
 
 

@@ -115,7 +115,7 @@ class Loop:
         return [k for k in active_variables(self.case) if k != self.fixed]
 
     def coordinates(self, x: Array) -> Array:
-        """Coordinates (..., d - 1) of states (..., 8), or of differences of states."""
+        """Coordinates in the section (..., d - 1), in natural units, of states (..., 8) or differences of states."""
         return np.asarray(x[..., self.free] / state_units(self.p)[self.free])
 
     def moved(self, by: Array, varied: str | None = None) -> Loop:
@@ -277,7 +277,7 @@ def close_loop(loop: Loop, varied: str | None = None, neighbour: Array | None = 
 
 
 def defect_jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
-    """Derivative (d - 1, d - 1) of by how much a loop isn't closed; with one more column if a parameter is varied."""
+    """Derivative (d - 1, d - 1) of the gap by which a loop isn't closed; one more column if a parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
     return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state
 

@@ -284,6 +284,7 @@ def _horizontal_drag(t: float, z: Any, rise: float, k: Motion) -> tuple[complex,
 
 
 def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
+    """`rates` of a ball away from the wall."""
     rise = 0.0
     if k.case == NN:
         rise = fall_speed(t, k) if k.fall.landing < math.inf else z[5]
@@ -304,6 +305,7 @@ def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
 
 
 def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
+    """`guards` of a ball away from the wall."""
     gap = 1 - math.sqrt(z[0] * z[0] + z[1] * z[1]) / k.R
     if k.case == RN:
         _, lag, c = _horizontal_drag(t, z, 0.0, k)

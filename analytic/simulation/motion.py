@@ -35,7 +35,7 @@ class Moment(NamedTuple):
 
 
 def line_of(flow: Flow, start: float) -> Line:
-    """What a flow is without its waves from one of its knots, or from 0, on."""
+    """The linear piece of a flow, without its waves, that holds from the time `start`: a knot of the flow, or 0."""
     k = int(np.searchsorted(flow.start, start, side="right")) - 1
     if k < 0:
         return Line(float(start), float(flow.value[0]), 0.0)
@@ -43,7 +43,7 @@ def line_of(flow: Flow, start: float) -> Line:
 
 
 def of_ball(p: Parameters, flow: Flow, settings: Settings) -> Motion:
-    """What the motion of a ball depends on, as plain numbers; in whatever case, and at first."""
+    """The constants of a ball's motion as plain numbers, with the flow at first; `in_case` sets the case."""
     m, r, R, j, mu, eta, g, c = map(float, (p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, p.c))
     law, unit = drag.Law(*map(float, drag.law(p))), math.sqrt(R / g)
     leaves = {"slip-stability": equations.STABILITY, "infeasible": equations.FEASIBILITY}[settings.leave_rolling]

@@ -35,7 +35,7 @@ AT_ONCE = 10_000
 
 
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
-    """Step from state x0 and record samples and changes of case; the contract of `simulation.simulate`.
+    """Simulate a run, by time stepping, from state x0 and azimuth theta_0, and write it to the recorder.
 
     The first sample, before any step, carries the forces and the case of the first step. Raises
     `NotConvergedError`.

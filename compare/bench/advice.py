@@ -80,7 +80,7 @@ def remedied(model: Any, data: Any) -> tuple[Any, Any, Callable[[Any, Any, int],
 
 
 def apply(model: Any, option: str, value: Sequence[float]) -> None:
-    """Change one option of a model; those of contacts for all geoms and pairs that are softer."""
+    """Set one option of a model; `solref` and `solimp` only of geoms and pairs that are softer than the value."""
     if option in ("impratio", "cone", "timestep"):
         setattr(model.opt, option, value[0])
     for own in (getattr(model, f"{kind}_{option}") for kind in ("geom", "pair") if option in ("solref", "solimp")):

@@ -117,7 +117,7 @@ class Case(Scene):
         return np.concatenate(gaps).T, np.concatenate(slips).T
 
     def in_contact(self, letters: str) -> Array:
-        """Where the exact motion has one of these letters, (n, surfaces)."""
+        """Where contacts of the exact motion are in one of these states, letters such as R or S; (n, surfaces)."""
         return np.array([[letter in letters for letter in sample] for sample in self.contacts])
 
     def to_mapping(self) -> dict[str, Any]:

@@ -287,8 +287,10 @@ def _groove(angle: float, mu: float) -> tuple[Surface, Surface]:
 
 
 def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> _Motion:
-    """A body in a groove, each plane of which carries m g cos/sqrt(2), goes down at g sin/(1 + j/sin^2 45) if it rolls,
-    where friction allows; a block can't."""
+    """A body goes down a groove at g sin/(1 + j/sin^2 45) if it rolls, faster if it slips; a block can't roll.
+
+    Each plane of the groove carries m g cos/sqrt(2).
+    """
     way, normal = slope(angle)
     a = max(G * math.sin(angle) / (1 + lever), G * (math.sin(angle) - mu * math.cos(angle) / math.sqrt(0.5)))
     spin = a * t / (math.sqrt(0.5) * RADIUS) if lever < 9 else 0 * t

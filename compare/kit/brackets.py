@@ -50,7 +50,7 @@ class Bracket:
 
     @property
     def width(self) -> float:
-        """How far they are apart."""
+        """The upper value less the lower one."""
         return self.high - self.low
 
     @property

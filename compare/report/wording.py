@@ -186,7 +186,7 @@ def headline(ran: Sequence[Verdict]) -> str:
 
 
 def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
-    """How many claims came out as expected, by kind, and how many didn't: counts with what they count."""
+    """Counts of claims that came out as expected, by kind, and of those that didn't; each with what it counts."""
     passed = [verdict for verdict in ran if verdict.passed]
     left = sum(verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed for verdict in ran)
     counts = {
@@ -209,7 +209,7 @@ def coarse_and_missing(ran: Sequence[Verdict]) -> str:
 
 
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
-    """How many claims and numbers came out how: counts with what they count."""
+    """Counts of claims and of numbers by outcome, each with what it counts, in words."""
     checks = [check for verdict in ran for check in verdict.checks]
     counts = [*by_kind(ran), (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance")]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):

@@ -165,7 +165,7 @@ starts are extrapolated from one or two hops, which attract from nearby only."""
 
 
 def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The wall beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
+    """The wall friction beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
     p = Parameters.named(SET)
     walls = [p.replace(eta=share * p.eta) for share in WALLS]
     etas = [q.eta for q in walls]
@@ -235,7 +235,7 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
-    """The wall at which disturbances neither grow nor shrink, by lines through eta (n,) and factors (n, 3).
+    """The wall friction at which disturbances neither grow nor shrink, by lines through eta (n,) and factors (n, 3).
 
     Factors are those with the coarser step, with the finer one, and in a later part of the run with the finer one.
     """

@@ -120,7 +120,7 @@ OFF = 0.05
 
 
 def _meant(m: Measurement, off: float) -> dict[str, float]:
-    """Friction of the meter of which the ball that was measured is the worst, off by `off`; the best if that is < 0.
+    """Nominal friction of a meter, of whose tolerance `off` the measured ball is the worst case (the best if off < 0).
 
     Less friction slips sooner; a rougher wall carries the ball sooner.
     """
@@ -135,6 +135,7 @@ def _one_end(m: Measurement) -> bool:
 
 
 def _stokes(m: Measurement) -> bool:
+    """Whether a set has Stokes' drag."""
     return m.parameters.drag == STOKES
 
 
@@ -157,7 +158,7 @@ def _end_of_spread(m: Measurement, end: int) -> float:
 
 
 def _by_sensitivity(m: Measurement) -> float:
-    """omega_02 from that on a wall with half the friction, as a power that a design tells."""
+    """omega_02 extrapolated from a wall of half the friction by the power of eta that is the design's sensitivity."""
     p, half = m.parameters, {"eta": m.parameters.eta / 2}
     power = design.sensitivities(p.replace, half)["omega_02"]["eta"].value
     return analytic.thresholds(p.replace(**half)).omega_02 * 2**power
@@ -280,7 +281,8 @@ CLAIMS = (
     claim(
         "design-reading",
         "extension, Fig. 13",
-        "A meter reads the lowest of a design's readings while the flow rises, the highest while it falls.",
+        "Where a flow has several stable readings, the meter shows the lowest while the flow rises and the highest "
+        "while it falls, as its design says.",
         Bearing("hysteresis", "omega_c", _loop_reading_of_design, by="analytic.flowmeter.design.readings"),
     ),
     claim(

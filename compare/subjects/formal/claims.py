@@ -253,8 +253,8 @@ def _with_inertia() -> Iterator[Check]:
 @_formal(
     "pulsation-extremes",
     "(66), (67), (73)",
-    "The amplitude at which a pulsation makes the ball slip tends to a limit as the pulsation becomes slow, and to "
-    "another as it becomes fast.",
+    "The amplitude at which a pulsation makes the ball slip tends to a closed form for slow pulsations, which take the "
+    "flow to ω₀₁, ω₀₃ or rest, and to another for fast ones, in which ω_c stands still.",
     reason="So slow or so fast, no engine could follow it; frequencies in between are measured (pulsation-slip).",
 )
 def _pulsating() -> Iterator[Check]:
@@ -311,7 +311,7 @@ def _both_ways() -> Iterator[Check]:
 @_formal(
     "fluid-torque-friction",
     "extension",
-    "A fluid that resists the ball's spin leaves less of the friction for rolling, by a known share.",
+    "A fluid that resists the ball's spin uses up friction; the least with which it still rolls follows from balances.",
     reason="Of engines only the lag is measured (fluid-torque).",
 )
 def _with_torque() -> Iterator[Check]:

@@ -40,7 +40,7 @@ def _sinking(m: Measurement) -> float:
 
 
 def _fallen(m: Measurement) -> float:
-    """Height in m to which a ball that is thrown has come: above the floor that it would reach just then."""
+    """Height in m of a thrown ball at the end: the start's height less the depth whose `drag.fall_time` is the time."""
     p, (y, v_y, *_) = m.parameters, state(m)
     fall = brentq(lambda fall: drag.fall_time(fall, v_y, p) - m.at("time"), 1e-6 * p.R, 100 * p.R)
     return y - float(fall)
@@ -151,8 +151,8 @@ LAW_CLAIMS = (
     claim(
         "opening",
         "(12), section 1.1",
-        "A wall contact that carries nothing, or less than friction at the floor takes from it, opens, and the ball "
-        "leaves the wall as the equations say.",
+        "The wall contact opens where it carries no load, or where friction at the floor pulls the ball inwards more "
+        "than its orbit needs; the ball then leaves the wall as the equations say.",
         *_end_states("pulled off"),
     ),
     claim(
@@ -198,7 +198,7 @@ LAW_CLAIMS = (
     claim(
         "impacts",
         "extension",
-        "A ball that lands does not rebound, and friction takes its share of the impulse.",
+        "A ball that lands does not rebound, and friction acts on it during the impact by Coulomb's law for impulses.",
         Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
         *bearings("impacts", [f"after_{name}" for name in LANDED], _end_of_motion, by=_RUN),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",

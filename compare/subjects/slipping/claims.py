@@ -21,6 +21,7 @@ _NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.R
 
 
 def _state(m: Measurement) -> Array:
+    """The state (8,) at which something was measured."""
     return np.array(state(m))
 
 
@@ -48,6 +49,7 @@ def _following_case(m: Measurement) -> float:
 
 
 def _gamma_nr(m: Measurement) -> float:
+    """gamma (56) in the measured direction of slip, rad s-2."""
     return float(slip_bounds.gamma_nr(math.atan2(m.at("n_y"), m.at("n_z")), _state(m), m.parameters))
 
 
@@ -59,6 +61,7 @@ def _by_forces(m: Measurement) -> float:
 
 
 def _steepest(m: Measurement) -> float:
+    """beta_1 (58) in the measured state, rad."""
     return float(slip_bounds.steepest_nr(_state(m), m.parameters))
 
 
@@ -89,6 +92,7 @@ def _bounds(
 
 
 def _neutral_flow(quantity: str, case: Case, by: str) -> Bearing:
+    """A bearing on a threshold: the flow at which the case is neutral with respect to slipping."""
     return Bearing(
         "thresholds",
         quantity,
@@ -99,6 +103,7 @@ def _neutral_flow(quantity: str, case: Case, by: str) -> Bearing:
 
 
 def _filippov_share(m: Measurement) -> float:
+    """The weight delta in (69)."""
     return slip_bounds.filippov_share(_arrow(m)[1], m.at("omega_c"), m.parameters)
 
 

@@ -309,7 +309,7 @@ def _responses(state: Pushed, answers: Sequence[Array], turns: float, row: Row) 
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:
-    """Natural size in s-1 of a part of an exponent, of which `other` is the other part.
+    """Natural size in s-1 of the real or imaginary part of an exponent, of which `other` is the other part.
 
     Its own, or that of the exponent if it is none, or else that of free fall.
     """

@@ -164,7 +164,7 @@ class Round(NamedTuple):
 def _settled_rounds(
     lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
 ) -> list[list[Round] | str]:
-    """Runs in pulsations until they are settled: the last two of each, the last with half the step, or its error.
+    """Run pulsations until they are settled: of each the last two rounds, the second with half the step, or its error.
     A ball that slips goes on with the rest of its last state.
     """
     states, seen = [each.start(a) for each, a in driven], list[list[Round] | str]([[]] * len(driven))
@@ -280,7 +280,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
 
 
 def _threshold(records: Records, set: str, threshold: str) -> float | None:
-    """The flow that was measured first as a threshold of a set, rad s-1; None if it was not."""
+    """The flow (rad s-1) that the protocol `thresholds` measured as this threshold of a set, or None."""
     return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
 
 

@@ -179,7 +179,7 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
 
 
 def limit_of_no_size(rates: Array) -> Array:
-    """The limit of rows (2 or 3, n), each of which belongs to half the size of the one before."""
+    """Rates extrapolated to a slip of size zero, from rows (2 or 3, n) for sizes that halve from row to row."""
     *first, before, last = rates
     return np.asarray((first[0] - 6 * before + 8 * last) / 3 if first else 2 * last - before)
 

@@ -256,7 +256,7 @@ class Arrow:
         return self.lab.task(*self.start(omega_c), Lifts.steps * step, step, samples=Lifts.steps)
 
     def staying(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
-        """Of runs those of the first row of orbits that stay in the two cases of the arrow, without a third."""
+        """The first runs in succession, in the order of their orbits, that stay in the two cases of the arrow."""
         strays = [not np.isin(run.case[Lifts.skipped :], [self.inner, self.outer]).all() for run in runs]
         first = [*strays, False].index(False)
         return runs[first : [*strays, True].index(True, first)]

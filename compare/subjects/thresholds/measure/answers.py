@@ -63,7 +63,7 @@ def stays_rolling(run: Trajectory) -> bool | None:
 
 
 def may_settle(run: Trajectory) -> bool | None:
-    """Whether a ball settles on the floor, or may after four times 10/c; None where a run of 10/c doesn't show it.
+    """Whether a ball settles on the floor, judged after 10/c (None if not clear yet) or after 40/c (True if not clear).
 
     Other motions still die out in a short run: with the usual share of change a ball just above a fold seemed to
     settle on some sets. (A tenth of it was chosen after that had been seen; a hundredth gives the same brackets.)

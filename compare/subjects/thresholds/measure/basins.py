@@ -249,7 +249,7 @@ def _next_line(edge: Edge) -> Edge:
 
 
 def _uncertainty(edge: Edge) -> Array:
-    """Standard uncertainty of the crossing, (8,): of the last bracket, and of all moves to come.
+    """Standard uncertainty of the crossing (8,), by the last bracket's width and by how far more lines would move it.
 
     They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size;
     and no less than the distance from the crossing to the next line, through the mean of the last two runs.

@@ -38,7 +38,7 @@ class BranchEnd:
 
 
 def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The drag at which omega_0 as a function of the floor's force has no slope where that vanishes.
+    """The drag at which the fold is born, where d omega_0/dA_y along the branch of SS is zero at its end, A_y = 0.
 
     The zero of the straight line through the slopes as a function of 1/c.
     """

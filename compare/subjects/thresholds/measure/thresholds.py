@@ -298,9 +298,7 @@ def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
 
 
 def _rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """Measurements of the end of rolling at both points, by lifting off or by slip; and of the least flow that holds a
-    ball on the wall, omega_02.
-    """
+    """Measurements of the end of rolling (omega_01 or omega_03), and of omega_02, the least that holds a ball up."""
     none = "no flow that was tried, up to twice the fastest of the settled states,"
     if not (rolling := each.bracket_seen("rolling")):
         yield each.missing(f"{none} ends two-point rolling")
