@@ -337,15 +337,12 @@ def test_a_second_program_is_refused_until_the_first_is_dead(tmp_path, capsys):
     assert not list(tmp_path.glob(".*"))
 
 
-def test_a_lock_of_a_machine_that_is_gone_is_nobodys(tmp_path):
+def test_a_lock_of_a_machine_that_is_gone_or_of_a_failed_campaign_is_nobodys(tmp_path):
     for left in ("process 1 on elsewhere, since 2001-01-01 00:00 UTC", ""):
         (tmp_path / ".lock").write_text(left)
         with Campaign(tmp_path, workers=0):
             assert "process 1 on elsewhere" not in (tmp_path / ".lock").read_text()
         assert not list(tmp_path.iterdir())
-
-
-def test_a_failed_campaign_lets_go(tmp_path):
     with pytest.raises(ZeroDivisionError), Campaign(tmp_path, workers=0):
         raise ZeroDivisionError
     Lock(tmp_path).release()

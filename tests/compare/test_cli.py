@@ -21,9 +21,7 @@ from compare.kit.journal import Journal
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
-from tests.commands import COMMANDS, carried_out, parser_of, refused, told
-
-ROOT = Path(cli.__file__).parents[2]
+from tests.commands import COMMANDS, ROOT, carried_out, parser_of, refused, told
 
 
 @pytest.mark.parametrize(
@@ -222,18 +220,11 @@ def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_
         assert not {each for each in known if not {each, each.removesuffix("-defaults")} & words}
 
 
-def test_the_tutorial_carries_out_every_command():
-    """But for the page that waits for a browser."""
-    shown = re.findall(r"^!dualball (\S+)", (ROOT / "docs" / "tutorial.md").read_text("utf-8"), re.MULTILINE)
-    assert {*shown} | {"explore"} == {*COMMANDS}
-
-
-def test_every_claim_is_listed(monkeypatch, capsys):
+def test_every_command_is_in_the_tutorial_and_claims_and_parameters_are_listed_once(monkeypatch, capsys):
+    tutorial = re.findall(r"^!dualball (\S+)", (ROOT / "docs" / "tutorial.md").read_text("utf-8"), re.MULTILINE)
+    assert {*tutorial} | {"explore"} == {*COMMANDS}  # which waits for a browser
     monkeypatch.delenv("COLUMNS", raising=False)  # names wrap in narrow terminals
     assert {claim.id for claim in CLAIMS} <= set(told(capsys, "validate --list").split())
-
-
-def test_parameters_are_described_once(capsys):
     shown, of_sweep = told(capsys, "parameters --mu 0.31"), parser_of("sweep").format_help()
     assert "0.31" in shown
     for field in Parameters.quantities():

@@ -5,15 +5,12 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from compare.kit import pages
 from model import storage
-from tests.commands import SCENE, carried_out, refused
-
-ROOT = Path(__file__).parents[2]
+from tests.commands import ROOT, SCENE, carried_out, refused
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +38,6 @@ def test_any_encoding(here, encoding):
     assert done.returncode == 0
     shown = done.stdout.decode(encoding)
     assert ("omega01" in shown) is (encoding != "utf-16")
-
-
-def test_what_cannot_be_shown_is_spelled():
     codecs.register_error("spelled", pages.spell_out)
     assert "ω₀₁Ωω̃²√±…é \udcff✓".encode("ascii", "spelled") == b"omega01Omegaomega2sqrt +-...e ??"
 
