@@ -91,23 +91,16 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
     return theta
 
 
-def note(row: Any, qpos: Any, qvel: Any, ahead: float, ball: Ball) -> None:
-    """Write coordinates, but for the azimuth, and velocities into a row, as those of a ball on joints.
-
-    The place is `ahead` of the velocities; these are along the axes of where the ball was.
-    """
-    row[1], row[2] = ball.R - math.hypot(qpos[0], qpos[1]), qpos[2] - ball.r
-    velocities = joint_velocities(qpos, qpos[3:], qvel, ahead)
-    for i in range(6):
-        row[_PLACE + i] = velocities[i]
-
-
 @loop
 def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) -> float:
-    """Take a `step` for each omega_0, noted in rows (steps, `COLUMNS`)."""
+    """Take a `step` for each omega_0, noted in rows (steps, `COLUMNS`) as those of a ball on joints."""
     for number in range(len(fluid)):
         row = rows[number]
-        note(row, body.qpos, body.qvel, duration / 2, body.ball)
+        qpos = body.qpos  # half a step ahead of velocities, and these along the axes of where the ball was
+        row[1], row[2] = body.ball.R - math.hypot(qpos[0], qpos[1]), qpos[2] - body.ball.r
+        velocities = joint_velocities(qpos, qpos[3:], body.qvel, duration / 2)
+        for i in range(6):
+            row[_PLACE + i] = velocities[i]
         theta = step(body, duration, False, fluid[number], theta, row[_SEEN:])
         row[0] = theta
     return theta

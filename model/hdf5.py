@@ -142,7 +142,13 @@ def reading(path: str | Path, remedy: str = "", sealed: bool = True) -> Iterator
             if content.read(len(_SIGNATURE)) != _SIGNATURE:
                 raise StorageError("it is not an HDF5 file")
             if sealed:
-                _check_seal(content)
+                size = content.seek(0, os.SEEK_END) - _TRAILER
+                content.seek(max(size, 0))
+                trailer = content.read()
+                if not trailer.startswith(_SEAL):
+                    raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
+                if trailer != _SEAL + _checksum(content, size):
+                    raise StorageError("it is damaged (its content does not match its checksum)")
         with h5py.File(path, "r") as file:
             yield file
     except _DAMAGE as error:
@@ -191,17 +197,6 @@ def write_columns(
 def seal(content: BinaryIO) -> None:
     """Add its checksum to an HDF5 file, open for reading and writing, that has none."""
     content.write(_SEAL + _checksum(content, content.seek(0, os.SEEK_END)))
-
-
-def _check_seal(content: BinaryIO) -> None:
-    """Raise `StorageError` if a file is not what `seal` has left."""
-    size = content.seek(0, os.SEEK_END) - _TRAILER
-    content.seek(max(size, 0))
-    trailer = content.read()
-    if not trailer.startswith(_SEAL):
-        raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
-    if trailer != _SEAL + _checksum(content, size):
-        raise StorageError("it is damaged (its content does not match its checksum)")
 
 
 def _checksum(content: BinaryIO, size: int) -> bytes:

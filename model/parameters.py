@@ -272,11 +272,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise StorageError(f"{path} is not valid TOML: it must be text in UTF-8") from error
     except tomllib.TOMLDecodeError as error:
-        hint = "; a number takes a point, not a comma" if _has_decimal_comma(text, str(error)) else ""
+        line = re.search(r"at line (\d+)", str(error))
+        comma = line and re.search(r"=\s*[-+]?\d+,\d", text.splitlines()[int(line[1]) - 1])
+        hint = "; a number takes a point, not a comma" if comma else ""
         raise StorageError(f"{path} is not valid TOML: {error}{hint}") from error
-
-
-def _has_decimal_comma(text: str, error: str) -> bool:
-    """Whether the line of a TOML text that an error names has a number with a decimal comma."""
-    line = re.search(r"at line (\d+)", error)
-    return bool(line and re.search(r"=\s*[-+]?\d+,\d", text.splitlines()[int(line[1]) - 1]))

@@ -256,7 +256,7 @@ def closed_orbit(loop: Loop, varied: str | None = None, neighbour: Array | None 
     return Orbit(loop, back.changes, back.turn, steps, loop.derivative())
 
 
-def close_loop(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> tuple[Loop, Return, int]:
+def close_loop(loop: Loop, varied: str | None, neighbour: Array | None) -> tuple[Loop, Return, int]:
     """The closed loop near a loop, its return, and how many steps Newton's method took; arguments of `closed_orbit`."""
     before = math.inf
     for step in range(ITERATIONS + 1):
@@ -276,7 +276,7 @@ def close_loop(loop: Loop, varied: str | None = None, neighbour: Array | None = 
     )
 
 
-def defect_jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
+def defect_jacobian(loop: Loop, derivative: Array, varied: str | None) -> Array:
     """Derivative (d - 1, d - 1) of the gap by which a loop isn't closed; one more column if a parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
     return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state

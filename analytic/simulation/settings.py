@@ -37,8 +37,8 @@ class Settings:
     """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in natural units: lengths in
     R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at sqrt(g R)."""
     timestep: float | None = None
-    """Longest time step, s, at most half of `model.time_scales.shortest_time`; `fitting_step` of 500 if None
-    (time-stepping)."""
+    """Longest time step, s, at most half of `model.time_scales.shortest_time`; sqrt(R/g)/500, or that half if it is
+    shorter, if None (time-stepping)."""
     restitution: float = 0.0
     """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1. A ball that hops in the corner is slow
     (event): a series of hops on the floor takes about ln(rtol)/ln(e) impacts, of which each takes about a millisecond,
@@ -59,12 +59,6 @@ class Settings:
         check_number("restitution", self.restitution, "1", Range(0.0, 1.0))
         if self.timestep is not None:
             check_number("timestep", self.timestep, "s", POSITIVE)
-
-
-def fitting_step(steps: float, p: Parameters, flow: Flow, t_end: float) -> float:
-    """sqrt(R/g)/`steps`, or the longest step that the times of a run of t_end s allow if that is shorter; s."""
-    shortest, _ = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
-    return min(math.sqrt(p.R / p.g) / steps, shortest / 2)
 
 
 def check_duration(p: Parameters, flow: Flow, t_end: float) -> None:

@@ -26,7 +26,7 @@ from analytic.mechanics.contact_problem import NotConvergedError
 from analytic.mechanics.rigid_body import NOTHING
 from analytic.simulation import stepping
 from analytic.simulation.motion import Recorder
-from analytic.simulation.settings import Settings, fitting_step
+from analytic.simulation.settings import Settings
 from model import Case, Flow, Parameters, State, time_scales
 from model.arrays import Array
 
@@ -75,8 +75,10 @@ def prepared(
     Raises `InputError` if the time step is too large for the problem.
     """
     t_end = float(times[-1])
-    timestep = settings.timestep or fitting_step(500, p, flow, t_end)
-    time_scales.check_timestep(timestep, p, flow, t_end, partial(drag.coefficient, p=p))
+    law = partial(drag.coefficient, p=p)
+    shortest, _ = time_scales.shortest_time(p, flow, t_end, law)
+    timestep = settings.timestep or min(math.sqrt(p.R / p.g) / 500, shortest / 2)
+    time_scales.check_timestep(timestep, p, flow, t_end, law)
     knots = np.union1d(times, flow.knots(t_end))
     length = np.diff(knots)
     steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)

@@ -91,10 +91,10 @@ def steepest_nr(x: npt.ArrayLike, p: Parameters) -> Array:
     return np.arctan2(lag, pull)
 
 
-def nr_to_ns(p: Parameters, side: int = 1) -> SlipBound:
-    """(60), (61): slip of the wall contact out of the stationary NR, along beta = 0 (side 1) or beta = pi (side -1)."""
+def nr_to_ns(p: Parameters) -> SlipBound:
+    """(60), (61): slip of the wall contact out of the stationary NR, along beta = 0, where it grows the most."""
     unit = (1 + p.j) / (p.j * p.r)
-    return SlipBound(side * unit * p.g, -unit * p.eta * p.R)
+    return SlipBound(unit * p.g, -unit * p.eta * p.R)
 
 
 def rr_to_rs(p: Parameters, omega_c: float, side: int) -> HeldBound:
@@ -125,7 +125,7 @@ def rr_to_sr_stationary(p: Parameters) -> SlipBound:
     return SlipBound(-unit * p.g / p.j, unit * p.R)
 
 
-def rr_to_ss(p: Parameters, side: int = 1) -> SlipBound:
+def rr_to_ss(p: Parameters, side: int) -> SlipBound:
     """Slip at both points where omega_c = omega_0, along (0, 0), (82), side 1, or along (pi, pi), (83), side -1.
 
     (83) has a real bound for eta > 1 only, below which slip would grow; but there the wall would have to
