@@ -139,7 +139,7 @@ class Classifier:
         self._changes.append((step, max(self._changes[-1][1], located), _case_number(old), _case_number(new)))
 
     def cases(self, steps: npt.NDArray[np.int_]) -> npt.NDArray[np.int8]:
-        """The case in some steps, in those not yet decided as in the last one that is."""
+        """Numbers of the cases in these steps; steps not yet decided get the case of the last decided one."""
         first, codes = [step for step, *_ in self._changes], [code for *_, code in self._changes]
         return np.array(codes, dtype=np.int8)[np.searchsorted(first, steps, side="right") - 1]
 
@@ -151,12 +151,12 @@ class Classifier:
         return Events(time=time, **codes, impulse_A=none, impulse_B=none)
 
     def state(self) -> dict[str, npt.NDArray[Any]]:
-        """Copies of all that is carried from one call to the next."""
+        """Copies of all that is carried from one call to the next, for `restore`."""
         counts = np.array([self.decided, self._waiting])
         return {"latest": self._latest.copy(), "counts": counts, "changes": np.array(self._changes).reshape(-1, 4)}
 
     def restore(self, state: dict[str, npt.NDArray[Any]]) -> None:
-        """Go on from such a state."""
+        """Go on from what `state` returned."""
         self._latest, (self.decided, self._waiting) = state["latest"], state["counts"].tolist()
         changes = state["changes"].tolist()
         self._changes = [(int(step), time, int(before), int(after)) for step, time, before, after in changes]

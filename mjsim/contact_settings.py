@@ -41,10 +41,12 @@ _FALL = 0.01
 
 
 def _number(default: float, unit: str, allowed: Range) -> Any:
+    """Declare a setting that is a number, with its default, unit and allowed range."""
     return dataclasses.field(default=default, metadata={"unit": unit, "allowed": allowed})
 
 
 def _choice(*known: Any) -> Any:
+    """Declare a setting that is one of a few values; the first is the default."""
     return dataclasses.field(default=known[0], metadata={"known": known})
 
 
@@ -136,7 +138,7 @@ class ContactSettings:
         return self.softness * load / self.k
 
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
-        """mu |w| / (R f), `load` > 0: without memory sliding contact is continuous below 1."""
+        """The hover number mu |w| / (R f): a sliding contact without memory stays closed below 1; needs `load` > 0."""
         kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
         return friction * max(0.0, self.b_f * slip_speed - kept) / (self.softness * load)
 
@@ -227,7 +229,7 @@ class ContactSettings:
     def for_problem(
         cls, p: Parameters, timestep: float = 1e-3, max_slip_speed: float | None = None, **changes: Any
     ) -> Self:
-        """Settings whose sliding contact is continuous, with a reserve.
+        """Settings with which contacts of this ball that slide stay closed instead of hovering, with a reserve.
 
         `max_slip_speed` (m s-1) is the fastest slip to expect under the load of gravity; by default that of the fluid,
         R omega_0. The impedance is lowered, where need be, until the hover number is at most 1/20 (a contact about

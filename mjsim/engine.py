@@ -128,7 +128,7 @@ class Run:
         return Trajectory.from_blocks(self.header, blocks, self.events)
 
     def _finish(self, first: int, raw: Array) -> npt.NDArray[np.void]:
-        """Samples from raw ones, (n, columns), up to where the run breaks down: through wall or floor it has come."""
+        """Turn raw samples (n, columns) into a block, up to where the run diverges or the ball breaks through."""
         p, samples = self._p, np.arange(first, first + len(raw))
         time = samples.astype(float) * (self._interval * self._timestep)
         sound = (np.abs(raw) < recorder.HUGE).all(axis=1) & (raw[:, 1:3] > -p.r).all(axis=1)

@@ -67,7 +67,7 @@ class Body(NamedTuple):
 
 
 def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, seen: Any) -> float:
-    """Take a step of so many seconds under Coulomb's law, with places half of it ahead of velocities, and see it.
+    """Take a step of so many seconds under Coulomb's law, places half of it ahead of velocities; `seen` gets sensors.
 
     `theta` is the azimuth before the last step; that before this one is returned.
     """
@@ -116,7 +116,7 @@ def closes(gap: float, speed: float, rate: float, fall: float) -> float:
 
 
 def average(means: Any, sensors: Any, count: int) -> None:
-    """Take the sensors of another step into means over `count`: of forces; axes are those of the last contact."""
+    """Update means of force sensors over `count` steps by those of one more; axes are those of the last contact."""
     for contact in range(0, 28, 14):
         for i in range(contact + 1, contact + 4):
             means[i] = (count * means[i] + sensors[i]) / (count + 1)
@@ -129,7 +129,7 @@ def through(
     body: Body, whole: float, longest: float, fall: float, reach: float, omega_0: float, theta: float,
     rates: tuple[float, float], seen: Any,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float, float]:  # fmt: skip
-    """Take a ball through a whole step, from a place at the time of its velocities.
+    """Take a ball through one whole step in short ones that end at its landings; place and velocities at one time.
 
     A contact that closes faster than `fall` does so in the middle of a short step: of a blow that two steps share,
     friction, which turns, would have two directions. Until then it isn't seen; others are within `reach`, m. `rates`
@@ -224,7 +224,7 @@ class FreeBall:
         self.place(x, theta_0)
 
     def place(self, x: State, theta: float) -> None:
-        """Begin anew in a state."""
+        """Put the ball in a state at an azimuth, as for a new run: nothing is remembered."""
         mujoco.mj_resetData(self.model, self.data)
         self.law.reset()
         now, self.theta = to_world(x, theta, self.p), theta
@@ -240,20 +240,20 @@ class FreeBall:
         self.theta = steps(self.body, self._timestep, fluid, self.theta, rows)
 
     def state(self) -> dict[str, Array]:
-        """Copies of all that is carried from one step to the next."""
+        """Copies of all that is carried from one step to the next, for `restore`."""
         kept = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
         mujoco.mj_getState(self.model, self.data, kept, _INTEGRATION)
         return {"integration": kept, "azimuth": np.array(self.theta)} | self.law.state()
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Go on from such a state."""
+        """Go on from what `state` returned."""
         mujoco.mj_setState(self.model, self.data, state["integration"], _INTEGRATION)
         self.theta = float(state["azimuth"])
         self.law.restore(state)
 
 
 class Fine:
-    """A free ball that takes steps of a jointed one, in which that lands, in shorter ones."""
+    """A free ball that takes, in short steps, those steps of a jointed ball in which that lands."""
 
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
         self._p, self._whole, self._fall = p, settings.timestep, settings.slowest_fall(p.g)

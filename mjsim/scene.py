@@ -76,6 +76,7 @@ def build(p: Parameters, settings: ContactSettings, shown: bool = False) -> tupl
 
 @functools.lru_cache(maxsize=256)
 def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[Any, str]:
+    """`build` from a cache; the model is shared."""
     filled = spec(p, settings)
     try:
         text = str(filled.to_xml())

@@ -217,13 +217,13 @@ class JointedBall:
             done += 1
 
     def state(self) -> dict[str, Array]:
-        """Copies of all that is carried from one step to the next."""
+        """Copies of all that is carried from one step to the next, for `restore`."""
         seen_forces(self.body)
         self.body.marks[_HELD] = 1
         return {name: getattr(self.body, name).copy() for name in _KEPT}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Go on from such a state."""
+        """Go on from what `state` returned."""
         for name in _KEPT:
             getattr(self.body, name)[:] = state[name]
 

@@ -161,7 +161,7 @@ def _library_function(name: str, source: Any = _engine, arguments: int = 2, retu
 
 
 def _called_by_address(name: str, arguments: int, returns: Any) -> Any:
-    """What compiled code calls in the place of a function that stands at an address, given to the linker by name."""
+    """Declare to numba a function whose address the linker knows by name, so that compiled code can call it."""
     return types.ExternalFunction(f"coulomb_{name}", returns(*[types.intp] * arguments))
 
 
@@ -260,25 +260,25 @@ def _at(name: int) -> int:
 
 @compiled
 def _reals(struct: int, name: int) -> Any:
-    """An array of reals of `mjData` or `mjModel`."""
+    """Pointer to an array of reals of the `mjData` or `mjModel` at address `struct`."""
     return _real(_int64(struct + _at(name))[0])
 
 
 @compiled
 def _integers(struct: int, name: int) -> Any:
-    """An array of integers of `mjData` or `mjModel`."""
+    """Pointer to an array of integers of the `mjData` or `mjModel` at address `struct`."""
     return _int32(_int64(struct + _at(name))[0])
 
 
 @compiled
 def _integer(struct: int, name: int) -> int:
-    """An integer in `mjData` or `mjModel`."""
+    """Read an integer field of the `mjData` or `mjModel` at address `struct`."""
     return int(_int32(struct + _at(name))[0])
 
 
 @compiled
 def _scalar(struct: int, name: int) -> float:
-    """A real in `mjData` or `mjModel`."""
+    """Read a real field of the `mjData` or `mjModel` at address `struct`."""
     return float(_real(struct + _at(name))[0])
 
 
@@ -677,7 +677,7 @@ def _chain_contacts(head: int) -> int:
 
 @compiled
 def _chain_start(contacts: Any, k: int, links: int) -> int:
-    """Where in `CHAINS` the first contact of a pair of geoms is told."""
+    """Index in `CHAINS` of the first contact of a pair of geoms."""
     return (int(contacts[k]) * 2654435761 + int(contacts[k + 1]) * 40503) >> 3 & (links - 1)
 
 
@@ -1335,7 +1335,7 @@ def _serve(m: int, d: int) -> None:
 
 @functools.cache
 def callback(find: Callable[[int, int], int]) -> Any:
-    """A control callback for MuJoCo, which applies the law; of a simulation that is new to it it asks `find`.
+    """The control callback for MuJoCo that applies the law; `find` tells it of a simulation that is new to it.
 
     `find` is a Python function of the addresses of model and data.
     """
@@ -1356,7 +1356,7 @@ _kept: list[Any] = []
 
 
 def remember(m: int, d: int, head: int) -> None:
-    """Note where the callback finds what a simulation remembers; 0 if it isn't under the law. While there is room."""
+    """Tell the callback, while there is room, where the memory of a simulation is: `head`, 0 if it has no law."""
     count = int(_simulations[0])
     if count < SIMULATIONS:
         _simulations[3 + 3 * count : 6 + 3 * count] = m, d, head

@@ -73,6 +73,7 @@ class Coulomb:
         self._adopted: dict[int, Any] | None = None
 
     def _check(self) -> None:
+        """Raise `ValueError` if the model has an option or a part with which the law can't be applied."""
         model, option = self.model, self.model.opt
         name = mujoco.mjtIntegrator(option.integrator).name.removeprefix("mjINT_")
         if name not in _INTEGRATORS or (name == "RK4" and self._law.rigid):
@@ -224,13 +225,14 @@ def _simulation(model: int, data: int) -> Any:
 
 
 def _check_number(name: str, value: float, unit: str, least: float, most: float) -> None:
+    """Raise `ValueError`, with name, value, unit and range, unless a value is a number in the range."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
         allowed = f"from {least:g} to {most:g}" if most < math.inf else f"at least {least:g}"
         raise ValueError(f"{name} = {value!r}{unit if isinstance(value, (int, float)) else ''} must be {allowed}{unit}")
 
 
 def _see_ahead(model: Any) -> None:
-    """Widen margins to the way of a step at the speed of a fall through the scene, at most a fifth of a body's radius.
+    """Widen contact margins to what a body that fell through the scene moves in a step, at most a fifth of its radius.
 
     Colliders take a body that is smaller than the margin for one that overlaps.
     """
