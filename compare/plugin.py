@@ -42,8 +42,15 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
     if engine := config.getoption("dualball_engine"):
         from compare.bench import cases, runner  # here, because no other run needs it
 
-        own = {case.name: case for case in cases()}
-        known = _known(config.getoption("dualball_known"), own)
+        own, path = {case.name: case for case in cases()}, config.getoption("dualball_known")
+        try:
+            lines = path.read_text("utf-8").splitlines() if path else []
+        except (OSError, UnicodeDecodeError) as error:
+            raise pytest.UsageError(f"--dualball-known: cannot read {path}: {error}") from error
+        rows = [line.partition("#")[0].split(None, 1) for line in lines]
+        known = {row[0]: row[1].strip() if len(row) > 1 else "known to fail" for row in rows if row}
+        for name in (each for each in known if each not in own):
+            raise pytest.UsageError(f"{path}: no case is called {name!r}; there are {', '.join(own)}")
 
         @functools.cache
         def trial() -> runner.EngineProcess:  # begins with the first case asked for
@@ -56,20 +63,6 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
             if name in known:
                 item.add_marker(pytest.mark.xfail(reason=known[name]))
             items.append(item)
-
-
-def _known(path: Path | None, cases: Any) -> dict[str, str]:
-    """Cases that are known to fail, from a file: the reason of each by its name."""
-    try:
-        lines = path.read_text("utf-8").splitlines() if path else []
-    except (OSError, UnicodeDecodeError) as error:
-        raise pytest.UsageError(f"--dualball-known: cannot read {path}: {error}") from error
-    rows = [line.partition("#")[0].split(None, 1) for line in lines]
-    known = {row[0]: row[1].strip() if len(row) > 1 else "known to fail" for row in rows if row}
-    for name in known:
-        if name not in cases:
-            raise pytest.UsageError(f"{path}: no case is called {name!r}; there are {', '.join(cases)}")
-    return known
 
 
 class ExactCase(pytest.Item):

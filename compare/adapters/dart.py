@@ -91,7 +91,7 @@ class Dart(Free):
     def advance(self) -> None:
         for joint, turning in self.tables:
             joint.setCommand(0, turning)
-        self.world.step()
+        super().advance()
 
     def read(self) -> State:
         return sum(((n.getCOM(), n.getLinearVelocity(), n.getAngularVelocity()) for n in self.nodes), ())

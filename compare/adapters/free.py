@@ -90,6 +90,7 @@ class Free(ABC):
         moved = "one plane that goes with the body for a cylinder; positions half a step ahead of velocities"
         self.DECLARED = "; ".join(filter(None, (moved if best else f"{FACETS} planes for a cylinder", best)))
         self.scene: Scene
+        self.world: Any
         self.timestep = self.now = self.ahead = 0.0
 
     def build(self, scene: Scene, timestep: float) -> None:
@@ -139,9 +140,9 @@ class Free(ABC):
     def make(self) -> None:
         """Make `scene` in the engine, with steps of `timestep`."""
 
-    @abstractmethod
     def advance(self) -> None:
         """Take a step."""
+        self.world.step()
 
     @abstractmethod
     def read(self) -> State:

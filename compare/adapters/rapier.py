@@ -74,9 +74,6 @@ class Rapier(Free):
             moving = moving.additional_mass_properties(engine.MassProperties((0, 0, 0), body.mass, body.inertia))
             self.bodies.append(self.world.add_body(moving, shapes))
 
-    def advance(self) -> None:
-        self.world.step()
-
     def read(self) -> State:
         own = [self.world.rigid_bodies[body] for body in self.bodies]
         return tuple([v.x, v.y, v.z] for body in own for v in (body.translation, body.linvel, body.angvel))

@@ -68,9 +68,6 @@ class Sapien(Free):
         self.world.add_entity(entity)
         return entity
 
-    def advance(self) -> None:
-        self.world.step()
-
     def read(self) -> State:
         return self.entity.pose.p, self.body.linear_velocity, self.body.angular_velocity
 
