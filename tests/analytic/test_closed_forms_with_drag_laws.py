@@ -7,15 +7,7 @@ used for what is expected. The equations of motion are those of `test_dynamics`.
 import numpy as np
 import pytest
 
-from analytic import (
-    Stability,
-    contact_forces,
-    leaning_modes,
-    slowest_time_constant,
-    stationary_solutions,
-    thresholds,
-    vector_field,
-)
+import analytic
 from analytic.bifurcation.diagram import number_of_folds
 from analytic.stationary import slipping_branch as sb
 from model import Case, Parameters
@@ -73,7 +65,7 @@ def test_fold_against_a_scan(law):
     """omega_04 to 1e-10, one fold beyond eta_cr and none before; omega_01, omega_02, omega_03 are those of Stokes."""
     folds, rng = [], np.random.default_rng([12, LAWS.index(law)])
     for p in (random_set(law, rng) for _ in range(12)):
-        t, stokes = thresholds(p), thresholds(p.replace(drag=STOKES))
+        t, stokes = analytic.thresholds(p), analytic.thresholds(p.replace(drag=STOKES))
         assert (t.omega_01, t.omega_02, t.omega_03) == (stokes.omega_01, stokes.omega_02, stokes.omega_03)
         assert t.eta_cr == LIGHT[law] * stokes.eta_cr
         top, turns = scanned(p)
@@ -91,7 +83,7 @@ def test_fold_where_the_drag_bends(nu_f):
     p = P.replace(c=0.07, nu_f=nu_f, drag=SCHILLER_NAUMANN)
     top, turns = scanned(p)
     assert number_of_folds(p) == turns == 1
-    assert abs(thresholds(p).omega_04 / top - 1) <= 1e-10
+    assert abs(analytic.thresholds(p).omega_04 / top - 1) <= 1e-10
     point = sb.branch(sb.fold(p), p)
     lag = float(point.Omega_0 - point.Omega_c) * np.sqrt(p.g * p.R)
     assert (abs(2 * p.r * lag / nu_f - 988.95) < 0.01) == (nu_f < 8e-6)
@@ -110,11 +102,12 @@ def test_solutions_are_zeros_of_the_equations(law, omega_0, eta):
     """
     p = P.replace(drag=law, omega_0=omega_0, eta=eta)
     scale = (p.g + p.R * (omega_0**2 + p.c * omega_0)) / (p.j * p.r)
-    for s in stationary_solutions(p):
+    for s in analytic.stationary_solutions(p):
         sinking = np.array([s.state.v_y, *[0.0] * 7])
-        assert np.abs(vector_field(s.case, s.x, p) - sinking).max() <= 100 * np.finfo(float).eps * scale, s.case
+        off = np.abs(analytic.vector_field(s.case, s.x, p) - sinking).max()
+        assert off <= 100 * np.finfo(float).eps * scale, s.case
         if s.case is not Case.RR:
-            np.testing.assert_array_equal([s.force_A, s.force_B], contact_forces(s.case, s.x, p))
+            np.testing.assert_array_equal([s.force_A, s.force_B], analytic.contact_forces(s.case, s.x, p))
         if s.case is Case.NS:
             assert s.moves
             assert s.state.v_y < 0
@@ -130,17 +123,17 @@ def test_where_the_fluid_takes_the_ball_along_a_slight_lag_decides(law, omega_0)
     p = P.replace(drag=law, omega_0=omega_0, eta=0.6)
     same = p.replace(drag=STOKES, c=LIGHT[law] * p.c)
     for case in (Case.RR, Case.SR, Case.NR):
-        (s,) = (s for s in stationary_solutions(p) if s.case is case)
-        (stokes,) = (s for s in stationary_solutions(p.replace(drag=STOKES)) if s.case is case)
-        (expected,) = (s for s in stationary_solutions(same) if s.case is case)
+        (s,) = (s for s in analytic.stationary_solutions(p) if s.case is case)
+        (stokes,) = (s for s in analytic.stationary_solutions(p.replace(drag=STOKES)) if s.case is case)
+        (expected,) = (s for s in analytic.stationary_solutions(same) if s.case is case)
         np.testing.assert_allclose(
             np.sort_complex(s.eigenvalues), np.sort_complex(expected.eigenvalues), atol=1e-12 * omega_0
         )
         assert (s.exists, s.slip_stability, s.family) == (stokes.exists, stokes.slip_stability, stokes.family)
-        exponential = law != QUADRATIC or stokes.stability is not Stability.ASYMPTOTIC
-        assert s.stability is (stokes.stability if exponential else Stability.ALGEBRAIC)
+        exponential = law != QUADRATIC or stokes.stability is not analytic.Stability.ASYMPTOTIC
+        assert s.stability is (stokes.stability if exponential else analytic.Stability.ALGEBRAIC)
         assert s.stable == stokes.stable
-        assert s.stability is not Stability.ALGEBRAIC or slowest_time_constant(s) == np.inf
+        assert s.stability is not analytic.Stability.ALGEBRAIC or analytic.slowest_time_constant(s) == np.inf
     if omega_0 == 40.0:  # the first mode of SR is that of leaning; the other dies out like a slight lag does
-        expected, _ = leaning_modes(p.replace(drag=STOKES, c=LIGHT[law] * p.c + 1e-12))
-        np.testing.assert_allclose(leaning_modes(p)[0], expected, atol=1e-10)
+        expected, _ = analytic.leaning_modes(p.replace(drag=STOKES, c=LIGHT[law] * p.c + 1e-12))
+        np.testing.assert_allclose(analytic.leaning_modes(p)[0], expected, atol=1e-10)

@@ -5,17 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic import (
-    characteristic_slope,
-    mean_slope,
-    operating_limit,
-    operating_range,
-    reading_range,
-    solution,
-    stable_solutions,
-    thresholds,
-    unloading_limit,
-)
+import analytic
 from analytic.flowmeter import pulsation, response
 from analytic.flowmeter.characteristic import End
 from model import Case, Parameters
@@ -28,28 +18,28 @@ def test_contacts_and_fluids_that_leave_no_range():
     """What the limits are elsewhere claims operating-range and unloading-limit hold."""
     for smooth in ({"mu": 0.0}, {"eta": 0.0}, {"mu": 0.0, "eta": 0.6}):
         p = P.replace(omega_0=0.1, **smooth)
-        assert operating_limit(p).end is End.SMOOTH
-        assert {s.case for s in stable_solutions(p)} != {Case.RR}
-    assert operating_range(P.replace(mu=0.0)) == 0
-    assert operating_limit(P.replace(c=0.0)).end is End.NO_DRAG
-    assert operating_range(P.replace(c=0.0)) == reading_range(P.replace(c=0.0)) == 0
-    assert reading_range(ROUGH) == reading_range(P.replace(mu=0.0)) == np.inf
-    assert np.isnan(unloading_limit(P.replace(eta=0.0)))
+        assert analytic.operating_limit(p).end is End.SMOOTH
+        assert {s.case for s in analytic.stable_solutions(p)} != {Case.RR}
+    assert analytic.operating_range(P.replace(mu=0.0)) == 0
+    assert analytic.operating_limit(P.replace(c=0.0)).end is End.NO_DRAG
+    assert analytic.operating_range(P.replace(c=0.0)) == analytic.reading_range(P.replace(c=0.0)) == 0
+    assert analytic.reading_range(ROUGH) == analytic.reading_range(P.replace(mu=0.0)) == np.inf
+    assert np.isnan(analytic.unloading_limit(P.replace(eta=0.0)))
 
 
 def test_the_characteristic_has_two_branches_between_omega_02_and_omega_04():
     p = P.replace(omega_0=35.0)
-    assert characteristic_slope(p, Case.NR) == characteristic_slope(p, Case.SR) == 1.0
-    assert characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
+    assert analytic.characteristic_slope(p, Case.NR) == analytic.characteristic_slope(p, Case.SR) == 1.0
+    assert analytic.characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
 
 
 def test_the_mean_of_the_slope_below_eta_cr():
     """What jump and mean are elsewhere claims slope-jump and slope-mean hold."""
     # Below eta_cr SS gains on the fluid again until it meets SR at omega_02.
-    p = P.replace(eta=0.5 * thresholds(P).eta_cr)
-    t = thresholds(p)
-    near = solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).state.omega_c
-    assert mean_slope(p) == pytest.approx((near - t.omega_01) / (t.omega_02 - t.omega_01), rel=1e-9)
+    p = P.replace(eta=0.5 * analytic.thresholds(P).eta_cr)
+    t = analytic.thresholds(p)
+    near = analytic.solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).state.omega_c
+    assert analytic.mean_slope(p) == pytest.approx((near - t.omega_01) / (t.omega_02 - t.omega_01), rel=1e-9)
 
 
 def test_a_peak_lies_between_the_points_of_a_grid():

@@ -11,8 +11,6 @@ from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from model import Case, Parameters, State
 
 P = Parameters.named("reference")
-
-
 RR_SS = Case.RR, Case.SS
 
 

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from analytic import (
-    solution,
-    stationary_solutions,
-    vector_field,
-)  # fmt: skip
+from analytic import solution, stationary_solutions, vector_field
 from analytic.mechanics.dynamics import jacobian
 from analytic.stationary.slipping_branch import branch, eigenvalues_at, fold, hopf_places, points_at
 from model import Case, Parameters, State

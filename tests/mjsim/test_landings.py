@@ -5,10 +5,9 @@ import pytest
 
 import analytic
 import mjsim
-from mjsim import ContactSettings, recorder, scene
+from mjsim import ContactSettings
 from mjsim.free import COARSE
-from mjsim.stepping import NOT, JointedBall
-from model import Case, Parameters, State
+from model import Case, Parameters
 
 HOPS = Parameters.named("hopping")
 """A hop lasts 0.22 s, and the floor is touched for half a millisecond of it."""
@@ -73,17 +72,3 @@ def test_a_ball_that_slips_fast_lands_at_any_step(step: float) -> None:
     """On a rough floor, whose contact is too much damped at small steps to be held."""
     p = Parameters.named("reference").replace(mu=2.0, r=0.0055, omega_0=70.0)
     assert off(p, [1e-4, -0.65, 80.0, -400.0, 0.0, 35.0, 0.0, 0.0], 0.5e-3, step)[0] < 1
-
-
-def test_a_state_amid_a_landing_is_taken_up_to_the_bit() -> None:
-    settings = ContactSettings.for_problem(HOPS, 5e-4)
-    one, other = (JointedBall(scene.build(HOPS, settings)[0], HOPS, settings, State(*START), 0.0) for _ in range(2))
-    fluid, rows = np.full(10, HOPS.omega_0), np.empty((10, recorder.COLUMNS))
-    one.advance(fluid, rows)  # the first step is a free ball's, too
-    while one.state()["marks"][0] == NOT:
-        one.advance(fluid[:1], rows[:1])
-    other.restore(one.state())
-    for ball in (one, other):
-        ball.advance(fluid[:5], rows[:5])
-    for name, values in one.state().items():
-        np.testing.assert_array_equal(other.state()[name], values, err_msg=name)

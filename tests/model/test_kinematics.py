@@ -8,15 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from model import Parameters, State
-from model.kinematics import (
-    angular_velocity,
-    frame,
-    from_world,
-    rotated,
-    slip_speeds,
-    slip_velocities,
-    to_world,
-)
+from model.kinematics import angular_velocity, frame, from_world, rotated, slip_speeds, slip_velocities, to_world
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps

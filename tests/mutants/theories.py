@@ -1,8 +1,12 @@
-"""Wrong theories: each has one fault of the size that slips into a derivation or a program."""
+"""Wrong theories: each has one fault of the size that slips into a derivation or a program.
+
+Most change the answer of the right function, or the parameters of the ball it is given.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -11,27 +15,101 @@ import numpy as np
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.mechanics import rolling_forces
+from analytic.mechanics.drag import Law
+from analytic.simulation.equations import Motion
 from analytic.slipping import slip_bounds
 from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
 from model.drag import STOKES
-from tests.mutants.exchange import (
-    Fault,
-    Function,
-    WrongTheory,
-    answer,
-    entries,
-    fields,
-    given,
-    in_case,
-    of_case,
-    other,
-    scaled,
-    swapped,
-    times,
-    where,
-    without,
-)
+from tests.mutants.exchange import Fault, Function, WrongTheory, faulty
+
+Change = Callable[[Any], Any]
+
+
+def answer(change: Change) -> Fault:
+    """Its answer is changed."""
+    return lambda right, *args, **named: change(right(*args, **named))
+
+
+def scaled(factor: float, *entries: int) -> Fault:
+    """Its answer is `factor` times too large: all of it, or these entries."""
+    return answer(times(factor, *entries))
+
+
+def of_case(case: Case | None, change: Change) -> Fault:
+    """Of its list of solutions those of a case are changed, all for None."""
+    return answer(lambda solutions: [change(s) if case in (None, s.case) else s for s in solutions])
+
+
+def without(case: Case) -> Fault:
+    """Its list of solutions lacks a case."""
+    return answer(lambda solutions: [s for s in solutions if s.case is not case])
+
+
+Ball = Parameters | Motion
+"""The parameters of a ball, as they are given or as plain numbers."""
+
+
+def given(change: Change) -> Fault:
+    """It takes other parameters for those of the ball."""
+    change = functools.lru_cache(change)
+    return lambda right, *args, **named: right(*(change(a) if isinstance(a, Ball) else a for a in args), **named)
+
+
+def replaced(p: Ball, **values: Any) -> Ball:
+    """The parameters with some of them changed."""
+    if isinstance(p, Parameters):
+        return p.replace(**values)
+    law = Law(*(term * (values.get("c", p.c) / p.c if p.c else 1.0) for term in p.law))
+    return p._replace(law=law, **values)
+
+
+def other(**factors: float) -> Fault:
+    """It takes a ball some of whose parameters are multiplied."""
+    return given(lambda p: replaced(p, **{name: getattr(p, name) * factor for name, factor in factors.items()}))
+
+
+swapped = given(lambda p: replaced(p, mu=p.eta, eta=p.mu))
+"""It takes the friction of the floor for that of the wall, and the other way round."""
+
+
+def where(test: Change, fault: Fault) -> Fault:
+    """The fault shows only where the first argument passes a test."""
+    return lambda right, first, *rest, **named: (faulty(right, fault) if test(first) else right)(first, *rest, **named)
+
+
+def in_case(fault: Fault, *cases: Case) -> Fault:
+    """The fault shows only where the first argument is one of these cases."""
+    return where(cases.__contains__, fault)
+
+
+def fields(**changes: Change) -> Change:
+    """A dataclass or named tuple with some of its fields changed."""
+
+    def change(record: Any) -> Any:
+        put = {name: each(getattr(record, name)) for name, each in changes.items()}
+        return record._replace(**put) if hasattr(record, "_replace") else replace(record, **put)
+
+    return change
+
+
+def entries(**changes: Change) -> Change:
+    """A mapping with some of its entries changed."""
+    return lambda mapping: mapping | {name: change(mapping[name]) for name, change in changes.items()}
+
+
+def times(factor: float, *entries: int) -> Change:
+    """A number or array multiplied, or some entries of a sequence."""
+
+    def change(values: Any) -> Any:
+        if not entries:
+            return factor * values
+        parts = [factor * part if k in entries else part for k, part in enumerate(values)]
+        if isinstance(values, np.ndarray):
+            return np.array(parts)
+        return type(values)(*parts) if hasattr(values, "_fields") else type(values)(parts)
+
+    return change
 
 
 def _rolls_up_to(p: Parameters) -> float:
