@@ -29,7 +29,7 @@ def make_directory(path: Path) -> None:
 
 
 def check_ours(path: Path, beside: Path) -> None:
-    """Raise `StorageError` if a file is there that this program has not written: it writes another `beside` it."""
+    """Raise `StorageError` if `path` exists and `beside`, which this program always writes with it, does not."""
     if path.exists() and not beside.exists():
         raise StorageError(f"{path} is not of this program: choose another directory with --output")
 
@@ -105,7 +105,7 @@ def temporary(path: Path) -> Path:
 
 
 def remove(made: Path) -> None:
-    """Remove a temporary file, if it hasn't got its name."""
+    """Remove a temporary file, if it is still there under its temporary name."""
     made.unlink(missing_ok=True)
     _under_way.discard(made)
 

@@ -133,7 +133,7 @@ class Trajectory:
         return [Case(code) for code in self.case]
 
     def phases(self) -> list[tuple[Case, float, float]]:
-        """Longest stretches of samples in one case, with the times of their first and last sample, s."""
+        """The cases that the run goes through in order, with the times of the first and last sample in each, s."""
         starts = np.flatnonzero(np.diff(self.case, prepend=-1))
         ends = np.append(starts, len(self.case))[1:] - 1
         stretches = zip(self.case[starts], self.time[starts].tolist(), self.time[ends].tolist(), strict=True)

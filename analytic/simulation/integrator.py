@@ -55,7 +55,7 @@ class StalledError(ArithmeticError):
 
 
 def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float) -> Pace:
-    """The `Pace` at the start of a stretch, which may be a straight line from there on if a contact opens."""
+    """How steps begin in a stretch (a `Pace`); if a contact `opens`, a straight line is tried at once."""
     small = least_slip(z, scale, case) < ONSET_SLIP
     return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 

@@ -236,7 +236,7 @@ def _nr(p: Parameters) -> list[StationarySolution]:
 
 
 def _ns(p: Parameters) -> list[StationarySolution]:
-    """Proposition 6: sinking along the wall at a constant speed, which takes drag to be constant."""
+    """Proposition 6: sinking along the wall at a constant speed; none without drag, which alone limits the speed."""
     sink = p.g - p.eta * p.R * p.omega_0**2
     if p.c == 0 or sink <= 0:
         return []

@@ -122,7 +122,7 @@ class Lawful(Bodies):
 
 
 def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
-    """Add a contact pair for each surface and what touches it, with the surface's friction; its name and the pair."""
+    """Add a contact pair, with the surface's friction, for each surface and what touches it; yield name and pair."""
     lowest = "under" if scene.under else "body"
     for surface in scene.surfaces:
         of = [[g.name for g in spec.geoms if g.name.rstrip("0123456789") == name] for name in (surface.name, lowest)]
@@ -133,7 +133,7 @@ def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
 
 
 def studied(spec: Any, scene: Scene, timestep: float) -> None:
-    """An elliptic cone, stiff friction rows; normal rows soft and slow enough for blocks on four points to be stable.
+    """Set an elliptic cone, stiff friction, and normal rows soft and slow enough for blocks on four points.
 
     b_f h is a tenth, so that contacts don't hover at 2 m/s; impratio 1e4 leaves a creep of some micrometres a second.
     """
@@ -145,7 +145,7 @@ def studied(spec: Any, scene: Scene, timestep: float) -> None:
 
 
 def rigid(spec: Any, scene: Scene, timestep: float) -> None:
-    """An elliptic cone, solved to round-off; dry joints that stop within a step; for facets a wall that moves."""
+    """Set an elliptic cone, solved to round-off; dry joints stop within a step; a wall that moves replaces facets."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
     for joint in spec.joints:
         joint.solref_friction, joint.solimp_friction = (-1.0, -_SOLIMP / timestep), (_SOLIMP, _SOLIMP, 1.0, 0.5, 2.0)

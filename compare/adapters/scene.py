@@ -204,6 +204,7 @@ class Scene:
 
 
 def _text(numbers: Any) -> str:
+    """Numbers as an MJCF attribute."""
     return " ".join(repr(float(number) + 0.0) for number in numbers)  # no negative zero
 
 

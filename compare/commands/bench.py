@@ -155,6 +155,7 @@ def run_cases(args: argparse.Namespace) -> int:
 
 
 def _table(version: int, rows: list[list[str]]) -> Any:
+    """The table of the exact cases for the terminal."""
     head = ["case", "contacts", "kind", "what happens"]
     return pages.table(f"Exact contact cases, version {version}", [head, *rows], justify="left")
 

@@ -94,7 +94,7 @@ def line(verdict: Verdict) -> Text:
 
 
 def summary(verdicts: Sequence[Verdict]) -> Text:
-    """One line with the counts of claims and of numbers by outcome."""
+    """The outcome in a sentence, with counts of claims and numbers; and a line for each engine beside."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     counts = "; ".join(map(" ".join, wording.totals(ran)))
     shown = Text(f"{wording.headline(ran)}: {counts}. {wording.coarse_and_missing(ran)}".strip(), "bold")

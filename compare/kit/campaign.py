@@ -180,6 +180,7 @@ class Campaign:
 
     @property
     def _storing(self) -> Storing:
+        """How workers are to store runs of the label as it is now."""
         return Storing(self.directory, self.label, self.save, self.passing)
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:

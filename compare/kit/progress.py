@@ -124,6 +124,7 @@ class ValidationProgress:
         return counted
 
     def _tell(self) -> None:
+        """Show how far claims and protocols are, weighted by their costs."""
         runs = [f"{name} {done}/{total}" for name, (done, total, _) in self._under_way.items()]
         what = f"{self._judged} of {self.claims} claims judged; measuring {', '.join(runs)}"
         all_, done = sum(self.costs.values()), (1 - DRAWING) * self._measured

@@ -144,6 +144,7 @@ def _cross(x: float, y: float) -> Figure:
 
 
 def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more: Any) -> Figure:
+    """A figure of plotly whose axes, with these labels, begin at 0 and end at `right` and `top`."""
     across, up = ({"title": {"text": str(typeset(label))}} for label in (x, y))
     layout = {
         "xaxis": across | {"range": [0, right]}, "yaxis": up | {"range": [0, top]},

@@ -994,7 +994,7 @@ def _lift_by_slip(rows: Any, r: int, length: int, elliptic: bool, axes: Any, mu:
 
 @compiled
 def _subtract_references(head: int) -> None:
-    """Make `RESIDUAL`, accelerations of contacts, what they differ by from the reference ones."""
+    """Subtract the reference accelerations of all contact rows from `RESIDUAL`."""
     counts, rows = _int64(head), _block(head, ROWS)
     for r in range(0, ROW * counts[COUNT_ROWS], ROW):
         rows[r + RESIDUAL] -= rows[r + REFERENCE]
@@ -1267,7 +1267,7 @@ def _put_points_back(m: int, d: int, head: int) -> bool:
 
 @functools.cache
 def link() -> None:
-    """Compile the law once, and give its address to those that call it by that."""
+    """Compile `control` and `retain` once, and give the linker their addresses, by which compiled code calls them."""
     for function in (control, retain) if COMPILES else ():
         with alone(function):
             function.compile((types.intp,) * 3)

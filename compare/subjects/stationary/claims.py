@@ -74,6 +74,7 @@ def _case_bearing(when: When) -> Bearing:
 
 
 def _rolling_bearing(when: When = lambda m: True) -> Bearing:
+    """A bearing on the case of balls that start with the fluid: RR up to the threshold at which rolling ends."""
     chosen = all_of(given(start="with the fluid"), when)
     return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 

@@ -241,6 +241,7 @@ def _spins(cases: tuple[str, ...], evidence: Evidence) -> list[Measurement]:
 
 
 def _select_released(_: Evidence) -> Diagram:
+    """Fig. 12, with (12) released: theory alone, since nothing measured can pull."""
     return Diagram("fig-12", RELEASED)
 
 

@@ -49,7 +49,7 @@ def _ramp_end(m: Measurement) -> float:
 
 
 def _lowest_flow(m: Measurement) -> float:
-    """Lowest flow (rad s-1) of the slow pulsation at whose amplitude slip begins; zero where the mean flow is slow."""
+    """Lowest flow (rad s-1) of a slow pulsation about a slow flow, when slip begins: 0, at rest."""
     p = m.parameters.replace(omega_0=0.1 * math.sqrt(m.parameters.g / m.parameters.R))
     return p.omega_0 - pulsation.slow_onset(p)
 

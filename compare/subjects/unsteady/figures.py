@@ -155,6 +155,7 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
 
 
 def _measured(protocol: str, evidence: Evidence) -> Iterator[Measurement]:
+    """All measurements of a protocol, as a figure takes them."""
     return evidence.records.select(protocol)
 
 

@@ -184,7 +184,7 @@ class Edge:
         return np.asarray(self.centre + self.bracket.place.value * self.line)
 
     def crossed(self, line: Edge, bracket: Bracket) -> Edge:
-        """The edge with the bracket of its crossing on one more line added."""
+        """The edge after the search on one more line: with the bracket found there, or counted as missed."""
         if None in bracket.runs:
             return replace(self, moves=(), missed=self.missed + 1)
         crossed = replace(line, bracket=bracket, missed=0)
