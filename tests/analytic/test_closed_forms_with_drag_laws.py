@@ -89,9 +89,6 @@ def test_fold_where_the_drag_bends(nu_f):
     assert (abs(2 * p.r * lag / nu_f - 988.95) < 0.01) == (nu_f < 8e-6)
 
 
-# --- stationary solutions and their eigenvalues ----------------------------------------------------------------
-
-
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("eta", [0.02, 0.2, 0.39, 0.6])
 @pytest.mark.parametrize("omega_0", [0.5, 5.0, 13.0, 14.0, 22.0, 31.5, 33.0, 60.0])

@@ -61,9 +61,6 @@ def test_rates_are_those_of_the_vector_field(case, law):
         assert run.header.settings["energy_residual"] < 1e-11 * run.header.settings["energy_scale"]
 
 
-# --- closed forms -----------------------------------------------------------------------------------------------------
-
-
 def test_bounces_come_to_rest():
     """Bounces on the spot without drag: t_k = t_0 (1 + 2 e + … + 2 e^k), and rest at t_0 (1+e)/(1-e)."""
     p, y, e = P.replace(c=0.0, omega_0=0.0), 0.04, 0.6
@@ -118,9 +115,6 @@ def test_near_the_axis_is_an_ordinary_place():
     np.testing.assert_allclose(place, turn * (rho + (-radial + 1j * along) * run.time), atol=1e-11)
 
 
-# --- what ends a case -------------------------------------------------------------------------------------------------
-
-
 DRAGGED = P.replace(c=5.0, omega_0=0.0)
 ROUGH = DRAGGED.replace(eta=0.6)
 
@@ -145,9 +139,6 @@ def test_a_case_ends_where_its_forces_do(p, x, flow, before, after, left):
     of_floor, of_wall = p.mu * A_y - math.hypot(A_x, A_z), p.eta * B_x - math.hypot(B_y, B_z)
     loads = {"A_y": A_y, "B_x": B_x, "friction of the floor": of_floor, "friction of the wall": of_wall}
     assert loads[left] == pytest.approx(0.0, abs=1e-7 * p.m * p.g)
-
-
-# --- solvers of scipy -------------------------------------------------------------------------------------------------
 
 
 def failing(solver, at):

@@ -64,9 +64,6 @@ def test_energy_and_forces_agree_on_omega_01(mu, eta):
             np.testing.assert_allclose(np.abs(n), [0, 0, 1], atol=1e-3)
 
 
-# --- where the paper's Euclidean claim fails -------------------------------------------------------------------
-
-
 def test_counter_example_to_the_claim_after_80():
     """With the normal of (75), (0, 0) is not the global maximum of gamma, and gamma > 0 somewhere though RR is stable.
 
@@ -109,9 +106,6 @@ def test_both_consistent_between_73_and_the_cone():
         growths = [slip.gamma(Case.RR, Case.SR, State(omega_c=omega_c), [side], q) for side in (1.0, -1.0)]
         assert (max(growths) > 0) == slips
         assert (rolling_forces.margin(omega_c, q) >= 0) == sticks
-
-
-# --- where nothing slips, or could ------------------------------------------------------------------------------------
 
 
 def test_bounds_are_infinite_where_gamma_never_vanishes():

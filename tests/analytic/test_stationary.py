@@ -18,9 +18,6 @@ def of_case(p, case):
     return [s for s in stationary_solutions(p) if s.case is case]
 
 
-# --- one solution, and those that attract -----------------------------------------------------------------------
-
-
 def test_solution_of_a_case():
     """The stable one; the unstable one on request; below omega_02 that of NR formally."""
     p = P.replace(omega_0=35.0)
@@ -28,9 +25,6 @@ def test_solution_of_a_case():
     assert np.array_equal(solution(p, Case.SS).x, first.x)
     assert np.array_equal(solution(p, Case.SS, stable=False).x, second.x)
     assert solution(P.replace(omega_0=9.0), Case.NR, formal=True).exists is False
-
-
-# --- eigenvalues -----------------------------------------------------------------------------------------------
 
 
 def test_the_jacobian_in_rn_has_the_spin_that_goes_with_the_radial_speed():
@@ -68,9 +62,6 @@ def test_hopf_points_exist_for_rough_floors_only():
     assert np.sum(eigenvalues_at(np.mean(places), p).real > 0) == 2
 
 
-# --- the branch without loss of digits -------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("eta", [0.05, 0.2, 0.39, 0.4 - 1e-9])
 @pytest.mark.parametrize("kappa", [1e-6, 1e-2, 1.0, 30.0])
 @pytest.mark.parametrize("mu", [0.05, 0.2, 1.0])
@@ -86,9 +77,6 @@ def test_roots_of_the_branch_to_round_off(mu, kappa, eta):
         assert places
         for place in places:
             assert abs(float(branch(place, p).Omega_0) - Omega_0) <= 8 * EPS * Omega_0
-
-
-# --- mirror images and vanishing parameters --------------------------------------------------------------------
 
 
 VANISHING = [  # what exists, is how stable, and is free

@@ -113,18 +113,12 @@ def test_a_ball_that_slides_down_the_wall_as_fast_as_drag_lets_it_stays_on_it(st
     assert -p.g / p.c < run.v_y[-1] < -(p.g - p.eta * p.R * p.omega_0**2) / p.c * (1 - math.exp(-p.c * 2.0))
 
 
-# --- the scene file ------------------------------------------------------------------------------------------
-
-
 def test_file_opens_as_it_is_and_holds_the_reference() -> None:
     model = mujoco.MjModel.from_xml_path(str(scene.SCENE))
     built, mjcf = scene.build(P, ContactSettings())
     for name in ("body_mass", "body_inertia", "body_pos", "jnt_pos", "geom_size", "geom_pos", "pair_solref"):
         assert getattr(built, name) == pytest.approx(getattr(model, name)), name
         assert getattr(mujoco.MjModel.from_xml_string(mjcf), name) == pytest.approx(getattr(model, name)), name
-
-
-# --- the compiled corrections are those of the source, whatever a run goes through ---------------------------
 
 
 SETS = [P.replace(omega_0=12.0, drag=law, nu_f=1e-4) for law in LAWS]

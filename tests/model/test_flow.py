@@ -105,9 +105,6 @@ def test_unreadable_measurements(tmp_path):
         Flow.from_csv(tmp_path / "flow.csv")
 
 
-# --- the longest step of a problem ---------------------------------------------------------------------------
-
-
 P = Parameters.named("reference")
 SLOW = {"omega_0": 1.0, "c": 1.0}
 QUADRATIC = {"drag": "quadratic", "nu_f": 1e-6}
