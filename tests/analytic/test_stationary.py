@@ -14,14 +14,10 @@ P = Parameters.named("reference")
 EPS = np.finfo(float).eps
 
 
-def of_case(p, case):
-    return [s for s in stationary_solutions(p) if s.case is case]
-
-
 def test_solution_of_a_case():
     """The stable one; the unstable one on request; below omega_02 that of NR formally."""
     p = P.replace(omega_0=35.0)
-    first, second = of_case(p, Case.SS)
+    first, second = stationary_solutions(p, (Case.SS,))
     assert np.array_equal(solution(p, Case.SS).x, first.x)
     assert np.array_equal(solution(p, Case.SS, stable=False).x, second.x)
     assert solution(P.replace(omega_0=9.0), Case.NR, formal=True).exists is False

@@ -173,6 +173,7 @@ def _one_cone(right: Function, p: Parameters) -> float:
     return min(abs(bound(p, p.omega_0, 1).zero - p.omega_0) for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr))
 
 
+_backwards = functools.partial(where, lambda p: p.omega_0 < 0)
 _FAULTS: dict[str, dict[str, Fault]] = {
     # Forces and equations of motion, (20)-(29)
     "mechanics.dynamics._rs": {
@@ -216,11 +217,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "SS lags 0.5 % too little": of_case(Case.SS, fields(x=times(1.005, 2))),
         "spin of SS on the floor 1 % large": of_case(Case.SS, fields(x=times(1.01, 3))),
         "NS sinks 2 % too fast": of_case(Case.NS, fields(x=times(1.02, 1))),
-        "in a flow the other way round the ball spins as before": where(
-            lambda p: p.omega_0 < 0, of_case(None, fields(x=times(-1.0, 3)))
-        ),
-        "in a flow the other way round friction along the orbit is as before": where(
-            lambda p: p.omega_0 < 0, of_case(None, fields(force_A=times(-1.0, 2)))
+        "in a flow the other way round the ball spins as before": _backwards(of_case(None, fields(x=times(-1.0, 3)))),
+        "in a flow the other way round friction along the orbit is as before": _backwards(
+            of_case(None, fields(force_A=times(-1.0, 2)))
         ),
         "RR is unstable": of_case(Case.RR, fields(slip_stability=lambda s: type(s).UNSTABLE)),
     },
