@@ -21,14 +21,9 @@ NEAR = 1e-6
 """Half the time over which a difference makes the rate of a contact's place, s."""
 
 
-@pytest.fixture
-def case(request):
-    return CASES[request.param]
-
-
-@pytest.mark.parametrize("case", NAMES, indirect=True)
-def test_a_case_is_whole(case):
-    n = len(case.times)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_case_is_whole(name):
+    case, n = CASES[name], len(CASES[name].times)
     assert case.exact.shape == (n, 9 * len(case.bodies))
     assert len(case.contacts) == n
     assert case.bound <= 1e-10
@@ -53,11 +48,10 @@ def test_the_list_that_is_shown_is_that_of_the_cases():
     assert {"version": VERSION, "cases": exact.listing()} == LISTED
 
 
-# --- a second way to the motions, which knows nothing of the variables in which they are known ----------------
-
-
 def newton(case, touching=None, friction=()):
     """The rates of a body's place, quaternion, velocity and spin in world axes, (13,), by Newton and Euler.
+
+    A second way to the motions, which knows nothing of the variables in which they are known.
 
     `touching` gives of place and quaternion for each contact its arm from the centre, its normal and the velocity of
     what it touches; `friction` the coefficients, None for what rolls. All forces are solved for together from what
@@ -96,14 +90,28 @@ def newton(case, touching=None, friction=()):
     return rates
 
 
-def begins(body):
-    return np.concatenate([body.position, body.orientation, body.velocity, body.spin])
+def moved(case, rates, more=(), ends=lambda x: 1.0, change=None):
+    """Place, velocity and spin of a body at the samples; `more` than they may belong to the state.
+
+    Wherever `ends` falls to zero the state becomes what `change` makes of it.
+    """
+    body = case.body
+    start = [*body.position, *body.orientation, *body.velocity, *body.spin, *more]
+    return np.delete(switched(rates, start, case.times, ends, change)[:, :13], range(3, 7), axis=1)
 
 
-def alone(case, rates):
-    """Place, velocity and spin of a body from its start to the samples."""
-    found = solve_ivp(rates, (0, case.times[-1]), begins(case.body), t_eval=case.times, **SHARP).y.T
-    return np.delete(found, range(3, 7), axis=1)
+def switched(rates, start, times, ends, change):
+    begin, state, out = 0.0, np.array(start, float), []
+    while begin < times[-1]:
+
+        def falls(t, x, begin=begin):
+            return ends(x) if t > begin + 1e-7 else 1.0
+
+        falls.terminal, falls.direction = True, -1
+        found = solve_ivp(rates, (begin, times[-1]), state, events=falls, dense_output=True, max_step=0.02, **SHARP)
+        out += [found.sol(t) for t in times[(times > begin) & (times <= found.t[-1])]]
+        begin, state = found.t[-1], change and change(found.y[:, -1])
+    return np.array(out)
 
 
 def ball(case, letters):
@@ -121,40 +129,27 @@ def ball(case, letters):
     return newton(case, lambda place: [*touching(place)], friction)
 
 
+def floor(arms):
+    """A floor at rest, touched at these arms of a place."""
+    return lambda place: [(arm, UP, 0 * UP) for arm in arms(place)]
+
+
 def tripod(case):
     """On three feet, each of which bears what keeps it on the floor."""
-
-    def touching(place):
-        return [(arm - case.body.size[0] * UP, UP, 0 * UP) for arm in rotated(place[3:], case.body.parts)]
-
-    return alone(case, newton(case, touching, 3 * [case.surfaces[0].friction]))
+    feet = floor(lambda place: rotated(place[3:], case.body.parts) - case.body.size[0] * UP)
+    return moved(case, newton(case, feet, 3 * [case.surfaces[0].friction]))
 
 
 def disc(case):
     """On the lowest point of its lower rim."""
     radius, half = case.body.size
 
-    def touching(place):
+    def lowest(place):
         axis = rotated(place[3:], UP)
         level = axis * axis[2] - UP
-        return [(radius * level / np.linalg.norm(level) - half * axis, UP, 0 * UP)]
+        return [radius * level / np.linalg.norm(level) - half * axis]
 
-    return alone(case, newton(case, touching, [None]))
-
-
-def switched(rates, start, times, ends, change):
-    """Integrate to the samples; wherever `ends` falls to zero the state becomes what `change` makes of it."""
-    begin, state, out = 0.0, np.array(start, float), []
-    while begin < times[-1]:
-
-        def falls(t, x, begin=begin):
-            return ends(x) if t > begin + 1e-7 else 1.0
-
-        falls.terminal, falls.direction = True, -1
-        found = solve_ivp(rates, (begin, times[-1]), state, events=falls, dense_output=True, max_step=0.02, **SHARP)
-        out += [found.sol(t) for t in times[(times > begin) & (times <= found.t[-1])]]
-        begin, state = found.t[-1], change(found.y[:, -1])
-    return np.array(out)
+    return moved(case, newton(case, floor(lowest), [None]))
 
 
 def rocking(case):
@@ -165,7 +160,7 @@ def rocking(case):
         return rotated(state[3:7], np.array(body.size) * [side, 0, -1])
 
     def rates(t, state):
-        return np.append(newton(case, lambda place: [(corner(place, state[13]), UP, 0 * UP)], [None])(t, state[:13]), 0)
+        return np.append(newton(case, floor(lambda place: [corner(place, state[13])]), [None])(t, state[:13]), 0)
 
     def blow(state):
         arm, moment = corner(state, -state[13]), body.inertia[1]
@@ -173,19 +168,13 @@ def rocking(case):
         spin = np.array([0, about / (moment + body.mass * arm @ arm), 0])
         return np.concatenate([state[:7], -np.cross(spin, arm), spin, [-state[13]]])
 
-    start = [*begins(body), 1.0]
-    return np.delete(switched(rates, start, case.times, lambda x: x[5] * x[13], blow), [3, 4, 5, 6, 13], axis=1)
+    return moved(case, rates, [1.0], lambda x: x[5] * x[13], blow)
 
 
 def bouncing(case):
     """A fall, from blow to blow."""
-
-    def blow(state):
-        state[9] *= -case.surfaces[0].restitution
-        return state
-
-    found = switched(newton(case), begins(case.body), case.times, lambda x: x[2] - case.body.size[0], blow)
-    return np.delete(found, range(3, 7), axis=1)
+    back = np.where(np.arange(13) == 9, -case.surfaces[0].restitution, 1.0)
+    return moved(case, newton(case), (), lambda x: x[2] - case.body.size[0], lambda state: back * state)
 
 
 def swinging(case):
@@ -212,31 +201,29 @@ def sliding(case):
     The friction of both contacts is found together from velocities at the end of a step, by projection on Coulomb's
     bounds: nothing knows when what sticks or slides. Forces are constant but in the steps of a change.
     """
-    (surface,), bodies = case.surfaces, case.bodies[::-1]
-    normal = np.array(surface.normal)
-    way, h, press = np.array([normal[2], 0.0, -normal[0]]), 1e-4, case.g * normal[2]
-    masses, count = [body.mass for body in bodies], len(bodies)
-    bounds = [press * surface.friction * sum(masses), press * case.between * masses[-1]][:count]
-    belt, v = float(np.dot(surface.velocity, way)), [float(np.dot(body.velocity, way)) for body in bodies]
-    s, out, done, f = [0.0] * count, [], 0, [0.0] * (count + 1)  # nothing lies on the highest
+    (surface,), bodies, h = case.surfaces, case.bodies[::-1], 1e-4
+    normal, masses = np.array(surface.normal), np.array([body.mass for body in bodies])
+    way, press, count = np.array([normal[2], 0.0, -normal[0]]), case.g * normal[2], len(bodies)
+    bounds = press * np.array([surface.friction * masses.sum(), case.between * masses[-1]])[:count]
+    slips = np.eye(count) - np.eye(count, k=-1)  # of velocities: each body's past what is under it
+    belt = np.eye(count)[0] * np.dot(surface.velocity, way)
+    answer = h * slips / masses @ slips.T  # of slips to friction
+    v, s, f, out, done = np.array([body.velocity for body in bodies]) @ way, np.zeros(count), np.zeros(count), [], 0
     for t in case.times:
         for _ in range(round(t / h) - done):
-            free = [w - h * case.g * way[2] for w in v]
+            free = v - h * case.g * way[2]
             for _ in range(400):
-                last = list(f)
+                last = f.copy()
                 for k in range(count):
-                    under = free[k - 1] + h * (f[k - 1] - f[k]) / masses[k - 1] if k else belt
-                    slip = free[k] + h * (f[k] - f[k + 1]) / masses[k] - under
-                    share = 1 / masses[k] + (1 / masses[k - 1] if k else 0.0)
-                    f[k] = min(max(f[k] - slip / (h * share), -bounds[k]), bounds[k])
-                if max(abs(now - then) for now, then in zip(f, last, strict=True)) <= 1e-13 * max(bounds):
+                    slip = (slips @ free - belt + answer @ f)[k]
+                    f[k] = min(max(f[k] - slip / answer[k, k], -bounds[k]), bounds[k])
+                if np.abs(f - last).max() <= 1e-13 * bounds.max():
                     break
-            new = [w + h * (f[k] - f[k + 1]) / masses[k] for k, w in enumerate(free)]
-            s, v = [x + h * (w + now) / 2 for x, w, now in zip(s, v, new, strict=True)], new
+            new = free + h * slips.T @ f / masses
+            s, v = s + h * (v + new) / 2, new
         done = round(t / h)
-        out.append(np.concatenate([
-            part for k in range(count)[::-1] for part in (bodies[k].position + s[k] * way, v[k] * way, np.zeros(3))
-        ]))  # fmt: skip
+        states = [[body.position + x * way, w * way, 0 * way] for body, x, w in zip(bodies, s, v, strict=True)]
+        out.append(np.ravel(states[::-1]))
     return np.array(out)
 
 
@@ -273,9 +260,10 @@ def changes(case):
     return events.time, ["N" in before and before != after for before, after in pairs]
 
 
-@pytest.mark.parametrize("case", [name for name in NAMES if name not in WAYS], indirect=True)
-def test_a_ball_moves_so_from_every_sixth_sample_to_the_next(case):
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in WAYS])
+def test_a_ball_moves_so_from_every_sixth_sample_to_the_next(name):
     """Where the contacts are the same all the while and the body moves."""
+    case = CASES[name]
     (events, _), checked = changes(case), 0
     for k in range(1, len(case.times), 6):
         (begin, end), letters = case.times[k - 1 : k + 1], case.contacts[k]
@@ -304,17 +292,14 @@ def test_rest_needs_the_share_of_friction_that_is_said(name, share):
     assert np.linalg.norm(acts + loads @ normals) / limit == pytest.approx(share, rel=1e-12)
 
 
-BLOWS = {"rocking-block": 7, "bounce": 5}
-"""What jumps there of a state."""
-
-
-@pytest.mark.parametrize("case", NAMES, indirect=True)
-def test_no_sample_is_near_a_blow(case):
+@pytest.mark.parametrize("name", NAMES)
+def test_no_sample_is_near_a_blow(name):
     """Where an engine is late by a step, it is not to be wrong by the whole jump."""
+    case, jumping = CASES[name], {"rocking-block": 7, "bounce": 5}  # what jumps there of a state
     blows = [time for time, jumps in zip(*changes(case), strict=True) if jumps]
-    if case.name in BLOWS:
+    if name in jumping:
         fine = np.arange(1, 20000) * (case.times[-1] / 20000)
-        found = WAYS[case.name][0](dataclasses.replace(case, times=fine))[:, BLOWS[case.name]]
+        found = WAYS[name][0](dataclasses.replace(case, times=fine))[:, jumping[name]]
         blows = fine[1:][np.abs(np.diff(found)) > 0.02]
         assert len(blows)
     assert all(np.abs(case.times - time).min() > 5e-3 for time in blows)
