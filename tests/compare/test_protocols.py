@@ -239,17 +239,15 @@ def test_numbers_that_no_quick_set_has_are_judged_too():
         assert outcome_of(claim, row) is outcome
 
 
-NUMBERS = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
-"""Stands for a lab whose tasks are their own runs."""
-
-
 def narrowed(answer, width, task=lambda v, b, attempt: (v, attempt), careful=True):
-    """The bracket in which an answer to (value, attempt) changes, from 0 to 1."""
-    (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
+    """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a lab whose tasks are their runs."""
+    lab = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
+    (bracket,) = narrow(lab, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
     return bracket
 
 
-def test_bisection_closes_in_on_the_change():
+def test_bisection_closes_in_on_the_change_unless_runs_are_undecided_or_break_down():
+    """What is undecided is run again, for longer; what broke says why."""
     bracket = narrowed(lambda run: run[0] < math.pi / 10, 1e-6)
     assert bracket.low < math.pi / 10 < bracket.high <= bracket.low + 1e-6
     assert bracket.shift == 0
@@ -259,10 +257,6 @@ def test_bisection_closes_in_on_the_change():
     moves = narrowed(lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4)  # with the time step
     assert moves.low < 0.3 < moves.high
     assert moves.place.uncertainty >= moves.shift > 0
-
-
-def test_runs_that_are_undecided_or_break_down_leave_the_place_open():
-    """What is undecided is run again, for longer; what broke says why."""
 
     def answer(run):
         value, attempt = run
@@ -326,26 +320,22 @@ def run_of(time, y, theta):
     return motion(HOPPING, time, y=y, theta=theta, omega_c=np.gradient(theta, time))
 
 
-def test_which_balls_hop():
+def test_which_balls_hop_and_how_high():
     """Those that come down again and again, but none that swings on the wall, sinks, or hardly leaves the floor."""
     t = np.arange(0, 5, 1e-3)
     hop = 4e-3 * np.abs(np.sin(12 * t))
     assert all(hops(run_of(t, y, t)) for y in (hop, np.exp(-t) * hop))
     assert not any(hops(run_of(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000))
-
-
-def test_tops_of_known_hops():
-    """Parabolas of one period and height: the tops come out between the samples."""
+    # Parabolas of one period and height: the tops come out between the samples.
     period, height = 0.2217, 4e-3
-    time = np.arange(0, 5, 1e-3)
-    phase = np.mod(time, period) / period - 0.5
-    run = run_of(time, height * (1 - 4 * phase**2), 57.0 * time)
+    phase = np.mod(t, period) / period - 0.5
+    run = run_of(t, height * (1 - 4 * phase**2), 57.0 * t)
     tops = attractors.tops(run, 1.0, 4.0)
     # The parabola through three samples is the hop itself.
     assert tops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
     assert tops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
     assert max(value.uncertainty for value in tops.values.values()) < 1e-9
-    assert len(attractors.tops(run_of(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
+    assert len(attractors.tops(run_of(t, np.zeros_like(t), t), 1.0, 4.0).time) == 0
 
 
 @pytest.mark.parametrize("size", [0.9, 1.05])

@@ -9,8 +9,8 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from contextlib import nullcontext
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -25,14 +25,13 @@ from model import Case, Flow, InputError, Parameters, State, storage
 from model.kinematics import angular_velocity, rotated
 from tests.commands import refused, started, told
 
-WIDTH = 320
+WIDTH, P, SETTINGS = 320, Parameters.named("reference"), ContactSettings()
 
 
 @pytest.fixture(scope="module")
 def run():
     """Two-point slipping, and rolling before."""
-    p = Parameters.named("reference").replace(omega_0=25.0)
-    return mjsim.simulate(p, [0, 0, 13.0, 0, 0, 0], 0.8, sample_interval=0.01)
+    return mjsim.simulate(P.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0], 0.8, sample_interval=0.01)
 
 
 @pytest.fixture
@@ -89,7 +88,7 @@ def test_a_film_as_mp4(run, draws, tmp_path, monkeypatch):
 
 
 def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
-    """Frames, numbers and the case follow the slider."""
+    """Frames, numbers and the case follow the slider; where a contact is open there is no slip to tell."""
     pytest.importorskip("nicegui")
     file = tmp_path / "run.html"
     assert render.write(run, file, at=0.1, speed=0.5, rate=50).endswith(": 71 frames")  # ends of 0.7 s of the run
@@ -103,14 +102,10 @@ def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
         assert tab.locator("#case").inner_text() == Case(now.case[0]).name
         assert f"ωc = {now.omega_c[0]:.2f} rad/s" in tab.locator("#numbers").inner_text()
     assert tab.locator("#play").inner_text() == "Play"
-
-
-def test_all_of_a_page_s_vessel_is_seen_however_high_the_ball_flies(tab, tmp_path):
-    """Above it the picture is white; where a contact is open there is no slip to tell."""
-    pytest.importorskip("nicegui")
-    flies = analytic.simulate(Parameters.named("reference"), [0.05, 0, 8.0, 0, 0, 0, 0.03, -0.3], 0.05)
-    render.write(flies, tmp_path / "run.html")
-    tab.goto((tmp_path / "run.html").as_uri())
+    # All of the vessel is seen, however high the ball flies: above it the picture is white.
+    flies = analytic.simulate(P, [0.05, 0, 8.0, 0, 0, 0, 0.03, -0.3], 0.05)
+    render.write(flies, file)
+    tab.goto(file.as_uri())
     tab.wait_for_function("document.querySelector('#numbers').innerText.includes('slip: floor –, wall –')")
     seen = Image.open(io.BytesIO(tab.locator("#view").screenshot())).convert("RGB")
     edge = np.asarray(seen)[3:6, seen.width // 2 :]
@@ -118,9 +113,9 @@ def test_all_of_a_page_s_vessel_is_seen_however_high_the_ball_flies(tab, tmp_pat
     assert np.asarray(seen)[:, seen.width // 2 :].min() < 255
 
 
-def test_the_ball_turns_with_its_angular_velocity(reference):
+def test_the_ball_turns_with_its_angular_velocity():
     """Rolling steadily, about an axis that itself goes round: the mean turn about z is that of o_y."""
-    p, x = reference.replace(omega_0=5.0), np.array([0, 0, 5.0, 0, 0, 0])
+    p, x = P.replace(omega_0=5.0), np.array([0, 0, 5.0, 0, 0, 0])
     run = mjsim.simulate(p, x, 0.05, sample_interval=0.005)
     rotations = geometry.orientations(run)
     step = (rotations[1] * rotations[0].inv()).magnitude() / (run.time[1] - run.time[0])
@@ -176,55 +171,32 @@ def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch):
     render.choose_opengl.cache_clear()
 
 
-class Window:
-    """Closes after so many pictures, and is the clock: a picture takes 1/64 s, a number without round-off."""
-
-    def __init__(self, pictures: int, takes: float = 1 / 64) -> None:
-        self.left, self.takes, self.now = pictures, takes, 0.0
-
-    def is_running(self) -> bool:
-        return self.left > 0
-
-    def lock(self) -> nullcontext[None]:
-        return nullcontext()
-
-    def sync(self) -> None:
-        self.left -= 1
-        self.now += self.takes
-
-    def monotonic(self) -> float:
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        pass
-
-
-def test_the_loop_is_that_of_a_simulation(reference, monkeypatch):
-    p, x0 = reference.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0]
-    flow, settings = Flow.ramp(20.0, 25.0, 0.3), ContactSettings()
-    stepper, window = viewer.start(p, x0, flow, settings), Window(33)
+def viewed(monkeypatch, x0, flow, pictures, takes=1 / 64):
+    """Steps until the window closes, after so many pictures, and the ball; its clock tells how long each takes, s."""
+    window = mock.MagicMock(spec=["is_running", "lock", "sync", "monotonic", "sleep"])
+    window.is_running = lambda: window.sync.call_count < pictures
+    window.monotonic = lambda: window.sync.call_count * takes
     monkeypatch.setattr(viewer, "time", window)
-    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0)
-    assert steps == 500  # half a second: the first of the 33 pictures shows the start
-    run = mjsim.simulate(p, x0, 0.5, flow, settings, sample_interval=0.5)
-    qpos, qvel = np.array(stepper.data.qpos), np.array(stepper.data.qvel)
-    place = qpos[:3] - settings.midpoint * settings.timestep * qvel[:3]  # positions are ahead of velocities
+    ball = viewer.start(P, x0, flow, SETTINGS)
+    return viewer.run(window, ball, flow, SETTINGS.timestep, 1.0), ball
+
+
+def test_the_loop_is_that_of_a_simulation(monkeypatch):
+    x0, flow = [0, 0, 13.0, 0, 0, 0], Flow.ramp(20.0, 25.0, 0.3)
+    steps, ball = viewed(monkeypatch, x0, flow, 33)
+    assert steps == 500  # half a second: the first of the 33 pictures, of 1/64 s without round-off, shows the start
+    run = mjsim.simulate(P, x0, 0.5, flow, SETTINGS, sample_interval=0.5)
+    qpos, qvel = np.array(ball.data.qpos), np.array(ball.data.qvel)
+    place = qpos[:3] - SETTINGS.midpoint * SETTINGS.timestep * qvel[:3]  # positions are ahead of velocities
     qvel[3:] = rotated(qpos[3:], qvel[3:])
     # Equal but for the round-off of turning one state into the paper's variables, or many at once.
-    scale = np.maximum(np.abs(run.x[-1]), [p.r, 1, 1, 60, 60, 60, p.r, 1])
-    np.testing.assert_array_less(np.abs(recorder.state(place, qvel, p) - run.x[-1]), 4 * np.finfo(float).eps * scale)
+    scale = np.maximum(np.abs(run.x[-1]), [P.r, 1, 1, 60, 60, 60, P.r, 1])
+    np.testing.assert_array_less(np.abs(recorder.state(place, qvel, P) - run.x[-1]), 4 * np.finfo(float).eps * scale)
 
 
-def test_a_slow_machine_does_not_run_after_the_clock(reference, monkeypatch):
-    settings = ContactSettings()
-    flow, window = Flow.steady(12.0), Window(4, takes=3.0)
-    stepper = viewer.start(reference, [0, 0, 12.0, 0, 0, 0], flow, settings)
-    monkeypatch.setattr(viewer, "time", window)
-    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0)
-    assert steps == 3 * round(viewer.BEHIND / settings.timestep)
-
-
-P = Parameters.named("reference")
+def test_a_slow_machine_does_not_run_after_the_clock(monkeypatch):
+    steps, _ = viewed(monkeypatch, [0, 0, 12.0, 0, 0, 0], Flow.steady(12.0), 4, takes=3.0)
+    assert steps == 3 * round(viewer.BEHIND / SETTINGS.timestep)
 
 
 @pytest.fixture(scope="module")
@@ -299,16 +271,14 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
 
 def test_a_run_is_saved_that_is_not_simulated_yet(browser, address):
     """Two files are asked for at once, as soon as there are buttons: both come."""
-    page, saved = browser.new_page(), []
-    page.on("download", lambda each: saved.append(each.suggested_filename))
+    page = browser.new_page()
     page.goto(address)
-    for text in ("Run as HDF5", "Set as TOML"):
-        page.get_by_text(text).click()
-    for _ in range(600):
-        if len(saved) == 2:
-            break
-        page.wait_for_timeout(100)
-    assert sorted(saved) == ["run.h5", "set.toml"]
+    with (
+        page.expect_download(lambda each: each.suggested_filename == "run.h5", timeout=60_000),
+        page.expect_download(lambda each: each.suggested_filename == "set.toml", timeout=60_000),
+    ):
+        page.get_by_text("Run as HDF5").click()
+        page.get_by_text("Set as TOML").click()
     page.close()
 
 
@@ -354,10 +324,7 @@ def test_every_set_has_its_figures_and_a_motion(changes):
     assert len(cells) == len(plane["data"][0]["x"]) * len(plane["data"][0]["y"])
     assert max(cells) < plane["data"][0]["zmax"]
     assert explore.simulated(p, State(omega_c=5.0)).complete
-
-
-def test_a_slider_changes_the_set():
-    assert explore.with_value(P, "kappa", 0.5).kappa == pytest.approx(0.5)
-    assert explore.with_value(P, "drag", "schiller-naumann").nu_f == explore.OIL
+    assert explore.with_value(p, "kappa", 0.5).kappa == pytest.approx(0.5)
+    assert explore.with_value(p, "drag", "schiller-naumann").nu_f == explore.OIL
     with pytest.raises(InputError, match="j = 2"):
-        explore.with_value(P, "j", 2.0)
+        explore.with_value(p, "j", 2.0)

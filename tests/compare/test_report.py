@@ -126,7 +126,7 @@ def test_every_number_is_on_the_page():
     assert packed == columns
 
 
-def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page):
+def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(page):
     text, summary = html.unescape(page.read_text("utf-8")), validate.summary(VERDICTS).plain
     for verdict in RAN:
         for heading, found in wording.findings(verdict).items():
@@ -140,6 +140,10 @@ def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page):
     for predicted, said in (12.0, "none: all equal"), (1.0, "not equal: case, reference"):  # counts have no tolerance
         check = Check(measurement=m, predicted=predicted, tolerance=0.0, scale=1.0)
         assert wording.findings(dataclasses.replace(RAN[0], checks=(check,))) == {"Largest deviation": said}
+    bad = results.load(page.parent).verdicts["bad"]
+    assert (bad["id"], bad["verdict"], bad["passed"], bad["expected"]) == ("bad", "refuted", False, "confirmed")
+    assert (bad["checks"], bad["agrees"]) == (len(VERDICTS[1].checks), 0)
+    assert results.described(VERDICTS[1])["checks"][0]["conditions"]["y"] == 0.02
 
 
 def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypatch):
@@ -157,13 +161,6 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypa
     assert text.count('<figure class="plot"') == 1
     assert '<a href="#figure-fall">A fall</a>: see good.' in row(text, "bad")
     assert "A gap is not drawn: the run &lt;is&gt; lost" in row(text, "good")
-
-
-def test_a_summary_is_read_back(page):
-    bad = results.load(page.parent).verdicts["bad"]
-    assert (bad["id"], bad["verdict"], bad["passed"], bad["expected"]) == ("bad", "refuted", False, "confirmed")
-    assert (bad["checks"], bad["agrees"]) == (len(VERDICTS[1].checks), 0)
-    assert results.described(VERDICTS[1])["checks"][0]["conditions"]["y"] == 0.02
 
 
 @pytest.mark.parametrize(
@@ -227,7 +224,7 @@ def opened(tab, page):
     return tab
 
 
-def test_claims_are_found_and_sorted(opened):
+def test_claims_are_found_and_sorted_and_numbers_found(opened):
     def shown():
         return opened.locator("details.claim:visible").evaluate_all("rows => rows.map(row => row.id)")
 
@@ -241,8 +238,6 @@ def test_claims_are_found_and_sorted(opened):
         opened.click("[data-sort=id]")
         assert shown() == order  # within each section
 
-
-def test_numbers_are_found(opened):
     def found(flow, words):
         opened.fill("#flow", flow)
         opened.fill("#words", words)
@@ -258,21 +253,18 @@ def test_numbers_are_found(opened):
     assert first[:3] + first[4:] == ["reference", "12", "ωc rad/s", "mujoco", "12", "1e-9", "12", "0", "3e-9", "good"]
 
 
-@pytest.mark.parametrize("width", [390, 1200])
-def test_nothing_runs_over_the_side_and_text_is_legible(opened, width):
+def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_legible_and_prints(opened):
     """All rows open, on a phone, too; text against its ground has the contrast 4.5 of WCAG AA, light and dark."""
-    opened.set_viewport_size({"width": width, "height": 844})
-    assert opened.evaluate(OPEN) <= width
+    assert opened.locator("details.claim[open]").evaluate_all("rows => rows.map(row => row.id)") == ["good"]
+    for width in (390, 1200):
+        opened.set_viewport_size({"width": width, "height": 844})
+        assert opened.evaluate(OPEN) <= width
     contrast = set()
     for scheme in ("light", "dark"):
         opened.emulate_media(color_scheme=scheme)
         contrast.add(opened.evaluate(CONTRAST))
     assert min(contrast) >= 4.5
     assert len(contrast) == 2
-
-
-def test_an_address_opens_its_row_and_the_page_prints(opened):
-    assert opened.locator("details.claim[open]").evaluate_all("rows => rows.map(row => row.id)") == ["good"]
     printed = opened.pdf()
     assert printed.startswith(b"%PDF")
     assert len(re.findall(rb"/Type ?/Page\b[^s]", printed)) > 1
@@ -302,7 +294,7 @@ def figure_of_two():
     return figure
 
 
-def test_series_and_scales_are_in_the_picture():
+def test_series_and_scales_are_in_the_picture_and_letters_are_shared():
     text = svg(figure_of_two())
     assert text == svg(figure_of_two())  # equal figures give equal text
     assert plain("$\\tilde{ω}_{x}$ (rad/s)") == "ω̃_x (rad/s)"
@@ -319,9 +311,7 @@ def test_series_and_scales_are_in_the_picture():
     (way,) = re.findall('data-series="many">.*?<path d="(M[^"]*)" fill="none"', text)
     assert len(way.split()) == 1 + 2 * 30
     assert text.count("<use") < 20  # of ticks
-
-
-def test_pictures_of_a_page_share_letters_and_nothing_else():
+    # Pictures of a page share letters and nothing else.
     pictures, letters = embedded({"a": svg(figure_of_two()), "b": svg(figure_of_two())})
     of = {name: set(re.findall('id="([^"]*)"', text)) for name, text in pictures.items()}
     there = set(re.findall('id="([^"]*)"', letters))

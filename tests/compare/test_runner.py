@@ -102,16 +102,6 @@ def test_engines_that_are_none(engine, says):
     assert says in str(refused.value)
 
 
-def test_a_version_that_broke_is_named(tmp_path, monkeypatch):
-    (tmp_path / "old.py").write_text(
-        "KNOWN = 'numpy 0.1'\ndef build(case, timestep): raise RuntimeError('gone')\nstep = state = print\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    found = run(CASES["box-stops"], "old")
-    assert found.failure.startswith("RuntimeError: gone (numpy ")
-    assert found.failure.endswith("known to work: 0.1)")
-
-
 def test_a_league_of_one(tmp_path, capsys):
     name = f"{__name__}:EXACT"
     shown = told(capsys, f"league --engine {name} -o {tmp_path} --workers 1 --quiet --json")
@@ -172,14 +162,18 @@ def state():
 """
 
 
-def test_an_adapter_of_version_1_takes_what_it_took_and_is_not_asked_for_more(tmp_path, monkeypatch):
+def test_adapters_of_a_file_are_asked_for_what_they_can_do_and_name_a_version_that_broke(tmp_path, monkeypatch):
     (tmp_path / "of_version_1.py").write_text(OLD)
     (tmp_path / "of_version_2.py").write_text(f"FEATURES = ('two bodies',){OLD}")
+    (tmp_path / "broke.py").write_text(f"KNOWN = 'numpy 0.1'{OLD}def build(*given): raise RuntimeError('gone')")
     monkeypatch.syspath_prepend(tmp_path)
     assert run(CASES["box-stops"], "of_version_1").passed
     asked = run(CASES["plank"], "of_version_1")
     assert asked.skipped == "of_version_1 doesn't say in FEATURES that it can do this: two bodies"
     assert run(CASES["plank"], "of_version_2").passed
+    found = run(CASES["box-stops"], "broke")
+    assert found.failure.startswith("RuntimeError: gone (numpy ")
+    assert found.failure.endswith("known to work: 0.1)")
 
 
 pytest_plugins = ("pytester",)
@@ -190,6 +184,14 @@ def state():
         return [0.0], [0.0], [0.0]
     return exact() * (1.2 if case.name == "box-stops" else 1.0)
 """.replace("    globals", "    if case.name == 'turntable': raise NotImplementedError('no tables')\n    globals", 1)
+FIXTURES = """
+from model import Parameters
+def test_theory(dualball_theory):
+    p = Parameters.named("reference")
+    assert dualball_theory(p, 1.0) is dualball_theory(p, 1.0)
+def test_case(dualball_case):
+    assert dualball_case.error(dualball_case.exact) == 0
+"""
 INSTALLED = ("-p", "compare", "-p", "no:cacheprovider")
 """Where dualball is installed an entry point names the package `compare`."""
 
@@ -200,8 +202,8 @@ def loaded():
     bench.cases()
 
 
-def test_an_engine_on_the_exact_cases(pytester):
-    pytester.makepyfile(adapter=ADAPTER, test_mine="def test_mine(): assert True")
+def test_an_engine_on_the_exact_cases_beside_tests_of_ones_own(pytester):
+    pytester.makepyfile(adapter=ADAPTER, test_mine=FIXTURES)
     known = pytester.makefile(".txt", known="# ours\ncylinder   it has no wall\nblock-rests\n")
     given = "test_mine.py", "--dualball-engine", "adapter", "--dualball-known", str(known), "-rx", "-n", "1"
     found = pytester.runpytest_subprocess(*INSTALLED, *given)
@@ -211,7 +213,7 @@ def test_an_engine_on_the_exact_cases(pytester):
     outcomes = found.parseoutcomes()
     new = sum(bool(case.needs) for case in bench.cases())  # of which the adapter says nothing
     assert (outcomes["failed"], outcomes["xfailed"], outcomes["xpassed"], outcomes["skipped"]) == (1, 1, 1, 1 + new)
-    assert outcomes["passed"] == len(bench.cases()) - new - 3  # and the test that is named
+    assert outcomes["passed"] == 2 * len(bench.cases()) - new - 3  # and the tests that are named
 
 
 @pytest.mark.parametrize(
@@ -230,23 +232,6 @@ def test_what_cannot_be_tested(pytester, args, message):
     assert found.ret != 0
     (found.stderr if "known" in args else found.stdout).fnmatch_lines([message])
     assert found.parseoutcomes().get("passed", 0) == 0
-
-
-def test_fixtures(pytester):
-    pytester.makepyfile(
-        """
-        from model import Parameters
-
-        def test_theory(dualball_theory):
-            p = Parameters.named("reference")
-            assert dualball_theory(p, 1.0) is dualball_theory(p, 1.0)
-
-        def test_case(dualball_case):
-            assert dualball_case.error(dualball_case.exact) == 0
-        """
-    )
-    found = pytester.runpytest_inprocess(*INSTALLED, "-k", "theory or drilling")
-    found.assert_outcomes(passed=2, deselected=found.parseoutcomes()["deselected"])
 
 
 def test_runs_that_do_not_use_it(pytester):
