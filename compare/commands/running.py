@@ -19,7 +19,7 @@ from model.parameters import REACH, Range, check_names, check_number, parse_numb
 
 
 def flow(args: argparse.Namespace) -> Flow | None:
-    """The flow that the options of `add_flow` describe; None for a steady one."""
+    """The flow that the options of `simulate` describe; None for a steady one."""
     chosen = [name for name in ("ramp", "staircase", "sine", "flow") if getattr(args, name)]
     if chosen and args.parameter_omega_0 is not None:
         raise InputError(f"--omega-0 is for a steady flow, and can't be given beside --{chosen[0]}")
@@ -47,7 +47,7 @@ def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
 
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
-    """The run of a ball that the options of `add_engine`, `add_start`, `add_samples` and ``--time`` describe."""
+    """The run of a ball that the options of `add_engine`, `add_start`, ``--sample-interval`` and ``--time`` say."""
     chosen = settings(args, p)
     step = getattr(chosen, "timestep", None) or 0.0
     check_number("time", args.time or step, "s", Range(step), "to hold a time step it")
