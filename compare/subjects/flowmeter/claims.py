@@ -119,7 +119,7 @@ OFF = 0.05
 """By how much, relatively, the friction of a meter may be off whose limits are claimed."""
 
 
-def _meant(m: Measurement, off: float) -> dict[str, float]:
+def _nominal_friction(m: Measurement, off: float) -> dict[str, float]:
     """Nominal friction of a meter, of whose tolerance `off` the measured ball is the worst case (the best if off < 0).
 
     Less friction slips sooner; a rougher wall carries the ball sooner.
@@ -145,15 +145,15 @@ def _exact(m: Measurement) -> float:
 
 
 def _worst(m: Measurement) -> float:
-    """The flow up to which a design covers all that the tolerances of a meter allow."""
-    meant = _meant(m, OFF)
-    return design.choice(m.parameters.replace, meant, dict.fromkeys(meant, OFF), fastest=1.0).margin
+    """The flow up to which a design covers a meter of nominal friction, whatever it is within the tolerance."""
+    nominal = _nominal_friction(m, OFF)
+    return design.choice(m.parameters.replace, nominal, dict.fromkeys(nominal, OFF), fastest=1.0).margin
 
 
 def _end_of_spread(m: Measurement, end: int) -> float:
-    """The least (0) or the most (1) that a design says a threshold of a meter may be."""
-    meant = _meant(m, (OFF, -OFF)[end])
-    corners = list(design.corners(m.parameters.replace, meant, dict.fromkeys(meant, OFF)))
+    """The lowest (end 0) or highest (1) value of a threshold that a design gives for a meter's tolerance."""
+    nominal = _nominal_friction(m, (OFF, -OFF)[end])
+    corners = list(design.corners(m.parameters.replace, nominal, dict.fromkeys(nominal, OFF)))
     return design.threshold_spread(corners)[m.quantity][end]
 
 
@@ -265,8 +265,8 @@ CLAIMS = (
     claim(
         "design-limit",
         "extension",
-        "The operating range of a meter ends where its design says: with friction off by 5 %, at the worst and "
-        "the best limit of the meter as it was meant. ω₀₂ changes with the wall's friction by the power that it says.",
+        "The operating range of a meter ends where its design says; with friction 5 % off its nominal value, at the "
+        "lowest or the highest limit of that tolerance. ω₀₂ follows the wall's friction by the design's sensitivity.",
         *(
             Bearing("thresholds", end, _exact, when=all_of(first, _stokes), by=_DESIGN)
             for end, first in _ENDS_OF_RANGES

@@ -139,7 +139,7 @@ class Findings:
 
 
 def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
-    """For each kind of change the bracket of flows between which settled cases differ, so where to look for it.
+    """For each kind of change a bracket to search: the flows of settled states between which the case changes.
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one on trial looks where
     that one found something.
