@@ -82,7 +82,7 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
 
 
 def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
-    """Points to measure next: midpoints between neighbours that differ, for each kind of border, and by points of rare kinds.
+    """Points to measure next: midpoints between neighbours of other cases, at each kind of border, and at rare cases.
 
     A set of cases is rare if it was seen less than half as often as if all were seen equally often.
     """
