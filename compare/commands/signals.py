@@ -87,23 +87,22 @@ def raised() -> Iterator[None]:
     """A context in which the first signal raises `Interrupted`, also where a library makes another error of it.
 
     It comes again a little later while something is imported, since half an import would spoil the next ones; and where
-    Python lost what it raised, as when an object ends.
+    Python lost what it raised, as when an object ends. At the end of the context it waits no longer.
     """
-    heard, waits, usual = list[int](), list[int](), sys.unraisablehook
+    heard, sent, usual = list[int](), list[threading.Timer](), sys.unraisablehook
 
     def send_again(number: int) -> None:
         listen()
-        _send_later(number, 0.01)
+        sent.append(_send_later(number, 0.01))
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         """Raise `Interrupted`, or send the signal again later if something is being imported."""
+        heard.append(number)
         while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
             frame = frame.f_back
-        if frame and len(waits) < _WAITS:
-            waits.append(number)
+        if frame and len(sent) < _WAITS:
             send_again(number)
         else:
-            heard.append(number)
             raise Interrupted(number)
 
     def on_unraisable(what: sys.UnraisableHookArgs) -> None:
@@ -116,12 +115,16 @@ def raised() -> Iterator[None]:
         with on_first_signal(interrupt) as listen:
             sys.unraisablehook = on_unraisable
             yield
+            if any(each.is_alive() for each in sent):
+                raise Interrupted(heard[-1])
     except Exception as error:
         if heard:
             raise Interrupted(heard[0]) from error
         raise
     finally:
         sys.unraisablehook = usual
+        for each in sent:
+            each.cancel()
 
 
 def end(number: int, frame: FrameType | None) -> NoReturn:
