@@ -17,8 +17,6 @@ from tests.exact_cases import CASES, LISTED
 NAMES = [name for name, *_ in LISTED["cases"]]
 UP = np.array([0.0, 0.0, 1.0])
 SHARP = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12}
-NEAR = 1e-6
-"""Half the time over which a difference makes the rate of a contact's place, s."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -65,7 +63,7 @@ def newton(case, touching=None, friction=()):
     what it touches; `friction` the coefficients, None for what rolls. All forces are solved for together from what
     keeps contacts closed and, where they roll, without slip; least squares where that leaves some open.
     """
-    body, count = case.body, len(friction)
+    body, count, near = case.body, len(friction), 1e-6  # s, half the time of a difference
 
     def rates(t, state):
         (w, *axis), velocity, spin = state[3:7], state[7:10], state[10:]
@@ -75,11 +73,11 @@ def newton(case, touching=None, friction=()):
         linear = np.array(case.force(t, state[:3], velocity)) / body.mass - case.g * UP
         found = np.concatenate([linear, np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))])  # without contacts
         if count:
-            now, after, before = (np.array(touching(state[:7] + d * begin)) for d in (0.0, NEAR, -NEAR))
+            now, after, before = (np.array(touching(state[:7] + d * begin)) for d in (0.0, near, -near))
             crosses = [np.cross(arm, np.eye(3)).T for arm, _, _ in now]
             pushed = [np.vstack([np.eye(3) / body.mass, np.linalg.solve(inertia, cross)]) for cross in crosses]
             of_forces, rows, right = np.hstack(pushed), [], []  # rows of what all forces must come to
-            for k, ((arm, normal, under), rate) in enumerate(zip(now, (after - before) / (2 * NEAR), strict=True)):
+            for k, ((arm, normal, under), rate) in enumerate(zip(now, (after - before) / (2 * near), strict=True)):
                 slip, of_slip = velocity + np.cross(spin, arm) - under, np.hstack([np.eye(3), -crosses[k]])
                 rest = rate[2] - np.cross(spin, rate[0]) - of_slip @ found
                 if friction[k] is None:

@@ -218,54 +218,51 @@ CONTRAST = """(() => {
 })()"""
 
 
-@pytest.fixture
-def opened(tab, page):
+def test_claims_are_found_and_sorted_and_numbers_found(tab, page):
     tab.goto(f"{page.as_uri()}#good")
-    return tab
 
-
-def test_claims_are_found_and_sorted_and_numbers_found(opened):
     def shown():
-        return opened.locator("details.claim:visible").evaluate_all("rows => rows.map(row => row.id)")
+        return tab.locator("details.claim:visible").evaluate_all("rows => rows.map(row => row.id)")
 
-    opened.fill("#find", "slip PROP. bro")
+    tab.fill("#find", "slip PROP. bro")
     assert shown() == ["broken"]
-    opened.fill("#find", "")
-    opened.select_option("#outcome", "inconclusive")
+    tab.fill("#find", "")
+    tab.select_option("#outcome", "inconclusive")
     assert shown() == ["coarse"]
-    opened.select_option("#outcome", "")
+    tab.select_option("#outcome", "")
     for order in (["bad", "doubted", "good", "broken", "coarse"], ["good", "doubted", "bad", "coarse", "broken"]):
-        opened.click("[data-sort=id]")
+        tab.click("[data-sort=id]")
         assert shown() == order  # within each section
 
     def found(flow, words):
-        opened.fill("#flow", flow)
-        opened.fill("#words", words)
-        return [line.split("\t") for line in opened.locator("#numbers-found tr").all_inner_texts()]
+        tab.fill("#flow", flow)
+        tab.fill("#words", words)
+        return [line.split("\t") for line in tab.locator("#numbers-found tr").all_inner_texts()]
 
     assert [cells[1] for cells in found("13.02", "")] == ["13"] * 4
     assert [cells[1] for cells in found("13.4", "good")] == ["13"]  # the nearest
     assert found("", "good SS") == []
     assert len(found("", "good RR")) == report.ROWS + 40
-    opened.click("[data-claim=good]")
-    assert opened.input_value("#words") == "good"
+    tab.click("[data-claim=good]")
+    assert tab.input_value("#words") == "good"
     first = found("", "good")[0]
     assert first[:3] + first[4:] == ["reference", "12", "ωc rad/s", "mujoco", "12", "1e-9", "12", "0", "3e-9", "good"]
 
 
-def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_legible_and_prints(opened):
+def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_legible_and_prints(tab, page):
     """All rows open, on a phone, too; text against its ground has the contrast 4.5 of WCAG AA, light and dark."""
-    assert opened.locator("details.claim[open]").evaluate_all("rows => rows.map(row => row.id)") == ["good"]
+    tab.goto(f"{page.as_uri()}#good")
+    assert tab.locator("details.claim[open]").evaluate_all("rows => rows.map(row => row.id)") == ["good"]
     for width in (390, 1200):
-        opened.set_viewport_size({"width": width, "height": 844})
-        assert opened.evaluate(OPEN) <= width
+        tab.set_viewport_size({"width": width, "height": 844})
+        assert tab.evaluate(OPEN) <= width
     contrast = set()
     for scheme in ("light", "dark"):
-        opened.emulate_media(color_scheme=scheme)
-        contrast.add(opened.evaluate(CONTRAST))
+        tab.emulate_media(color_scheme=scheme)
+        contrast.add(tab.evaluate(CONTRAST))
     assert min(contrast) >= 4.5
     assert len(contrast) == 2
-    printed = opened.pdf()
+    printed = tab.pdf()
     assert printed.startswith(b"%PDF")
     assert len(re.findall(rb"/Type ?/Page\b[^s]", printed)) > 1
 
