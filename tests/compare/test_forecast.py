@@ -23,11 +23,12 @@ from tests.commands import carried_out, told
 from tests.exact_cases import CASES
 
 FLOOR = '<geom name="floor" type="plane" size="20 20 .1" {}/>'
+SPHERE, BLOCK = 'type="sphere" size=".05"', 'type="box" size=".05 .05 .05"'
 GROUND, SLOPE = FLOOR.format(""), FLOOR.format('euler="0 15 0"')
 
 
-def box(place=".013 0 .0525", angle="0 15 0", name="box"):
-    geom = f'<geom name="{name}" type="box" size=".05 .05 .05" mass="1"/>'
+def box(place=".013 0 .0525", angle="0 15 0", name="box", shape=BLOCK):
+    geom = f'<geom name="{name}" {shape} mass="1"/>'
     return f'<body name="{name}" pos="{place}" euler="{angle}"><freejoint/>{geom}</body>'
 
 
@@ -46,13 +47,8 @@ GRIPPER = FINGER.format("left", -0.0305) + FINGER.format("right", 0.0305)
 GRIPPER += '<body name="rod" pos="0 0 .2"><freejoint/><geom name="rod" type="capsule" size=".02 .03" mass=".1"/></body>'
 SQUEEZE = '<actuator><motor joint="left" ctrlrange="-9 9"/><motor joint="right" ctrlrange="-9 9"/></actuator>'
 SQUEEZE += '<keyframe><key name="held" ctrl="5 -5"/></keyframe>'
-BALL = SLOPE + (
-    '<body name="ball" pos=".013 0 .0515"><freejoint/>'
-    '<geom name="ball" type="sphere" size=".05" mass="1" condim="6" friction=".6 .01 .03"/></body>'
-)
-PAIR = (
-    '<contact><pair geom1="floor" geom2="box" friction=".7 .5 .01 .001 .001" solreffriction="{}" condim="4"/></contact>'
-)
+BALL = SLOPE + box(".013 0 .0515", "0 0 0", "ball", f'{SPHERE} condim="6" friction=".6 .01 .03"')
+PAIR = '<contact><pair geom1="floor" geom2="box" friction=".7 .5 .01" solreffriction="{}" condim="4"/></contact>'
 WHEEL = (
     '<body pos="{0} {1} 0"><joint axis="0 1 0" frictionloss="1"/>'
     '<geom name="wheel{2}" type="cylinder" size=".05 .02" euler="90 0 0" mass=".3"/></body>'
@@ -127,7 +123,6 @@ def test_depth_creep_and_turning_are_as_predicted(scene):
 
 # A body that a moving floor drags under a guide; how far its place is from where it was put, and its pair.
 GUIDED = '<body pos="0 0 .0495"><joint type="slide" axis="0 0 1"/><geom name="box" {} mass="1"/></body>'
-SPHERE, BLOCK = 'type="sphere" size=".05"', 'type="box" size=".05 .05 .05"'
 SLIDING = {
     "elliptic": ('cone="elliptic"', 'friction=".6"', SPHERE),
     "springs": ('cone="elliptic"', 'friction=".3" solref="-3000 -80"', SPHERE),
@@ -159,7 +154,7 @@ def test_contact_is_lost_from_the_predicted_speed_on(name):
 
 
 LEVEL = GROUND + box(place="0 0 .0499", angle="0 0 0")
-ROUND = '<body name="ball" pos="0 0 .0499"><freejoint/><geom name="ball" type="sphere" size=".05" mass="1"/></body>'
+ROUND = box("0 0 .0499", "0 0 0", "ball", SPHERE)
 UNSAFE = '<flag refsafe="disable"/>'
 STEPS = {
     "springs": mjcf(LEVEL, 'cone="elliptic"', 'solref="-5000 -100"'),
@@ -215,9 +210,7 @@ def test_advice_does_what_it_says(scene):
         assert pair.creep_measured < 1e-3 * forecast.CREEP
 
 
-CLOTH = (
-    '<flexcomp name="c" type="grid" count="4 4 1" spacing=".05 .05 .05" pos="1 1 .1" radius=".01" mass=".1" dim="2">'
-)
+CLOTH = '<flexcomp name="c" type="grid" count="4 4 1" spacing=".05 .05 .05" pos="1 1 .1" radius=".01" mass=".1">'
 CLOTH += '<edge equality="true"/></flexcomp>'
 FALLING = '<body name="stone"><freejoint/><geom size=".1"/></body>'
 REFUSED = {

@@ -223,8 +223,16 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     expect = pytest.importorskip("playwright.sync_api").expect
     expect.set_options(timeout=60_000)  # until theory is compiled
     page, other = (browser.new_page(viewport={"width": 1500, "height": 900}) for _ in range(2))
+    other.goto(address)
+    # A run is saved that is not simulated yet: two files are asked for at once, as soon as there are buttons.
+    with (
+        other.expect_download(lambda each: each.suggested_filename == "run.h5", timeout=60_000),
+        other.expect_download(lambda each: each.suggested_filename == "set.toml", timeout=60_000),
+    ):
+        other.get_by_text("Run as HDF5").click()
+        other.get_by_text("Set as TOML").click()
+    page.goto(address)
     for tab in (page, other):
-        tab.goto(address)
         tab.wait_for_selector(".map .nsewdrag", timeout=60_000)
 
     def shows(text):
@@ -265,19 +273,6 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     assert (p.eta, p.omega_0) == (pytest.approx(0.6, abs=0.02), pytest.approx(60, abs=1.5))
     assert run.header.parameters == p
     assert run.omega_c[0] == pytest.approx(60, abs=1.5)
-
-
-def test_a_run_is_saved_that_is_not_simulated_yet(browser, address):
-    """Two files are asked for at once, as soon as there are buttons: both come."""
-    page = browser.new_page()
-    page.goto(address)
-    with (
-        page.expect_download(lambda each: each.suggested_filename == "run.h5", timeout=60_000),
-        page.expect_download(lambda each: each.suggested_filename == "set.toml", timeout=60_000),
-    ):
-        page.get_by_text("Run as HDF5").click()
-        page.get_by_text("Set as TOML").click()
-    page.close()
 
 
 @pytest.mark.slow

@@ -110,10 +110,10 @@ def test_the_worst_numbers_come_first_no_section_is_empty_and_nothing_is_fetched
 
 
 def test_every_number_is_on_the_page():
-    (check,), far = checks(1), checks(1, 0.5)[0]
-    m = dataclasses.replace(check.measurement, value=12.3456789, uncertainty=2.3e-4)
+    both = *checks(1), *checks(1, 0.5)
+    m = dataclasses.replace(both[0].measurement, value=12.3456789, uncertainty=2.3e-4)
     alone = dataclasses.replace(m, quantity="case", value=1.0, uncertainty=0.0, conditions={"start": "rest"})
-    check, far = (dataclasses.replace(each, measurement=m) for each in (check, far))
+    check, far = (dataclasses.replace(each, measurement=m) for each in both)
     again = dataclasses.replace(m)  # a copy, as another process returns it
     columns = report.columns(Records((again, alone)), {"good": (check,), "bad": (far,)})
     assert columns["claim"] == ["good", "bad", ""]
