@@ -3,7 +3,6 @@
 Settings of an MJCF file reach the engine of the league as MuJoCo itself reads them.
 """
 
-import dataclasses
 import itertools
 import json
 import math
@@ -16,7 +15,6 @@ import pytest
 
 from compare.adapters.mujoco_free import Bodies
 from compare.bench import forecast, forecast_page, native
-from compare.bench.native import Pair
 from compare.bench.settled import STILL, settle
 from model import InputError
 from tests.commands import carried_out, told
@@ -370,42 +368,31 @@ def test_the_league_takes_the_settings_of_a_file(tmp_path, capsys, monkeypatch):
     assert mine["errors"][-1] < usual["errors"][-1] / 30
 
 
-def test_settings_come_through_to_the_engine(tmp_path):
-    text = (
-        'integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" tolerance="1e-5" '
-        'noslip_iterations="2"'
-    )
-    A, B = Pair(solref=(0.005, 0.8), margin=1e-4), Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3))
-    given = dataclasses.replace(read(tmp_path, mjcf(GROUND + WALL + SMALL, text)), A=A, B=B)
-    body = Bodies("mine", "", tune=given.tune)
-    body.build(CASES["rolls-on-both"], 0.0015)
-    option = body.model.opt
-    assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
-    assert (option.impratio, option.iterations, option.cone) == (7.0, 33, mujoco.mjtCone.mjCONE_ELLIPTIC)
-    assert (option.integrator, option.solver) == (mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtSolver.mjSOL_CG)
-    for k, geom in enumerate(body.model.pair_geom1):
-        if body.model.geom(geom).name == "floor":
-            assert (*body.model.pair_solref[k], body.model.pair_margin[k]) == (0.005, 0.8, 1e-4)
-        else:
-            assert body.model.pair_solimp[k].tolist() == [0.2, 0.3, 0.01, 0.4, 3]
-
-
-def test_geoms_are_mixed_as_the_engine_does(tmp_path):
-    """Against the contact that MuJoCo itself makes."""
+def test_settings_come_through_to_the_engine_and_geoms_are_mixed_as_it_does(tmp_path):
+    """Against the contacts that MuJoCo itself makes."""
     text = mjcf(
         '<geom name="floor" type="plane" size="1 1 1" solref="0.01 0.9" solmix="3" margin="0.001"/>'
         '<geom name="wall" type="box" size="0.1 1 1" pos="0.1095 0 0" solimp="0.5 0.6 0.01" priority="1"/>'
-        '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 1.1"/></body>'
+        '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 1.1"/></body>',
+        'integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" tolerance="1e-5" '
+        'noslip_iterations="2"',
     )
-    of_scene, model = read(tmp_path, text), mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    given, body = mujoco.MjModel.from_xml_string(text), Bodies("mine", "", tune=read(tmp_path, text).tune)
+    data = mujoco.MjData(given)
+    mujoco.mj_forward(given, data)
     assert data.ncon == 2
-    for contact in data.contact:
-        pair = of_scene.A if model.geom("floor").id in contact.geom else of_scene.B
-        assert pair.solref == pytest.approx(tuple(contact.solref))
-        assert pair.solimp == pytest.approx(tuple(contact.solimp))
-        assert pair.margin == pytest.approx(contact.includemargin)
+    body.build(CASES["rolls-on-both"], 0.0015)
+    model, option = body.model, body.model.opt
+    assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
+    assert (option.impratio, option.iterations, option.cone) == (7.0, 33, mujoco.mjtCone.mjCONE_ELLIPTIC)
+    assert (option.integrator, option.solver) == (mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtSolver.mjSOL_CG)
+    assert model.npair >= 2
+    for k, geom in enumerate(model.pair_geom1):
+        floor = model.geom(geom).name == "floor"
+        (contact,) = (each for each in data.contact if (given.geom("floor").id in each.geom) == floor)
+        assert model.pair_solref[k] == pytest.approx(contact.solref)
+        assert model.pair_solimp[k] == pytest.approx(contact.solimp)
+        assert model.pair_margin[k] == pytest.approx(contact.includemargin)
 
 
 @pytest.mark.parametrize(

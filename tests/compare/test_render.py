@@ -36,7 +36,6 @@ def run():
 
 @pytest.fixture
 def draws():
-    render.choose_opengl.cache_clear()
     try:
         render.choose_opengl()
     except InputError as error:
@@ -142,22 +141,18 @@ def test_a_run_is_shown_between_its_samples(run):
         ("p.gif", {"at": 2.0}, "at = 2 s is out of range"),
         ("p.gif", {"speed": 0.0}, "speed = 0 is out of range"),
         ("p.html", {"speed": 0.05, "rate": 1000}, r"1\.6e\+04 frames are more than 8000: choose a shorter time, or"),
+        ("p.png", {"mjcf": "<mujoco/>"}, "no geom named 'ball'"),
+        ("p.png", {"mjcf": "<mujoco"}, "no valid MJCF"),
         ("p.html", {"rate": 10}, r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'"),
     ],
 )
 def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name, options, message):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    header = dataclasses.replace(run.header, mjcf=options.pop("mjcf", run.header.mjcf))
     with pytest.raises(InputError, match=message):
-        render.write(run, Path(name), **options)
+        render.write(dataclasses.replace(run, header=header), Path(name), **options)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_scene_without_a_ball(run, tmp_path):
-    for mjcf, message in (("<mujoco/>", "no geom named 'ball'"), ("<mujoco", "no valid MJCF")):
-        other = dataclasses.replace(run, header=dataclasses.replace(run.header, mjcf=mjcf))
-        with pytest.raises(InputError, match=message):
-            render.write(other, tmp_path / "p.png", 0.0, WIDTH)
 
 
 def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch):
