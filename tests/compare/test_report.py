@@ -164,9 +164,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("part", "other", "message"),
     [
-        (".*", "{", "holds no summary that this program reads: Expecting"),
-        (".*", "[]", "holds no summary that this program reads: list"),
-        ('"schema_version": 5', '"schema_version": 4', "in another format"),
+        ('"schema_version": 5', '"schema_version": 4', "holds no summary that this program reads: .* another format"),
         ('"dualball": "[^"]*"', '"dualball": "0.0.0"', "holds results of dualball 0.0.0"),
     ],
 )

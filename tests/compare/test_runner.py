@@ -109,9 +109,7 @@ def test_a_league_of_one(tmp_path, capsys):
     assert len(tried) == sum(not case.needs for case in cases()) - 1
     assert sum(result["passed"] for result in tried) == 14
     assert not any(result["failure"] for result in tried)
-    page = (tmp_path / "league.html").read_text("utf-8")
-    assert '<figure class="plot"' in page
-    assert "no forces" in page
+    assert "no forces" in (tmp_path / "league.html").read_text("utf-8")
     said = refused(capsys, f"league --engine no.such -o {tmp_path} --quiet")
     assert "nothing to compare: no.such can't be used: ModuleNotFoundError: No module" in said
 
