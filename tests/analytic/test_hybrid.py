@@ -24,9 +24,6 @@ def changes(run):
     return [(Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True)]
 
 
-# --- a motion begins in each case as its vector field says, and spends the energy that drag and friction take ---------
-
-
 STEP, RAMP = 1e-6, Flow.ramp(17.0, 20.0, 1.0)
 
 

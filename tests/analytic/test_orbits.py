@@ -111,9 +111,6 @@ def test_no_orbit_and_bad_input(hop):
         orbit_branch.follow(hop, "eta", 0.2, 0.3)
 
 
-# --- what motions come to, from many starts ------------------------------------------------------------------
-
-
 SLIPS, RIDES = (0, 0, 20, 0, 0, 0), (0.03, 0, 69, -100, 0, 0)
 
 

@@ -184,9 +184,6 @@ def test_the_end_is_always_a_sample():
     assert run.time.tolist() == [0.0, 1 / frequency]
 
 
-# --- time stepping settles in every step, or says so; claim two-methods has its limit of no step
-
-
 @pytest.mark.parametrize(
     ("omega_c", "given"),
     [

@@ -30,7 +30,7 @@ from tests.mutants.theories import THEORIES
 Outcomes = dict[str, Outcome]
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
 """Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
-PATIENCE = 40.0
+PATIENCE = 20.0
 """Processor time that the predictions of a claim may take under a wrong theory, s; several times what they need."""
 KINDS = "by_numbers", "by_error", "by_hanging", "missed"
 """How a wrong theory may be noticed."""
