@@ -192,10 +192,10 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
             new = after
             # Changes shrink at a steady rate: what is left is this one times the rate.
             settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
-            if (settled and residual <= enough) or not residual <= aim:
+            converged = settled and residual <= enough
+            if converged or not residual <= aim:
                 break
             last = change
-        converged = settled and residual <= enough
         if converged:
             break
     u = mean(old, new)
