@@ -167,8 +167,7 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
             u = mean(old, new)
             x_i = at.h - p.R + dt / 2 * u.v_h
             x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
-            # (20) with (9), no contact
-            w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
+            w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i  # (20) with (9), no contact
             c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
             f_h = v_h - dt * (spin * u.v_k + c * w_h)
             f_y = v_y - dt * (p.g + c * u.v_y)
