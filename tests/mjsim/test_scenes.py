@@ -1,4 +1,4 @@
-"""Small scenes of what users build: what memory holds still, and what it leaves alone."""
+"""Small scenes of what users build, and robots that others wrote: what memory holds still, and what it leaves alone."""
 
 import pytest
 
@@ -65,6 +65,14 @@ def test_flexes_are_left_to_mujoco():
     for run in (one, other):
         run.advance(0.1)
     assert other.data.qpos == pytest.approx(one.data.qpos, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ant", "quadruped", "sawyer", "egg", pytest.param("lift", marks=pytest.mark.slow)])
+def test_robots_hold_still(name):
+    pytest.importorskip(SCENES[name].package, reason="where its scene comes from")
+    plain, soft = both(SCENES[name].run)
+    assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
+    assert not soft.wrong
 
 
 def test_a_scene_says_what_failed():

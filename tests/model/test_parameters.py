@@ -15,7 +15,7 @@ from model.drag import LAWS
 from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, Range, check_number, parse_number
 
 FIELDS = [f.name for f in Parameters.quantities()]
-positive = st.floats(1e-9, 1e9)
+REFERENCE = Parameters.named("reference")
 
 
 def zero_or(most):
@@ -24,13 +24,10 @@ def zero_or(most):
 
 valid = st.builds(
     Parameters,
-    m=positive,
-    r=positive,
-    R=positive,
+    **dict.fromkeys(("m", "r", "R", "g"), st.floats(1e-9, 1e9)),
     j=st.floats(1e-9, 2 / 3),
     mu=zero_or(10),
     eta=zero_or(10),
-    g=positive,
     c=zero_or(1e3),
     omega_0=zero_or(1e6) | st.floats(-1e6, -1e-9),
     nu_f=st.floats(1e-9, 1e3),
@@ -42,7 +39,7 @@ valid = st.builds(
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_law_of_drag_beside_a_fluid(tmp_path, law, reference):
+def test_a_law_of_drag_beside_a_fluid(tmp_path, law):
     (tmp_path / "p.toml").write_text(
         f'r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\ndrag = "{law}"\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 4.0'
     )
@@ -51,7 +48,7 @@ def test_a_law_of_drag_beside_a_fluid(tmp_path, law, reference):
     p.save(tmp_path / "again.toml")
     assert Parameters.load(tmp_path / "again.toml") == p
     names = ("m", "r", "R", "j", "mu", "eta", "g", "c", "omega_0")  # without a law: Stokes'
-    assert Parameters.from_mapping({name: getattr(reference, name) for name in names}) == reference
+    assert Parameters.from_mapping({name: getattr(REFERENCE, name) for name in names}) == REFERENCE
 
 
 def test_drag_and_gravity_follow_from_the_fluid():
@@ -81,22 +78,22 @@ def test_dimensionless_groups_do_not_depend_on_units(p, length, time):
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_a_bad_value_is_named_with_unit_and_range(name, reference):
+def test_a_bad_value_is_named_with_unit_and_range(name):
     field = Parameters.__dataclass_fields__[name]
     bad = [-1e-12] * (name != "omega_0") + [0.0] * (name in ("m", "r", "R", "j", "g", "C_D"))
     for value in (*bad, *{"j": [0.67], "density_ratio": [1.0]}.get(name, [])):
         with pytest.raises(InputError) as caught:
-            reference.replace(**{name: value})
+            REFERENCE.replace(**{name: value})
         message = str(caught.value)
         assert message.startswith(f"{name} = {value:g} {field.metadata['unit']}".removesuffix(" 1"))
         assert str(field.metadata["allowed"]) in message
         assert "\n" not in message
     for value in (math.nan, math.inf, -math.inf):
         with pytest.raises(InputError, match=rf"^{name} = .*must be finite"):
-            reference.replace(**{name: value})
+            REFERENCE.replace(**{name: value})
     for value in ("0.2", None, True, [0.2], 1j):
         with pytest.raises(InputError, match=f"^{name} = .*must be a number"):
-            reference.replace(**{name: value})
+            REFERENCE.replace(**{name: value})
 
 
 @pytest.mark.parametrize(
@@ -151,11 +148,11 @@ def test_a_bad_file_is_one_clear_line(tmp_path, text, says):
     assert "\n" not in str(caught.value)
 
 
-def test_files_that_cannot_be_read_or_written(tmp_path, reference):
+def test_files_that_cannot_be_read_or_written(tmp_path):
     with pytest.raises(StorageError, match="No such file"):
         Parameters.load(tmp_path / "absent.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(StorageError, match="not valid TOML"):
         Parameters.load(tmp_path / "binary.toml")
     with pytest.raises(StorageError, match="cannot write"):
-        reference.save(tmp_path / "absent" / "p.toml")
+        REFERENCE.save(tmp_path / "absent" / "p.toml")
