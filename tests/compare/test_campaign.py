@@ -75,17 +75,17 @@ def undisturbed(tmp_path_factory):
 
 def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
     """Of runs of 201 samples each no file is read twice in a campaign, as long as there is room."""
-    loaded, read = [], storage.load_runs
+    loaded, told, read = [], [], storage.load_runs
     monkeypatch.setattr(storage, "load_runs", lambda path: [loaded.append(path), read(path)][1])
     for room, times in ((2**19, [2, 2, 4, 4]), (500, [2, 4, 6, 8])):
         monkeypatch.setattr("compare.kit.campaign.READ", room)
         seen = []
         for _ in range(2):
-            with Campaign(tmp_path / str(room), workers=0, batch=2) as campaign:
+            with Campaign(tmp_path / str(room), 0, 2, report=lambda *now: told.append(now), doing="it") as campaign:
                 for _ in range(2):
                     campaign.run(tasks(4))
                     seen.append(len(loaded))
-        assert seen == times
+        assert (seen, told[-1]) == (times, ("it", 4, 4, 0))
         loaded.clear()
 
 

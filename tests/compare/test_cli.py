@@ -31,10 +31,7 @@ from tests.commands import COMMANDS, ROOT, carried_out, parser_of, refused, told
         ("--omega_0 25", r"the ball slips \(SS\)"),
         ("--set reference", "slip at both points"),
         ("--set high-wall-friction", "the wall can carry it"),
-        (
-            "--set plastic-in-oil",
-            "^Warning: the paper's model doesn't hold for this fluid.*changes its numbers by",
-        ),
+        ("--set plastic-in-oil", "^Warning: the paper's model doesn't hold for this fluid.*changes its numbers by"),
         ("--set plastic-in-oil", r"two-point rolling.* would be [\d.]+ rad/s \(-\d+ %\)"),  # by the fluid's torque
         ("--set steel-in-water", "the fluid's inertia .*: it would shift ω₀₁ by "),
         ("--set steel-in-water --omega-0 20 --drag stokes", r"Warning: Re = \d+ in SS, "),
@@ -109,12 +106,7 @@ def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeyp
 
 @pytest.mark.parametrize(
     ("flow", "last"),
-    [
-        ("--ramp 10 20 0.2", 20),
-        ("--staircase 0.1 10 12 14", 14),
-        ("--sine 10 2 2.5 1 5", 8),
-        ("--flow flow.csv", 9),
-    ],
+    [("--ramp 10 20 0.2", 20), ("--staircase 0.1 10 12 14", 14), ("--sine 10 2 2.5 1 5", 8), ("--flow flow.csv", 9)],
 )
 def test_flows(tmp_path, monkeypatch, capsys, flow, last):
     monkeypatch.chdir(tmp_path)

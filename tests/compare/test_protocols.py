@@ -61,6 +61,8 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, mo
     left = Records.of(PROTOCOLS[name](lab))
     assert ["the run diverged at once" in missing.reason for missing in left.missing].count(True) == 1
     assert sum(missing.rows for missing in left.missing if "at once" in missing.reason) < len(left.measurements)
+    if name == "pulsation":
+        assert {m.quantity for m in left.measurements} == {"gain", "phase_lag", "slip_amplitude", "mean_error"}
 
 
 @pytest.mark.parametrize(
