@@ -28,6 +28,8 @@ from model.files import make_directory, write_text
 
 _FRAME = 1e-6, 10.0
 """Deviations, in parts of the tolerance, that are drawn where they are; what is less or more stands at the edge."""
+_MANY = 100
+"""Points beyond which marks are small and hollow."""
 _WIDTH, _BELOW = 7.0, 0.48
 """Of a figure of deviations, and of what is below its frame, inches."""
 Checks = tuple[Check, ...]
@@ -84,7 +86,7 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     for k, name in enumerate(engines):
         for fine, bad in ((agrees, {}), (~agrees, {"color": style.FORCE, "label": f"_{name}"})):
             own = fine & (engine == k)
-            look = style.mark_of(name) | ({"ms": 3, "mfc": "none"} if len(checks) > 100 else {"ms": 4.5})
+            look = style.mark_of(name) | ({"ms": 3, "mfc": "none"} if len(checks) > _MANY else {"ms": 4.5})
             axes.plot(parts[own], lanes[own], ls="none", clip_on=False, **{"label": name} | look | bad)
     axes.set_yticks(range(len(names)), [style.symbol(name) for name in names])
     axes.set(xscale="log", xlim=_FRAME, ylim=(len(names) - 0.5, -0.5), xlabel="|measured − predicted|/tolerance")

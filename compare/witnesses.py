@@ -17,11 +17,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import or_
 from statistics import median
-from typing import Any
+from typing import Self
 
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
@@ -117,15 +117,11 @@ def _testify(
     if not shared and not any(found.values()):
         reasons = ["at this level nothing that bears on the claim was asked of it", *map(str, missing[:3])]
         return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason="; ".join(reasons))
-    if by.allowance:  # its numbers have a share of their scales as tolerance, since their errors have no limit
-        checks, orders = (
-            tuple(
-                replace(c, tolerance=by.allowance * c.scale, ceiling=2 * by.allowance)
-                if quantity(c.measurement.quantity).resolves
-                else c
-                for c in found[max(found)]
-            ),
-            list[float](),
+    orders = list[float]()
+    if share := by.allowance:  # numbers may be off by a share of their scales, since their errors have no limit
+        checks = tuple(
+            replace(c, tolerance=share * c.scale, ceiling=2 * share) if quantity(c.measurement.quantity).resolves else c
+            for c in found[max(found)]
         )
     else:
         limits = [limit for row in _sequences_by_step(found, finest) if (limit := _limit_of_no_step(row, ends))]
@@ -169,16 +165,31 @@ def _numbers_of(m: Measurement) -> dict[str, float]:
     return numbers | {name: getattr(m.parameters, name) for name in ("omega_0", "c", "mu", "eta")}
 
 
+@dataclass(frozen=True)
+class Alike:
+    """What checks of one thing with different time steps share: all but the numbers among their conditions."""
+
+    protocol: str
+    bearing: int
+    set: str
+    texts: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(cls, check: Check) -> Self:
+        """What a check shares with those of the same thing with other steps."""
+        m = check.measurement
+        texts = sorted((name, value) for name, value in m.conditions.items() if isinstance(value, str))
+        return cls(m.protocol, check.bearing, m.set, tuple(texts))
+
+
 def _sequences_by_step(found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]) -> Iterator[list[Step]]:
     """For each check with the finest step of its protocol: those of the same with coarser steps, and itself last."""
-    groups: dict[int, dict[Any, list[Check]]] = {n: {} for n in sorted(found)}
+    groups: dict[int, dict[Alike, list[Check]]] = {n: {} for n in sorted(found)}
     for n, group in groups.items():
-        for check in found[n]:  # those of one thing share all but the numbers among their conditions
-            m = check.measurement
-            texts = sorted((name, value) for name, value in m.conditions.items() if isinstance(value, str))
-            group.setdefault((m.protocol, check.bearing, m.set, *texts), []).append(check)
+        for check in found[n]:
+            group.setdefault(Alike.of(check), []).append(check)
     for n, kind, last in [(n, kind, own) for n, group in groups.items() for kind, own in group.items()]:
-        if n == finest[last[0].measurement.protocol]:
+        if n == finest[kind.protocol]:
             steps: list[list[Step]] = [[] for _ in last]
             for coarser, others in [(m, group[kind]) for m, group in groups.items() if m < n and kind in group]:
                 for i, k in _pair_nearest(last, others):

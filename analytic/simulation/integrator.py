@@ -60,21 +60,16 @@ def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, fir
     return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 
 
-def finish_straight(t: float, of: Stretch, taken: int) -> bool:
-    """Whether a straight line solves the equations for the rest of a stretch and no guard fires; it is then filled in.
+def finish_straight(t: float, of: Stretch, taken: int) -> int:
+    """Fill in the rest of a stretch if a straight line solves its equations and no guard fires: samples taken, else -1.
 
     What moves by less than the tolerance is taken to rest.
     """
     k, until, z, scale, times, samples, arm, _ = of
     if len(k.waves) > 0 or k.line.slope != 0:
-        return False
-    rate, there, other, values, left = (
-        np.empty(len(z)),
-        np.empty(len(z)),
-        np.empty(len(z)),
-        np.empty(len(arm)),
-        until - t,
-    )
+        return -1
+    rate, there, other = np.empty(len(z)), np.empty(len(z)), np.empty(len(z))
+    values, left = np.empty(len(arm)), until - t
     equations.rates(t, z, k, rate)
     for i in range(len(z)):
         if left * abs(rate[i]) < k.rtol * scale[i]:
@@ -85,18 +80,18 @@ def finish_straight(t: float, of: Stretch, taken: int) -> bool:
         equations.rates(t + ahead, there, k, other)
         for i in range(len(z)):
             if left * abs(other[i] - rate[i]) > k.rtol * scale[i]:
-                return False
+                return -1
         equations.guards(t + ahead, there, k, values)
         for value in values:
             if value < 0:
-                return False
+                return -1
     while taken < len(times) and times[taken] <= until:
         for i in range(len(z)):
             samples[taken, i] = z[i] + (times[taken] - t) * rate[i]
         taken += 1
     for i in range(len(z)):
         z[i] = there[i]
-    return True
+    return taken
 
 
 def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
@@ -107,8 +102,8 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
     """
     start, tau, first, small, slow = pace
     t, steps, failures = start + tau, 0, 0
-    if slow and finish_straight(t, of, taken):
-        return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
+    if slow and (end := finish_straight(t, of, taken)) >= 0:
+        return DONE, pace, -1, end
     while t < of.until:
         slow, method = 0, BDF if small else LSODA
         try:
@@ -118,8 +113,8 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
                     return FIRED, (t, 0.0, 0.0, small, 0), guard, taken
                 grown = least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP
                 slow = 0 if grown else slow + 1
-                if slow % PATIENCE == PATIENCE - 1 and finish_straight(t, of, taken):
-                    return DONE, pace, -1, int(np.searchsorted(of.times, of.until, side="right"))
+                if slow % PATIENCE == PATIENCE - 1 and (end := finish_straight(t, of, taken)) >= 0:
+                    return DONE, pace, -1, end
                 if steps >= most and t < of.until:
                     return PAUSED, (t, 0.0, 0.0, small, 0), -1, taken
                 if grown if small else slow > PATIENCE:

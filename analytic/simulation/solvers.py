@@ -409,8 +409,9 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
     why, left = OTHER, most
     while why == OTHER or (why == PAUSED and left > 0):
         left -= PATIENCE if small else most
-        if slow % 2 == 1 and finish_straight(start + tau, of, taken):
-            return DONE, (start, tau, h, small, slow), -1, int(np.searchsorted(of.times, of.until, side="right"))
+        end = finish_straight(start + tau, of, taken) if slow % 2 == 1 else -1
+        if end >= 0:
+            return DONE, (start, tau, h, small, slow), -1, end
         if small:
             why, tau, h, guard, taken = _implicit_steps(of, start, tau, h, taken)
         else:

@@ -260,6 +260,11 @@ def add_own_set(parser: Parser) -> None:
     own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
 
 
+def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
+    """An option for ranges or lists of values (`compare.kit.sweep.Axis`), to be given once or more often."""
+    parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
+
+
 def add_directory(parser: Parser, directory: str, *names: str) -> None:
     """Options of all commands that fill a directory: its name, and whether to show progress."""
     where = "directory of the results; what it holds already is not computed again"
@@ -309,6 +314,12 @@ def add_processes(parser: Any) -> None:
     parser.add_argument("--workers", type=processes, default=all_of_them, help=here)
 
 
+def add_samples(parser: Parser) -> None:
+    """The option that says how often a run is sampled."""
+    between = "time between samples (default: duration/1000)"
+    parser.add_argument("--sample-interval", type=seconds, help=between)
+
+
 def add_start(parser: Parser) -> None:
     """The option for the initial state."""
     from model.kinematics import UNITS, VARIABLES  # here, because it loads numpy
@@ -316,6 +327,11 @@ def add_start(parser: Parser) -> None:
     units = ", ".join(f"{name} in {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True))
     meaning = f"initial state: {units}; zero (at rest against the wall) where not named"
     parser.add_argument("--start", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
+
+
+def add_plot(parser: Parser, what: str) -> None:
+    """The option --plot, to draw what is printed."""
+    parser.add_argument("--plot", type=FIGURE, help=f"draw {what}: png, svg or pdf (default: don't)")
 
 
 def add_verdicts(parser: Parser) -> None:

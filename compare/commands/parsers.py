@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from compare.commands import options
-from compare.commands.options import FIGURE, FILM, HDF5, MAP, MARKDOWN, PAGE, Number, Parser
+from compare.commands.options import FILM, HDF5, MAP, MARKDOWN, PAGE, Number, Parser
 from model import InputError
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range
-
-RANGE, SAMPLED = "NAME=FROM:TO:COUNT", "time between samples (default: duration/1000)"
 
 
 class Command(NamedTuple):
@@ -116,7 +114,7 @@ def simulate(parser: Parser) -> None:
     group.add_argument("--longest-interval", type=options.seconds, help=longest)
     options.add_start(parser)
     parser.add_argument("--time", type=options.seconds, help="duration (default 10)")
-    parser.add_argument("--sample-interval", type=options.seconds, help=SAMPLED)
+    options.add_samples(parser)
     parser.add_argument("-o", "--output", type=HDF5, help="HDF5 file to write (default: none)")
     live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
     parser.add_argument("--view", action="store_true", help=live)
@@ -131,7 +129,7 @@ def simulate(parser: Parser) -> None:
 def inspect(parser: Parser) -> None:
     """What a trajectory file holds."""
     parser.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
-    parser.add_argument("--plot", type=FIGURE, help="draw the run: png, svg or pdf (default: don't)")
+    options.add_plot(parser, "the run")
     options.add_json(parser)
 
 
@@ -141,7 +139,7 @@ def compare(parser: Parser) -> None:
     what = "a run, or time and some of its quantities from CSV or any HDF5 file"
     parser.add_argument("a", metavar="FILE", help=what)
     parser.add_argument("b", metavar="OTHER", help="what it is compared with, the same")
-    parser.add_argument("--plot", type=FIGURE, help="draw both: png, svg or pdf (default: don't)")
+    options.add_plot(parser, "both")
     options.add_json(parser)
 
 
@@ -150,8 +148,7 @@ def sweep(parser: Parser) -> None:
     """Many runs over ranges of parameters, resumable."""
     options.add_parameters(parser)
     options.add_start(parser)
-    ranges = "a range, or NAME=A,B,C; several make a grid"
-    parser.add_argument("--vary", action="append", required=True, metavar=RANGE, help=ranges)
+    options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
     parser.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
     parser.add_argument("--seed", type=options.seed, default=0, help="seed of the points of --random")
     ways, meaning = ("held", "up", "down", "both"), "held: a run for each point; else one run, omega_0 in steps"
@@ -159,7 +156,7 @@ def sweep(parser: Parser) -> None:
     options.add_engine(parser)
     lasts = "duration of a run that is held, and else of each step"
     parser.add_argument("--time", type=options.seconds, default=30.0, help=lasts)
-    parser.add_argument("--sample-interval", type=options.seconds, help=SAMPLED)
+    options.add_samples(parser)
     means = "store what each run settles to, for collect, and not its samples"
     parser.add_argument("--means-only", action="store_true", help=means)
     options.add_workers(parser)
@@ -194,10 +191,9 @@ def attractors(parser: Parser) -> None:
     parser.add_argument("--random", type=options.count, default=20, help=unless)
     parser.add_argument("--seed", type=options.seed, default=0, help="seed of the random starts")
     parser.add_argument("--time", type=options.seconds, help="how long to follow a run at most (default 60/c)")
-    ranges = "a range, or NAME=A,B,C; several: grid"
-    parser.add_argument("--vary", action="append", default=[], metavar=RANGE, help=ranges)
+    options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
-    parser.add_argument("--follow", action="append", default=[], metavar="NAME=FROM:TO", help=follow)
+    options.add_axes(parser, "--follow", follow, "NAME=FROM:TO")
     tables = "write the tables as Markdown, too (default: don't)"
     parser.add_argument("-o", "--output", type=MARKDOWN, dest="page", help=tables)
     options.add_json(parser)
@@ -211,7 +207,7 @@ def basins(parser: Parser) -> None:
     options.add_start(parser)
     for name in ("across", "up"):
         text = f"a state variable {name} the plane, and its range"
-        parser.add_argument(f"--{name}", required=True, metavar=RANGE, help=text)
+        parser.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
     points = "every N-th point along both axes by MuJoCo, too; 0: none"
     parser.add_argument("--mujoco", type=Number(allowed=Range(0, 1e6, whole=True)), default=0, help=points)
     parser.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")

@@ -168,11 +168,18 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
             row |= {variable: mean, f"{variable}_uncertainty": drift}
         row |= {"case": int(settled_case(run)) if len(run.case) else -1, "steady": run.header.flow.is_steady}
         about = run.header.attributes() | {"mjcf": run.header.mjcf, "created": "", "failure": ""}
-        numbers = b"".join(getattr(run, each).tobytes() for each in columns(Trajectory))
-        for each, data in (("identity", json.dumps(about, sort_keys=True).encode()), ("numbers", numbers)):
-            row[each] = hashlib.sha256(data).hexdigest()[:32]
+        row["identity"] = _digest(json.dumps(about, sort_keys=True).encode())
+        row["numbers"] = _digest(*(getattr(run, each).tobytes() for each in columns(Trajectory)))
         rows.append(row)
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def _digest(*parts: bytes) -> str:
+    """A hash of bytes, 32 hexadecimal digits."""
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
+    return digest.hexdigest()[:32]
 
 
 def _attributes() -> dict[str, dict[str, Any]]:

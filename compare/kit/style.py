@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from compare.kit.statistics import COVERAGE
 from model import Case, Parameters, Trajectory
 from model.drag import STOKES
 
+T = TypeVar("T")
 COLOURS = {
     Case.RR: "#0072B2",
     Case.RS: "#56B4E9",
@@ -217,6 +218,14 @@ def mark_of(engine: str) -> dict[str, Any]:
     return {"marker": given.mark if given else "D", "color": "0.1", "mfc": "white"}
 
 
+def by_engine(rows: Iterable[T], engine: Callable[[T], str]) -> dict[str, list[T]]:
+    """Rows by the name of their engine."""
+    sorted_out: dict[str, list[T]] = {}
+    for row in rows:
+        sorted_out.setdefault(engine(row), []).append(row)
+    return sorted_out
+
+
 def omega_0(m: Measurement) -> float:
     """The flow at which something was measured, rad s-1."""
     return m.parameters.omega_0
@@ -236,8 +245,7 @@ def points(
     for m in rows:
         axes.update_datalim([(x(m), unit * y(m))])
     longest = LONGEST_BAR * axes.dataLim.height
-    for engine in dict.fromkeys(m.engine for m in rows):
-        own = [m for m in rows if m.engine == engine]
+    for engine, own in by_engine(rows, lambda m: m.engine).items():
         usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
         for pale in (False, True):
             shown = [m for m in own if (COVERAGE * unit * m.uncertainty > longest) == pale]
@@ -275,10 +283,9 @@ def ground(
                 axes.text(x.mean(), 1.02, case.name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
 
 
-def deviations(axes: Axes, rows: Sequence[Measurement], predicted: Callable[[Measurement], float]) -> None:
+def deviations(axes: Axes, rows: Iterable[Measurement], predicted: Callable[[Measurement], float]) -> None:
     """Draw relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
-    for engine in dict.fromkeys(m.engine for m in rows):
-        own = [m for m in rows if m.engine == engine]
+    for engine, own in by_engine(rows, lambda m: m.engine).items():
         off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
         axes.plot(list(map(omega_0, own)), off, ls="none", ms=5, **mark_of(engine))
     axes.set(yscale="log", ylim=(LEAST / 10, 10), ylabel="relative deviation")

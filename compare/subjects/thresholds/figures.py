@@ -63,10 +63,9 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3",
                   transform=axes.get_xaxis_transform())  # fmt: skip
-    engines = dict.fromkeys(check.measurement.engine for check in plane.checks)
     marks = [
-        (f"{engine}, as predicted", [c for c in plane.checks if c.measurement.engine == engine], style.mark_of(engine))
-        for engine in engines
+        (f"{engine}, as predicted", own, style.mark_of(engine))
+        for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items()
     ]
     if failed := [check for check in plane.checks if not check.agrees]:
         marks.append(("not as predicted", failed, {"marker": "x", "color": "#B3261E", "ms": 10, "mew": 2}))
@@ -91,9 +90,7 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
     """Draw which cases exist over friction and flow, up to a flow at least, rad s-1, and the thresholds."""
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if equal else np.full(eta.shape, p.mu)
-    doubles = [
-        point for point in bifurcation.double_points(p, equal) if point.eta > 0.01
-    ]  # lower ones don't set the scale
+    doubles = [each for each in bifurcation.double_points(p, equal) if each.eta > 0.01]  # lower ones set no scale
     fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), highest, *(point.omega_0 for point in doubles)])
     omega_0 = np.linspace(0.0, fastest, 901)
     plane = bifurcation.case_map(p, mu, eta, omega_0).T
