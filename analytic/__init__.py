@@ -5,7 +5,10 @@ from typing import TYPE_CHECKING, Any
 import model
 
 if not hasattr(model, "Parameters"):
-    raise ImportError(f"{model.__file__} hides the package model of dualball: rename that, or work in another folder")
+    raise ImportError(
+        f"{model.__file__} hides the package model of dualball: rename that, or work in another "
+        f"folder"
+    )
 
 from analytic.bifurcation.diagram import Thresholds, thresholds
 from analytic.flowmeter.characteristic import (
@@ -66,7 +69,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """`attractors` when it is asked for: the formulas don't wait for its integrators and statistics to load."""
+    """`attractors` when it is asked for: the formulas don't wait for its integrators and statistics
+    to load."""
     if name == "attractors":
         from analytic.orbits.fates import attractors
 

@@ -10,7 +10,8 @@ from typing import NoReturn
 
 
 def main() -> NoReturn:
-    """The program; what ends it while it is still being imported ends it at once, since there is nothing to keep."""
+    """The program; what ends it while it is still being imported ends it at once, since there is
+    nothing to keep."""
 
     def leave(number: int, frame: FrameType | None) -> NoReturn:
         with suppress(OSError):  # standard error may be closed
@@ -35,5 +36,7 @@ def main() -> NoReturn:
 
 if __name__ == "__main__":
     if sys.path[:1] == [str(Path.cwd())] != [str(Path(__file__).parents[1])]:
-        del sys.path[0]  # `python -m` puts the current folder first, where a foreign `model` may be; `dualball` doesn't
+        del sys.path[
+            0
+        ]  # `python -m` puts the current folder first, where a foreign `model` may be; `dualball` doesn't
     main()

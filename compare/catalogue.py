@@ -8,11 +8,15 @@ from compare import subjects
 from compare.claim import Claim
 from compare.kit.programme import Protocol
 
-PROTOCOLS: tuple[Protocol, ...] = tuple(protocol for each in subjects.parts("measure") for protocol in each.PROTOCOLS)
+PROTOCOLS: tuple[Protocol, ...] = tuple(
+    protocol for each in subjects.parts("measure") for protocol in each.PROTOCOLS
+)
 """Every protocol there is; each goes out only from those before it."""
 _SECTIONS: dict[str, list[Claim]] = {}
 for _each in subjects.parts("claims"):
     for _section, _claims in _each.SECTIONS.items():
         _SECTIONS.setdefault(_section, []).extend(_claims)
-CLAIMS = tuple(replace(claim, section=section) for section, claims in _SECTIONS.items() for claim in claims)
+CLAIMS = tuple(
+    replace(claim, section=section) for section, claims in _SECTIONS.items() for claim in claims
+)
 """Every claim there is."""

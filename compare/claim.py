@@ -1,9 +1,9 @@
 """Statements of the paper that can be checked, and the verdicts on them.
 
-A claim says what is stated and where, and which measurements bear on it: a `Bearing` picks measurements by protocol,
-quantity and conditions, and predicts each by a function of `analytic`. The verdict is computed from the numbers. That
-the paper's text had to be corrected, or holds formally only, is another matter: `Claim.text`.
-"""
+A claim says what is stated and where, and which measurements bear on it: a `Bearing` picks
+measurements by protocol, quantity and conditions, and predicts each by a function of `analytic`.
+The verdict is computed from the numbers. That the paper's text had to be corrected, or holds
+formally only, is another matter: `Claim.text`."""
 
 from __future__ import annotations
 
@@ -101,7 +101,10 @@ class Claim:
 
     def __post_init__(self) -> None:
         if bool(self.bearings) == bool(self.algebra):
-            raise ValueError(f"claim {self.id}: measurements bear on it, or it is formal only and has its algebra")
+            raise ValueError(
+                f"claim {self.id}: measurements bear on it, or it is formal only and has its "
+                f"algebra"
+            )
         if self.algebra:
             object.__setattr__(self, "text", Text.FORMAL)
 
@@ -112,14 +115,18 @@ class Claim:
 
 
 def bearings(
-    protocol: str, quantities: Iterable[str], predict: Callable[[Measurement], Prediction], **more: Any
+    protocol: str,
+    quantities: Iterable[str],
+    predict: Callable[[Measurement], Prediction],
+    **more: Any,
 ) -> tuple[Bearing, ...]:
     """A `Bearing` for each of several quantities of one protocol, all predicted by one function."""
     return tuple(Bearing(protocol, quantity, predict, **more) for quantity in quantities)
 
 
 def claim(id: str, source: str, statement: str, *bearings: Bearing, **more: Any) -> Claim:
-    """A claim with the bearings of the measurements that bear on it; `more` are other fields of `Claim`."""
+    """A claim with the bearings of the measurements that bear on it; `more` are other fields of
+    `Claim`."""
     return Claim(id, source, statement, bearings, **more)
 
 
@@ -132,12 +139,14 @@ class Judged:
 
     @property
     def worst(self) -> float:
-        """Largest deviation divided by its tolerance; inf where theory knows no such state, nan without numbers."""
+        """Largest deviation divided by its tolerance; inf where theory knows no such state, nan
+        without numbers."""
         return max((check.share for check in self.checks), default=math.nan)
 
     @property
     def resolving_power(self) -> dict[str, float]:
-        """By quantity, the smallest relative error of theory that every conclusive check would notice.
+        """By quantity, the smallest relative error of theory that every conclusive check would
+        notice.
 
         That of all checks where none is conclusive.
         """
@@ -152,16 +161,18 @@ class Judged:
 
 @dataclass(frozen=True, kw_only=True)
 class Witness(Judged):
-    """What one engine says of a claim: by checks in the limit of no time step, where it is judged so."""
+    """What one engine says of a claim: by checks in the limit of no time step, where it is judged
+    so."""
 
     engine: str
     reason: str = ""
     """Why it was not asked, or leaves the claim undecided."""
     order: float = math.nan
-    """Median of the orders in the time step with which the numbers converge; nan where the step shows nothing."""
+    """Median of the orders in the time step with which the numbers converge; nan where the step
+    shows nothing."""
     deviations: tuple[float, ...] = ()
-    """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them: at MuJoCo's own step
-    of 2 ms, or of an engine that is judged at one step at that."""
+    """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them:
+    at MuJoCo's own step of 2 ms, or of an engine that is judged at one step at that."""
     left_out: int = 0
     """Measurements that its protocols left out, or that have no limit."""
 
@@ -192,8 +203,8 @@ class Verdict(Judged):
     def passed(self) -> bool:
         """Whether the outcome is the one to be expected.
 
-        What an example refutes is refuted on the sets of the study; a user's own set may hold no such example.
-        """
+        What an example refutes is refuted on the sets of the study; a user's own set may hold no
+        such example."""
         if self.outcome is Outcome.CONFIRMED and self.claim.expected is Outcome.REFUTED:
             return not {check.measurement.set for check in self.checks} & sets(Level.FULL).keys()
         return self.outcome is self.claim.expected

@@ -1,4 +1,5 @@
-"""The figures of the report, as the subjects list them; those of the league and of a designed meter are its pages'."""
+"""The figures of the report, as the subjects list them; those of the league and of a designed meter
+are its pages'."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ from model import InputError, Parameters, StorageError
 from model.files import make_directory, write_text
 
 _FRAME = 1e-6, 10.0
-"""Deviations, in parts of the tolerance, that are drawn where they are; what is less or more stands at the edge."""
+"""Deviations, in parts of the tolerance, that are drawn where they are; what is less or more stands
+at the edge."""
 _MANY = 100
 """Points beyond which marks are small and hollow."""
 _WIDTH, _BELOW = 7.0, 0.48
@@ -38,12 +40,15 @@ Selected = dict[str, Callable[[], Any]]
 
 FORMATS = tuple(suffix[1:] for suffix in drawing.SUFFIXES)
 PICTURES, CAPTIONS = "figures", "captions.txt"
-FIGURES: Figures = {name: each for part in subjects.parts("figures") for name, each in part.FIGURES.items()}
+FIGURES: Figures = {
+    name: each for part in subjects.parts("figures") for name, each in part.FIGURES.items()
+}
 """Every figure, in the order of the report."""
 
 
 def figures_of(claim: str) -> Figures:
-    """The figures shown with a claim; unless one bears its name, also that of the deviations of its numbers."""
+    """The figures shown with a claim; unless one bears its name, also that of the deviations of its
+    numbers."""
     own = {name: each for name, each in FIGURES.items() if claim in each.claims}
     chosen = partial(measured, claim=claim)
     deviations = Drawing(f"Deviations of {claim}", chosen, draw_deviations, (claim,))
@@ -63,7 +68,8 @@ def _has_tolerance(check: Check) -> bool:
 
 
 def draw_deviations(checks: Checks) -> tuple[Figure, str]:
-    """A figure of the deviations of a claim's numbers from theory, a row for each quantity; and its caption."""
+    """A figure of the deviations of a claim's numbers from theory, a row for each quantity; and its
+    caption."""
     every, checks = checks, tuple(filter(_has_tolerance, checks))
     names = list(dict.fromkeys(c.measurement.quantity for c in checks))
     engines = list(dict.fromkeys(c.measurement.engine for c in checks))
@@ -79,27 +85,44 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     engine = np.array([engines.index(c.measurement.engine) for c in checks])
     # Points are spread vertically against overlap; a single point stays centred.
     kind = row * len(engines) + engine
-    spread = np.where(np.bincount(kind)[kind] == 1, 0.0, (np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5)
+    spread = np.where(
+        np.bincount(kind)[kind] == 1, 0.0, (np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5
+    )
     lanes = row + strip * (engine + 0.5 + 0.6 * spread) - 0.5
     parts = np.clip([abs(c.deviation) / c.tolerance for c in checks], *_FRAME)
     agrees = np.array([c.agrees for c in checks])
     for k, name in enumerate(engines):
         for fine, bad in ((agrees, {}), (~agrees, {"color": style.FORCE, "label": f"_{name}"})):
             own = fine & (engine == k)
-            look = style.mark_of(name) | ({"ms": 3, "mfc": "none"} if len(checks) > _MANY else {"ms": 4.5})
-            axes.plot(parts[own], lanes[own], ls="none", clip_on=False, **{"label": name} | look | bad)
+            look = style.mark_of(name) | (
+                {"ms": 3, "mfc": "none"} if len(checks) > _MANY else {"ms": 4.5}
+            )
+            axes.plot(
+                parts[own], lanes[own], ls="none", clip_on=False, **{"label": name} | look | bad
+            )
     axes.set_yticks(range(len(names)), [style.symbol(name) for name in names])
-    axes.set(xscale="log", xlim=_FRAME, ylim=(len(names) - 0.5, -0.5), xlabel="|measured − predicted|/tolerance")
+    axes.set(
+        xscale="log",
+        xlim=_FRAME,
+        ylim=(len(names) - 0.5, -0.5),
+        xlabel="|measured − predicted|/tolerance",
+    )
     axes.minorticks_off()  # of which there would be more than marks
     above = 0.04
     if len(engines) > 1:
         style.legend(figure, loc="upper center", ncols=4)
         above = 0.33
-    # Placed by hand: there are so many of these figures that a solver of layouts would cost more than drawing them.
+    # Placed by hand: there are so many of these figures that a solver of layouts would cost more
+    # than drawing them.
     texts = [(label.get_text(), label.get_fontproperties()) for label in axes.get_yticklabels()]
-    widths = [text_to_path.get_text_width_height_descent(text, font, "$" in text)[0] for text, font in texts]
+    widths = [
+        text_to_path.get_text_width_height_descent(text, font, "$" in text)[0]
+        for text, font in texts
+    ]
     left = 0.15 + max(widths) / 72  # points
-    axes.set_position((left / _WIDTH, _BELOW / height, 1 - (left + 0.16) / _WIDTH, 1 - (_BELOW + above) / height))
+    axes.set_position(
+        (left / _WIDTH, _BELOW / height, 1 - (left + 0.16) / _WIDTH, 1 - (_BELOW + above) / height)
+    )
     sets = dict.fromkeys(c.measurement.set for c in checks)
     alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
     counts = Counter(c.measurement.engine for c in every)
@@ -110,15 +133,19 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
         for name in engines
     )
     return figure, (
-        f"By how much what was measured differs from what is predicted, in parts of the tolerance: {told} "
-        f"({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each quantity, and in it one for "
-        "each engine. Shaded: within tolerance, three standard uncertainties; darker: within one; red: not as "
+        f"By how much what was measured differs from what is predicted, in parts of the tolerance: "
+        f"{told} "
+        f"({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each "
+        f"quantity, and in it one for "
+        "each engine. Shaded: within tolerance, three standard uncertainties; darker: within one; "
+        "red: not as "
         f"predicted. What is less than {_FRAME[0]:g} or more than {_FRAME[1]:g} stands at the edge."
     )
 
 
 def of_set(p: Parameters) -> Selected:
-    """For each figure that theory alone can draw, by name, the function that selects its data for a set."""
+    """For each figure that theory alone can draw, by name, the function that selects its data for a
+    set."""
     return {name: partial(each.of_set, p) for name, each in FIGURES.items() if each.of_set}
 
 
@@ -127,14 +154,19 @@ def of_results(evidence: Evidence) -> Selected:
     return {name: partial(each.select, evidence) for name, each in FIGURES.items()}
 
 
-def write(output: Path, selected: Selected, formats: Sequence[str] = ("svg",)) -> Iterator[tuple[str, str]]:
-    """Write figures to a directory, and their captions; yield the name of each, and why it wasn't drawn if so.
+def write(
+    output: Path, selected: Selected, formats: Sequence[str] = ("svg",)
+) -> Iterator[tuple[str, str]]:
+    """Write figures to a directory, and their captions; yield the name of each, and why it wasn't
+    drawn if so.
 
     Raises `InputError` for an unknown format, `StorageError` if a file can't be written.
     """
     for suffix in formats:
         if suffix not in FORMATS:
-            raise InputError(f"no figure can be written as {suffix!r}; there are {', '.join(FORMATS)}")
+            raise InputError(
+                f"no figure can be written as {suffix!r}; there are {', '.join(FORMATS)}"
+            )
     make_directory(output)
     captions = []
     for name, data in selected.items():
@@ -154,10 +186,11 @@ def write(output: Path, selected: Selected, formats: Sequence[str] = ("svg",)) -
 def pictures(
     evidence: Evidence, drawings: Mapping[str, Drawing], spread: Spread = map
 ) -> tuple[dict[str, dict[str, str]], str]:
-    """For a page: each figure's picture and caption, or why there is none, by name; and the letters that they share.
+    """For a page: each figure's picture and caption, or why there is none, by name; and the letters
+    that they share.
 
-    Each is drawn once, by `spread`, a `map`, and kept in `PICTURES` of the results with a hash of all that it shows.
-    """
+    Each is drawn once, by `spread`, a `map`, and kept in `PICTURES` of the results with a hash of
+    all that it shows."""
     figures, new = {}, []
     for name, each in drawings.items():
         path = evidence.directory / PICTURES / f"{name}.svg"
@@ -176,7 +209,9 @@ def pictures(
     new.reverse()  # the last ones take longest
     for (path, *_), found in zip(new, spread(drawn, new), strict=True):
         figures[path.stem] |= found
-    made, letters = embedded({name: each["picture"] for name, each in figures.items() if not each["gap"]})
+    made, letters = embedded(
+        {name: each["picture"] for name, each in figures.items() if not each["gap"]}
+    )
     for name, picture in made.items():
         figures[name]["picture"] = picture
     return figures, letters
@@ -193,7 +228,8 @@ def kept(path: Path, drawing: Drawing, data: Any) -> dict[str, str] | None:
 
 
 def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
-    """Draw a figure and write it to its SVG file, with its caption as description: picture and caption.
+    """Draw a figure and write it to its SVG file, with its caption as description: picture and
+    caption.
 
     Where it can't be drawn or written, the reason as a "gap".
     """
@@ -210,6 +246,9 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
 
 
 def _mark(drawing: Drawing, data: Any) -> str:
-    """A comment at the end of an SVG file with a hash of the program and the data that it was made from."""
-    made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources("model", "analytic", "compare")])
+    """A comment at the end of an SVG file with a hash of the program and the data that it was made
+    from."""
+    made_from = "\n".join(
+        [repr(data), drawing.title, matplotlib.__version__, sources("model", "analytic", "compare")]
+    )
     return f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"

@@ -24,9 +24,11 @@ from model.kinematics import VARIABLES, state_units
 P = ParamSpec("P")
 R = TypeVar("R")
 RTOL = 1e-7
-"""Relative tolerance of simulations that predict: what most of them predict is measured to 1e-4 at best."""
+"""Relative tolerance of simulations that predict: what most of them predict is measured to 1e-4 at
+best."""
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
-"""What a prediction raises where theory knows no such state or motion: that is a deviation, not a breakdown."""
+"""What a prediction raises where theory knows no such state or motion: that is a deviation, not a
+breakdown."""
 
 _RATIOS = frozenset({"slope", "steepest", "filippov_share", "response", "law_in_motion"})
 """Ratios, angles, and deviations that are divided by their scales already."""
@@ -35,24 +37,31 @@ _computed = functools.cache(lambda function, *args, **options: function(*args, *
 
 
 def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
-    """The value of a function of `analytic` at hashable arguments, from a cache that `judge` empties.
+    """The value of a function of `analytic` at hashable arguments, from a cache that `judge`
+    empties.
 
-    Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p, f)``: then a theory
-    that was exchanged is the one that is asked.
-    """
+    Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p,
+    f)``: then a theory that was exchanged is the one that is asked."""
     result: R = _computed(function, *args, **options)  # type: ignore[arg-type]  # they can be hashed
     return result
 
 
 def simulated(
-    p: Parameters, x: tuple[float, ...], t_end: float, samples: int = 1, flow: Flow | None = None, rtol: float = RTOL
+    p: Parameters,
+    x: tuple[float, ...],
+    t_end: float,
+    samples: int = 1,
+    flow: Flow | None = None,
+    rtol: float = RTOL,
 ) -> Trajectory:
-    """The motion from a state x by event-driven simulation, with so many samples after the first; computed once."""
+    """The motion from a state x by event-driven simulation, with so many samples after the first;
+    computed once."""
     return theory(analytic.simulate, p, x, t_end, flow, sample_interval=t_end / samples, rtol=rtol)
 
 
 def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
-    """The verdicts on claims, in their order; each stands for itself, whatever becomes of the others."""
+    """The verdicts on claims, in their order; each stands for itself, whatever becomes of the
+    others."""
     forget()
     return [verdict(claim, records) for claim in claims]
 
@@ -65,11 +74,11 @@ def forget() -> None:
 def verdict(claim: Claim, records: Records) -> Verdict:
     """The verdict on a claim: each measurement beside its prediction, and the outcome.
 
-    Refuted if one check deviates beyond its tolerance; else inconclusive if of a bearing fewer than half of the checks
-    are fine enough to tell; else not run if the claim predicts numbers and has none, since counts confirm no number;
-    else confirmed. A check that is too coarse confirms nothing, and is counted apart.
-    Whatever a prediction raises makes the verdict an error of this claim alone.
-    """
+    Refuted if one check deviates beyond its tolerance; else inconclusive if of a bearing fewer than
+    half of the checks are fine enough to tell; else not run if the claim predicts numbers and has
+    none, since counts confirm no number; else confirmed. A check that is too coarse confirms
+    nothing, and is counted apart. Whatever a prediction raises makes the verdict an error of this
+    claim alone."""
     left_out = Counter[Missing]()
     for each in records.missing:
         if each.protocol in claim.protocols:
@@ -77,22 +86,40 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     missing = tuple(replace(each, rows=rows) for each, rows in left_out.most_common())
     try:
         checks = tuple(claim.algebra() if claim.algebra else checks_of(claim, records))
-    except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
+    except (
+        Exception
+    ) as error:  # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
-    if not checks and not missing and (known := {m.protocol for m in records.measurements} & claim.protocols):
-        missing = tuple(Missing(name, "all sets", "no number bears on the claim", 0) for name in sorted(known))
-    return Verdict(claim=claim, outcome=outcome(claim, checks, per_bearing(checks)), checks=checks, missing=missing)
+    if (
+        not checks
+        and not missing
+        and (known := {m.protocol for m in records.measurements} & claim.protocols)
+    ):
+        missing = tuple(
+            Missing(name, "all sets", "no number bears on the claim", 0) for name in sorted(known)
+        )
+    return Verdict(
+        claim=claim,
+        outcome=outcome(claim, checks, per_bearing(checks)),
+        checks=checks,
+        missing=missing,
+    )
 
 
 def outcome(claim: Claim, checks: Sequence[Check], wanted: Counter[int]) -> Outcome:
-    """The outcome of a claim by its checks; `wanted` is how many were to be made for each bearing. See `verdict`."""
+    """The outcome of a claim by its checks; `wanted` is how many were to be made for each bearing.
+    See `verdict`."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
     if undecided_bearings(checks, wanted):
         return Outcome.INCONCLUSIVE
-    equal = {n: each.quantity for n, each in enumerate(claim.bearings) if each.relation is Relation.EQUAL}
-    numbers = {n for n, name in equal.items() if quantity(name).resolves > 0}  # no case, no count, no bound
+    equal = {
+        n: each.quantity for n, each in enumerate(claim.bearings) if each.relation is Relation.EQUAL
+    }
+    numbers = {
+        n for n, name in equal.items() if quantity(name).resolves > 0
+    }  # no case, no count, no bound
     if not checks or (numbers and numbers.isdisjoint(per_bearing(checks))):
         return Outcome.NOT_RUN
     return Outcome.CONFIRMED
@@ -104,7 +131,8 @@ def per_bearing(checks: Iterable[Check]) -> Counter[int]:
 
 
 def undecided_bearings(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
-    """Bearings of which fewer than half of the checks that are wanted can tell, and how many can."""
+    """Bearings of which fewer than half of the checks that are wanted can tell, and how many
+    can."""
     told = per_bearing(check for check in checks if check.conclusive)
     return {n: told[n] for n, count in wanted.items() if 2 * told[n] < count}
 
@@ -153,9 +181,12 @@ def natural_size(quantity: str, p: Parameters) -> float | None:
 
 
 def select(claims: Iterable[Claim], ids: Sequence[str] | None) -> list[Claim]:
-    """The claims of the given ids, all for None; `InputError` with a suggestion for an unknown id."""
+    """The claims of the given ids, all for None; `InputError` with a suggestion for an unknown
+    id."""
     known = {claim.id: claim for claim in claims}
     for name in ids or ():
         if name not in known:
-            raise InputError(f"no claim is called {name!r}{suggestion(name, known)}; list them with --list")
+            raise InputError(
+                f"no claim is called {name!r}{suggestion(name, known)}; list them with --list"
+            )
     return [known[name] for name in (ids or known)]

@@ -1,4 +1,5 @@
-"""Figures of one's own: functions draw into axes of matplotlib, new ones if none are given, and return them.
+"""Figures of one's own: functions draw into axes of matplotlib, new ones if none are given, and
+return them.
 
 For example:
 
@@ -34,8 +35,11 @@ if TYPE_CHECKING:
     import xarray
 
 
-def characteristic(p: Parameters, axes: Axes | None = None, *, fastest: float | None = None) -> Axes:
-    """The stationary solutions of a set, omega_c over omega_0 up to the fastest, rad/s: dashed where unstable.
+def characteristic(
+    p: Parameters, axes: Axes | None = None, *, fastest: float | None = None
+) -> Axes:
+    """The stationary solutions of a set, omega_c over omega_0 up to the fastest, rad/s: dashed
+    where unstable.
 
     Dotted: the thresholds (84) to (88). Raises `InputError` where a set has none, as without drag.
     """
@@ -47,7 +51,8 @@ def characteristic(p: Parameters, axes: Axes | None = None, *, fastest: float | 
 
 
 def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> Axes:
-    """A map of which cases have a stationary solution, over the friction of the wall, or of both, and the flow.
+    """A map of which cases have a stationary solution, over the friction of the wall, or of both,
+    and the flow.
 
     As Figs. 7 and 8 of the paper, with the other parameters of the set.
     """
@@ -58,7 +63,8 @@ def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> 
 
 
 def figure(name: str, p: Parameters) -> Figure:
-    """A figure of the paper, or beyond it, of a set: "fig-9", "unloading", as `dualball figures` names them.
+    """A figure of the paper, or beyond it, of a set: "fig-9", "unloading", as `dualball figures`
+    names them.
 
     Raises `InputError` for an unknown name, and for a figure of which the set has nothing to show.
     """
@@ -74,13 +80,18 @@ def figure(name: str, p: Parameters) -> Figure:
 def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = None) -> Axes:
     """Quantities of a motion over time, omega_c if none is named, on the colours of its cases.
 
-    `run`: what `simulate` returns, or a file that xarray has opened. A component of a force is named as in
-    `Trajectory.to_pandas`, ``force_Ay``. Raises `InputError` for an unknown name, or for quantities of different units.
-    """
+    `run`: what `simulate` returns, or a file that xarray has opened. A component of a force is
+    named as in `Trajectory.to_pandas`, ``force_Ay``. Raises `InputError` for an unknown name, or
+    for quantities of different units."""
     if not hasattr(run, "force_A"):
-        raise InputError("the run must be as its file is: open it without engine='dualball', which makes a table of it")
+        raise InputError(
+            "the run must be as its file is: open it without engine='dualball', which makes a "
+            "table of it"
+        )
     names = names or ("omega_c",)
-    check_names(names, [name for name in UNITS if name not in ("time", "case")], "quantity of a motion")
+    check_names(
+        names, [name for name in UNITS if name not in ("time", "case")], "quantity of a motion"
+    )
     units = {UNITS[name]: name for name in names}
     if len(units) > 1:
         raise InputError(f"{' and '.join(units.values())} have different units: {', '.join(units)}")
@@ -89,7 +100,9 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
         axes.plot(time, component(run, name), label=style.symbol(name))
     begins = np.flatnonzero(np.diff(case, prepend=-1))
     for first, last in zip(begins, [*begins[1:], len(case) - 1], strict=True):
-        axes.axvspan(time[first], time[last], color=style.COLOURS[Case(case[first])], alpha=0.15, lw=0)
+        axes.axvspan(
+            time[first], time[last], color=style.COLOURS[Case(case[first])], alpha=0.15, lw=0
+        )
     (unit,) = units
     said = ", ".join(dict.fromkeys(str(line.get_label()) for line in axes.get_lines()))
     axes.set(xlabel="time (s)", ylabel=f"{said} ({pages.readable(unit)})", xlim=time[[0, -1]])
@@ -98,7 +111,8 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
 
 
 def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
-    """A map of where balls end that start on a plane of states, from the file of `dualball basins`, or what it holds.
+    """A map of where balls end that start on a plane of states, from the file of `dualball basins`,
+    or what it holds.
 
     Raises `StorageError` for a file that isn't one.
     """

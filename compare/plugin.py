@@ -1,8 +1,9 @@
-"""The plugin for pytest: exact cases as tests of an engine, and fixtures for tests of one's own scene.
+"""The plugin for pytest: exact cases as tests of an engine, and fixtures for tests of one's own
+scene.
 
-``pytest --dualball-engine mypkg.adapter`` runs the cases, and nothing else unless files are named. An entry point loads
-this in every run of pytest where dualball is installed: nothing but pytest is imported until it is used.
-"""
+``pytest --dualball-engine mypkg.adapter`` runs the cases, and nothing else unless files are named.
+An entry point loads this in every run of pytest where dualball is installed: nothing but pytest is
+imported until it is used."""
 
 from __future__ import annotations
 
@@ -16,13 +17,16 @@ from typing import Any
 import pytest
 
 _ROW = "dualball"
-"""The property of a test's report that holds a row of the summary: it comes through from processes of pytest-xdist."""
+"""The property of a test's report that holds a row of the summary: it comes through from processes
+of pytest-xdist."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of the plugin to pytest."""
     group = parser.getgroup("dualball", "exact contact cases")
-    engine = "test an engine on the exact cases: a module with build, step and state, or MODULE:OBJECT"
+    engine = (
+        "test an engine on the exact cases: a module with build, step and state, or MODULE:OBJECT"
+    )
     group.addoption("--dualball-engine", metavar="MODULE", help=engine)
     known = "cases that are known to fail, one a line: the name, then the reason"
     group.addoption("--dualball-known", metavar="FILE", type=Path, help=known)
@@ -37,7 +41,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(
+    session: pytest.Session, config: pytest.Config, items: list[pytest.Item]
+) -> None:
     """Add the cases, before ``-k`` and ``-m`` choose."""
     if engine := config.getoption("dualball_engine"):
         from compare.bench import cases, runner  # here, because no other run needs it
@@ -50,7 +56,9 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
         rows = [line.partition("#")[0].split(None, 1) for line in lines]
         known = {row[0]: row[1].strip() if len(row) > 1 else "known to fail" for row in rows if row}
         for name in (each for each in known if each not in own):
-            raise pytest.UsageError(f"{path}: no case is called {name!r}; there are {', '.join(own)}")
+            raise pytest.UsageError(
+                f"{path}: no case is called {name!r}; there are {', '.join(own)}"
+            )
 
         @functools.cache
         def trial() -> runner.EngineProcess:  # begins with the first case asked for
@@ -59,7 +67,9 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
             return begun
 
         for name, case in own.items():
-            item = ExactCase.from_parent(session, name=name, nodeid=f"{engine}::{name}", case=case, trial=trial)
+            item = ExactCase.from_parent(
+                session, name=name, nodeid=f"{engine}::{name}", case=case, trial=trial
+            )
             if name in known:
                 item.add_marker(pytest.mark.xfail(reason=known[name]))
             items.append(item)
@@ -83,9 +93,13 @@ class ExactCase(pytest.Item):
         if found.skipped:
             pytest.skip(found.skipped)
         row = (found.error, found.order, found.creep, found.lost, found.cost)
-        self.user_properties.append((_ROW, [self.name, *("" if math.isnan(v) else f"{v:.2g}" for v in row)]))
+        self.user_properties.append(
+            (_ROW, [self.name, *("" if math.isnan(v) else f"{v:.2g}" for v in row)])
+        )
         if not found.passed:
-            at = ", ".join(f"{e:.2g} at {1e3 * h:g} ms" for e, h in zip(found.errors, found.steps, strict=True))
+            at = ", ".join(
+                f"{e:.2g} at {1e3 * h:g} ms" for e, h in zip(found.errors, found.steps, strict=True)
+            )
             allowed = f"{self.case.about}: errors, in units of its scales, are {at}; allowed is {TOLERANCE:g}"
             pytest.fail(found.failure or allowed, pytrace=False)
 
@@ -99,9 +113,15 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
     rows = [["case", "error", "order", "creep (m/s)", "lost", "cost", ""]]
     for verdict in ("passed", "failed", "xfailed", "xpassed"):
         for report in terminalreporter.stats.get(verdict, []):
-            rows += [[*row, verdict] for name, row in getattr(report, "user_properties", []) if name == _ROW]
+            rows += [
+                [*row, verdict]
+                for name, row in getattr(report, "user_properties", [])
+                if name == _ROW
+            ]
     if len(rows) > 1:
-        terminalreporter.section("exact cases: error at the shortest step in units of the case's scales")
+        terminalreporter.section(
+            "exact cases: error at the shortest step in units of the case's scales"
+        )
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         for first, *row in rows:
             cells = (cell.rjust(width) for cell, width in zip(row, widths[1:], strict=True))
@@ -110,7 +130,8 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 @pytest.fixture(scope="session")
 def dualball_theory() -> Callable[..., Any]:
-    """``theory(p, t_end, x0=(0,) * 6)``: the motion by the event-driven simulation, computed once for all tests."""
+    """``theory(p, t_end, x0=(0,) * 6)``: the motion by the event-driven simulation, computed once
+    for all tests."""
     import analytic  # here, because no other run needs it
 
     @functools.cache

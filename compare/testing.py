@@ -1,7 +1,8 @@
-"""Assertions for tests of one's own scene: does the ball settle where it should, does it move as it should?
+"""Assertions for tests of one's own scene: does the ball settle where it should, does it move as it
+should?
 
-Of one's own motion no more is needed than times and omega_c: arrays, a CSV file, or an HDF5 file of any program.
-"""
+Of one's own motion no more is needed than times and omega_c: arrays, a CSV file, or an HDF5 file of
+any program."""
 
 from __future__ import annotations
 
@@ -27,13 +28,17 @@ SETTLED_PART = 0.25
 """Last part of a motion, in which it has to have settled."""
 FEWEST, SAMPLES = 10, 10_000_000
 """Samples below which nothing is judged, and most that are read of another program's file."""
-UNITS: dict[str, str] = {name: columns(Trajectory)[column]["units"] for name, (column, _) in COMPONENTS.items()}
-"""Units of what a motion may have, by name: the columns of a trajectory, of its forces each component."""
+UNITS: dict[str, str] = {
+    name: columns(Trajectory)[column]["units"] for name, (column, _) in COMPONENTS.items()
+}
+"""Units of what a motion may have, by name: the columns of a trajectory, of its forces each
+component."""
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """A motion, whole or in part; raises `InputError` for values that aren't finite or times that don't increase."""
+    """A motion, whole or in part; raises `InputError` for values that aren't finite or times that
+    don't increase."""
 
     name: str
     time: Array
@@ -47,33 +52,47 @@ class Series:
         for name, values in {"time": self.time, **self.values}.items():
             if values.shape != self.time.shape or values.ndim != 1 or not len(values):
                 raise InputError(
-                    f"{self.name}: {name} has shape {values.shape}, time {self.time.shape}, not both (n > 0,)"
+                    f"{self.name}: {name} has shape {values.shape}, time {self.time.shape}, not "
+                    f"both (n > 0,)"
                 )
             for k in np.flatnonzero(~np.isfinite(values))[:1]:
-                raise InputError(f"{self.name}: {name} is {values[k]} in sample {k}, at t = {self.time[k]:g} s")
+                raise InputError(
+                    f"{self.name}: {name} is {values[k]} in sample {k}, at t = {self.time[k]:g} s"
+                )
         for k in np.flatnonzero(np.diff(self.time) <= 0)[:1]:
             raise InputError(
-                f"{self.name}: times must increase, but {self.time[k + 1]:g} s comes after {self.time[k]:g} s"
+                f"{self.name}: times must increase, but {self.time[k + 1]:g} s comes after "
+                f"{self.time[k]:g} s"
             )
 
     def __getitem__(self, quantity: str) -> Array:
         """A quantity (n,); raises `InputError` for one that it doesn't have."""
         if quantity not in self.values:
             hint = suggestion(quantity, self.values)
-            raise InputError(f"{self.name} has no {quantity}{hint}; it has {', '.join(self.values)}")
+            raise InputError(
+                f"{self.name} has no {quantity}{hint}; it has {', '.join(self.values)}"
+            )
         return self.values[quantity]
 
 
-Source = Series | Trajectory | str | Path | Mapping[str, npt.ArrayLike] | tuple[npt.ArrayLike, npt.ArrayLike]
+Source = (
+    Series
+    | Trajectory
+    | str
+    | Path
+    | Mapping[str, npt.ArrayLike]
+    | tuple[npt.ArrayLike, npt.ArrayLike]
+)
 """A motion: what `read` takes."""
 
 
 def read(source: Source, name: str = "") -> Series:
-    """A motion from a trajectory, a file, arrays by name of which one is ``time``, or the pair (time, omega_c).
+    """A motion from a trajectory, a file, arrays by name of which one is ``time``, or the pair
+    (time, omega_c).
 
-    Files are dualball's own, other HDF5 files with datasets of such names, or CSV with a head of such names; without
-    one its columns are time and omega_c. `name` is what errors call it. Raises `InputError`.
-    """
+    Files are dualball's own, other HDF5 files with datasets of such names, or CSV with a head of
+    such names; without one its columns are time and omega_c. `name` is what errors call it. Raises
+    `InputError`."""
     run = None
     if isinstance(source, Series):
         return source
@@ -82,35 +101,55 @@ def read(source: Source, name: str = "") -> Series:
         source = _csv(path) if path.suffix.lower() in (".csv", ".txt") else _hdf5(path)
     if isinstance(source, Trajectory):
         run = source
-        given: dict[str, npt.ArrayLike] = {quantity: component(run, quantity) for quantity in COMPONENTS}
+        given: dict[str, npt.ArrayLike] = {
+            quantity: component(run, quantity) for quantity in COMPONENTS
+        }
     else:
         given = dict(source) if isinstance(source, Mapping) else {}
     name = name or (run.header.engine if run else "the motion")
     try:
         if not isinstance(source, Mapping | Trajectory):
             given = dict(zip(("time", "omega_c"), source, strict=True))
-        known = {"time" if key == "t" else key: np.asarray(values, float) for key, values in given.items()}
+        known = {
+            "time" if key == "t" else key: np.asarray(values, float)
+            for key, values in given.items()
+        }
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be (time, omega_c), arrays by name, a file or a trajectory: {error}") from error
+        raise InputError(
+            f"{name} must be (time, omega_c), arrays by name, a file or a trajectory: {error}"
+        ) from error
     if "time" not in known or not known.keys() & UNITS.keys() - {"time"}:
-        raise InputError(f"{name} needs time and, say, omega_c; it has {', '.join(given) or 'nothing of the kind'}")
-    return Series(name, known.pop("time"), {key: row for key, row in known.items() if key in UNITS}, run)
+        raise InputError(
+            f"{name} needs time and, say, omega_c; it has "
+            f"{', '.join(given) or 'nothing of the kind'}"
+        )
+    return Series(
+        name, known.pop("time"), {key: row for key, row in known.items() if key in UNITS}, run
+    )
 
 
 def _csv(path: Path) -> dict[str, Array]:
-    """The columns of a table of numbers by the names in its head; time and omega_c if it has none."""
+    """The columns of a table of numbers by the names in its head; time and omega_c if it has
+    none."""
     try:
-        rows = [row for line in path.read_text("utf-8-sig").splitlines() if any(row := table.fields(line))]
+        rows = [
+            row
+            for line in path.read_text("utf-8-sig").splitlines()
+            if any(row := table.fields(line))
+        ]
         head = rows.pop(0) if rows and {"time", "t"} & set(rows[0]) else ["time", "omega_c"]
         return dict(zip(head, np.array(rows, float).reshape(len(rows), len(head)).T, strict=True))
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except ValueError as error:
-        raise InputError(f"{path} is no table of numbers under a head of their names: {error}") from error
+        raise InputError(
+            f"{path} is no table of numbers under a head of their names: {error}"
+        ) from error
 
 
 def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
-    """The trajectory in an HDF5 file, or the columns of a file of another program, which names no schema."""
+    """The trajectory in an HDF5 file, or the columns of a file of another program, which names no
+    schema."""
     try:
         return storage.load(path)
     except StorageError as error:
@@ -119,7 +158,9 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
         ours = error
     with reading(path, sealed=False) as file:
         if "schema" not in file.attrs:
-            found = {name: dataset(file, name) for name in ("t", *UNITS) if file.get(name, getlink=True)}
+            found = {
+                name: dataset(file, name) for name in ("t", *UNITS) if file.get(name, getlink=True)
+            }
             for name, stored in found.items():
                 if stored.dtype.kind not in "fiu" or len(stored.shape or ()) != 1:
                     raise StorageError(f"{name!r} is no column of numbers")
@@ -146,16 +187,20 @@ class Difference:
 
 
 def common_times(a: Series, b: Series) -> Array:
-    """Sample times (n,) of the motion with fewer samples while both last; `InputError` for less than `FEWEST`."""
+    """Sample times (n,) of the motion with fewer samples while both last; `InputError` for less
+    than `FEWEST`."""
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     times: Array = min((t[(begin <= t) & (t <= end)] for t in (a.time, b.time)), key=len)
     if len(times) < FEWEST:
-        raise InputError(f"{a.name} and {b.name} have {len(times)} samples while both last; {FEWEST} are needed")
+        raise InputError(
+            f"{a.name} and {b.name} have {len(times)} samples while both last; {FEWEST} are needed"
+        )
     return times
 
 
 def difference(a: Series, b: Series, quantity: str) -> Difference:
-    """How far a is from b in a quantity at `common_times`, linearly between samples; raises `InputError`."""
+    """How far a is from b in a quantity at `common_times`, linearly between samples; raises
+    `InputError`."""
     times, rows, doubts = common_times(a, b), [], []
     for t, values in ((each.time, each[quantity]) for each in (a, b)):
         rows.append(np.interp(times, t, values))
@@ -165,7 +210,12 @@ def difference(a: Series, b: Series, quantity: str) -> Difference:
     off = np.abs(rows[0] - rows[1])
     k = int(off.argmax())
     return Difference(
-        quantity, _rms(off), float(off[k]), float(times[k]), float(np.abs(rows[1]).max()), math.hypot(*doubts)
+        quantity,
+        _rms(off),
+        float(off[k]),
+        float(times[k]),
+        float(np.abs(rows[1]).max()),
+        math.hypot(*doubts),
     )
 
 
@@ -173,17 +223,21 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def assert_tracks(mine: Source, reference: Source, *, quantity: str = "omega_c", rms: float) -> None:
-    """Assert that a motion follows a reference, as `analytic.simulate` gives it; both are what `read` takes.
+def assert_tracks(
+    mine: Source, reference: Source, *, quantity: str = "omega_c", rms: float
+) -> None:
+    """Assert that a motion follows a reference, as `analytic.simulate` gives it; both are what
+    `read` takes.
 
-    The root mean square of the difference, divided by the largest value of the reference, must not exceed `rms`.
+    The root mean square of the difference, divided by the largest value of the reference, must not
+    exceed `rms`.
 
     Raises
     ------
     AssertionError
         If it does.
-    InputError
-        For fewer than `FEWEST` samples, a reference that ends earlier, samples too far apart to be interpolated.
+    InputError For fewer than `FEWEST` samples, a reference that ends earlier, samples too far apart
+        to be interpolated.
     """
     check_number("rms", rms, "1", POSITIVE)
     a, b = read(mine), read(reference)
@@ -193,25 +247,37 @@ def assert_tracks(mine: Source, reference: Source, *, quantity: str = "omega_c",
         spans = [f"from {each.time[0]:g} to {each.time[-1]:g} s" for each in (b, a)]
         raise InputError(f"the reference lasts {spans[0]}, but {a.name} {spans[1]}")
     if off.scale == 0:
-        raise InputError(f"{quantity} of the reference {b.name} is zero all the time: there is no scale for an error")
+        raise InputError(
+            f"{quantity} of the reference {b.name} is zero all the time: there is no scale for an "
+            f"error"
+        )
     if off.doubt > rms * off.scale / 2:
         raise InputError(
-            f"samples are too far apart: interpolating {quantity} may be off by {off.doubt:.1e} {unit}, while "
+            f"samples are too far apart: interpolating {quantity} may be off by {off.doubt:.1e} "
+            f"{unit}, while "
             f"rms = {rms:g} allows {rms * off.scale:.1e} {unit}"
         )
     assert off.rms <= rms * off.scale, (
-        f"{quantity} of {a.name} does not track {b.name}: rms {off.rms / off.scale:.2e} > {rms:g} of the largest "
-        f"value, {off.scale:.6g} {unit}; farthest off at t = {off.at:g} s, by {off.largest:.3g} {unit}"
+        f"{quantity} of {a.name} does not track {b.name}: rms {off.rms / off.scale:.2e} > {rms:g} "
+        f"of the largest "
+        f"value, {off.scale:.6g} {unit}; farthest off at t = {off.at:g} s, by {off.largest:.3g} "
+        f"{unit}"
     )
 
 
 def assert_settles(
-    time: npt.ArrayLike, omega_c: npt.ArrayLike, p: Parameters, *, case: Case | str | None = None, rtol: float
+    time: npt.ArrayLike,
+    omega_c: npt.ArrayLike,
+    p: Parameters,
+    *,
+    case: Case | str | None = None,
+    rtol: float,
 ) -> None:
-    """Assert that a ball settles in a stationary state of theory: of a case, or in any but NS, which sinks.
+    """Assert that a ball settles in a stationary state of theory: of a case, or in any but NS,
+    which sinks.
 
-    In the last quarter of the motion omega_c must stay within `rtol`, relative, of the state's. That doesn't tell apart
-    the states that go round with the fluid (RR, NR, NS).
+    In the last quarter of the motion omega_c must stay within `rtol`, relative, of the state's.
+    That doesn't tell apart the states that go round with the fluid (RR, NR, NS).
 
     Parameters
     ----------
@@ -221,11 +287,11 @@ def assert_settles(
     ------
     AssertionError
         If it doesn't.
-    InputError
-        If there is no such state, or the motion is too short to judge: before its last quarter three of the slowest
-        time constants must pass, or a ball that started in theory's state might not have left it yet. They are those of
-        a disturbance of the state and of a ball that is taken along from rest, (1 + 2 j)/c with the c of its lag in the
-        state, and no less than Stokes'.
+    InputError If there is no such state, or the motion is too short to judge: before its last
+        quarter three of the slowest time constants must pass, or a ball that started in theory's
+        state might not have left it yet. They are those of a disturbance of the state and of a ball
+        that is taken along from rest, (1 + 2 j)/c with the c of its lag in the state, and no less
+        than Stokes'.
     """
     check_number("rtol", rtol, "1", POSITIVE)
     motion = read((time, omega_c))
@@ -233,11 +299,20 @@ def assert_settles(
         raise InputError(f"there is no case {case!r}; there are {', '.join(Case.__members__)}")
     lasting = analytic.stable_solutions(p, sinking=True) if p.c else []
     stays = [s for s in lasting if not s.moves]
-    states = stays if case is None else [analytic.solution(p, Case[case] if isinstance(case, str) else case)]
+    states = (
+        stays
+        if case is None
+        else [analytic.solution(p, Case[case] if isinstance(case, str) else case)]
+    )
     if not states or not p.c:
-        raise InputError(f"at c = {p.c:g} s-1, omega_0 = {p.omega_0:g} rad s-1 there is no state to settle in")
+        raise InputError(
+            f"at c = {p.c:g} s-1, omega_0 = {p.omega_0:g} rad s-1 there is no state to settle in"
+        )
     if len(motion.time) < FEWEST:
-        raise InputError(f"the motion is too short to judge: {len(motion.time)} samples, at least {FEWEST} are needed")
+        raise InputError(
+            f"the motion is too short to judge: {len(motion.time)} samples, at least {FEWEST} are "
+            f"needed"
+        )
     t, w = (
         row[motion.time >= np.quantile(motion.time[[0, -1]], 1 - SETTLED_PART)]
         for row in (motion.time, motion["omega_c"])
@@ -245,20 +320,31 @@ def assert_settles(
     state = min(states, key=lambda s: abs(s.state.omega_c - w.mean()))
     name, exact = state.case.name, state.state.omega_c
     c = max(p.c, drag.coefficient(abs(p.omega_0 - exact) * p.R, p))
-    slowest = max((1 + 2 * p.j) / c, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)]))
+    slowest = max(
+        (1 + 2 * p.j) / c, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)])
+    )
     lasts, swing = float(motion.time[-1] - motion.time[0]), float(np.ptp(w))
     scale, off = abs(exact) or rotation_scale(p), np.abs(w - exact)
-    needed = slowest * (max(3.0, -math.log(rtol)) if off.max() > rtol * scale < swing else 3.0) / (1 - SETTLED_PART)
+    needed = (
+        slowest
+        * (max(3.0, -math.log(rtol)) if off.max() > rtol * scale < swing else 3.0)
+        / (1 - SETTLED_PART)
+    )
     if lasts < needed:
         raise InputError(
-            f"the motion is too short to judge: it lasts {lasts:.3g} s and should last {needed:.3g} s, since to forget "
+            f"the motion is too short to judge: it lasts {lasts:.3g} s and should last "
+            f"{needed:.3g} s, since to forget "
             f"its start takes the ball time constants of {slowest:.3g} s"
         )
-    elsewhere = [s.case.name for s in lasting if np.all(np.abs(w - s.state.omega_c) <= rtol * scale)]
+    elsewhere = [
+        s.case.name for s in lasting if np.all(np.abs(w - s.state.omega_c) <= rtol * scale)
+    ]
     k = int(off.argmax())
     assert off[k] <= rtol * scale, (
-        f"the ball does not settle in {name}: for the last {SETTLED_PART * lasts:.3g} s omega_c should be within "
-        f"{rtol:g} of {exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t = {t[k]:g} s (on average "
+        f"the ball does not settle in {name}: for the last {SETTLED_PART * lasts:.3g} s omega_c "
+        f"should be within "
+        f"{rtol:g} of {exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t = {t[k]:g} s (on "
+        f"average "
         f"{w.mean():.8g} rad/s; it swings by {swing:.1e} rad/s)"
         + "".join(f"; it settles in {other}" for other in elsewhere[:1])
     )

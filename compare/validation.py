@@ -47,9 +47,11 @@ def validate(
     announce: Announce = lambda verdict: None,
     report: bool = True,
 ) -> list[Verdict]:
-    """Measure with an engine and judge claims on what was measured; store runs, measurements, summary and report.
+    """Measure with an engine and judge claims on what was measured; store runs, measurements,
+    summary and report.
 
-    What the directory holds already is not measured again. A claim is judged as soon as its measurements are there.
+    What the directory holds already is not measured again. A claim is judged as soon as its
+    measurements are there.
 
     Parameters
     ----------
@@ -73,21 +75,38 @@ def validate(
     for p in (sets or {}).values():
         check_type("sets", p, Parameters)
     forget()
-    output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
+    output, chosen = (
+        Path(output),
+        [each for each in select(CLAIMS, claims) if claims or each.level <= level],
+    )
     results.open_directory(output)
-    names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
-    todo = [protocol for protocol in programme.with_needed(PROTOCOLS, names) if protocol.assignment.level <= level]
+    names = (
+        [protocol.name for protocol in PROTOCOLS]
+        if claims is None
+        else [n for c in chosen for n in c.protocols]
+    )
+    todo = [
+        protocol
+        for protocol in programme.with_needed(PROTOCOLS, names)
+        if protocol.assignment.level <= level
+    ]
     engines = [engine] if engine else [*WITNESSES]
     far = ValidationProgress(progress, {}, len(chosen))
     with (
         threads(1) as bench,  # judges while the next protocols' runs are on their way
-        Campaign(output / results.RUNS, workers, limit=limit, report=far.measuring, passing=True) as campaign,
+        Campaign(
+            output / results.RUNS, workers, limit=limit, report=far.measuring, passing=True
+        ) as campaign,
     ):
         labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
-        known = [Job(each, lab, output, sets) for lab in labs for each in PROTOCOLS if each.measures(lab)]
+        known = [
+            Job(each, lab, output, sets) for lab in labs for each in PROTOCOLS if each.measures(lab)
+        ]
         jobs = [job for job in known if job.protocol in todo]
         far.costs = {job.name: job.cost for job in jobs}
-        judging = _Judging(chosen, engines, lambda *of: bench.submit(_announced, announce, *of), far.judged)
+        judging = _Judging(
+            chosen, engines, lambda *of: bench.submit(_announced, announce, *of), far.judged
+        )
         judging.judge(jobs)
         for job, found in programme.run(tuple(jobs)):
             jobs.remove(job)
@@ -95,10 +114,14 @@ def validate(
             judging.take(job, found)
             judging.judge(jobs)
     verdicts = {name: future.result() for name, future in judging.judged.items()}
-    files: dict[str, dict[int, list[str]]] = {each.name: {n: [] for n in each.refine} for each in engines}
+    files: dict[str, dict[int, list[str]]] = {
+        each.name: {n: [] for n in each.refine} for each in engines
+    }
     for job in known:
         if job.file.exists():
-            files[job.lab.engine.name][job.lab.refine].append(job.file.relative_to(output).as_posix())
+            files[job.lab.engine.name][job.lab.refine].append(
+                job.file.relative_to(output).as_posix()
+            )
     count = workers if isinstance(workers, int) else workers.count
     with processes(min(count, os.cpu_count() or 1)) as work:
         draw = far.drawing(work.map) if report else None
@@ -121,14 +144,17 @@ class _Judging:
         self.broken, self.judged = dict[str, str](), dict[str, Future[Verdict]]()
 
     def take(self, job: Job, found: Records | Exception) -> None:
-        """Take in what a protocol has measured, or its error, which takes its own claims with it, and no others."""
+        """Take in what a protocol has measured, or its error, which takes its own claims with it,
+        and no others."""
         if isinstance(found, Exception):
             why = f"{type(found).__name__}: {found}"
             name = job.protocol.name
             if job.lab.engine is self.engines[0]:
                 self.broken[name] = f"{name}: {why}"
                 return
-            found = Records(missing=tuple(Missing(name, each, f"{job.name}: {why}") for each in job.sets))
+            found = Records(
+                missing=tuple(Missing(name, each, f"{job.name}: {why}") for each in job.sets)
+            )
         self.measured[job.lab.engine.name][job.lab.refine] += found
 
     def judge(self, jobs: Sequence[Job]) -> None:
@@ -143,12 +169,14 @@ class _Judging:
                 self.judged[claim.id].add_done_callback(lambda _: self.done())
 
 
-def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0) -> list[Verdict]:
-    """Judge the measurements of the last validation in a directory again, and write summary and report anew.
+def judge_stored(
+    directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0
+) -> list[Verdict]:
+    """Judge the measurements of the last validation in a directory again, and write summary and
+    report anew.
 
-    On so many processes; 0 is this one. Raises `StorageError` if a file is missing, damaged, or was changed;
-    `InputError` for an unknown claim.
-    """
+    On so many processes; 0 is this one. Raises `StorageError` if a file is missing, damaged, or was
+    changed; `InputError` for an unknown claim."""
     directory = Path(directory)
     chosen = {claim.id for claim in select(CLAIMS, claims)}
     summary = results.load(directory)
@@ -157,13 +185,19 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
     testimony = stored(directory)  # what can't be read is said before anything is judged
     with processes(workers) as work:  # the last claims first: they take longest
         found = work.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
-        verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
-        written = _write(directory, Level[summary.level], summary.measurements, testimony, verdicts, work.map)
+        verdicts = {
+            claim.id: Verdict(claim=claim, **each)
+            for claim, each in zip(CLAIMS[::-1], found, strict=True)
+        }
+        written = _write(
+            directory, Level[summary.level], summary.measurements, testimony, verdicts, work.map
+        )
     return [v for v in written if v.claim.id in chosen]
 
 
 def _judged(directory: Path, number: int) -> dict[str, Any]:
-    """In a worker: judge a claim by its number; the verdict's fields, since claims can't be sent between processes."""
+    """In a worker: judge a claim by its number; the verdict's fields, since claims can't be sent
+    between processes."""
     judged = _in_time(CLAIMS[number], stored(directory))
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
@@ -184,14 +218,20 @@ def stored(directory: Path) -> RecordsByEngine:
 
 
 def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Evidence:
-    """Collect what figures draw: checks by claim, and each engine's measurements, at half the usual step if there."""
-    checks = {v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts}
-    first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [Records()]
+    """Collect what figures draw: checks by claim, and each engine's measurements, at half the usual
+    step if there."""
+    checks = {
+        v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts
+    }
+    first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [
+        Records()
+    ]
     return Evidence(checks, first, directory, sum(others, Records()))
 
 
 def stored_evidence(directory: Path) -> Evidence:
-    """As `evidence`, of a stored validation, which is judged again; empty if the directory holds none."""
+    """As `evidence`, of a stored validation, which is judged again; empty if the directory holds
+    none."""
     if not (directory / results.SUMMARY).exists():
         return Evidence()
     testimony = stored(directory)
@@ -206,7 +246,8 @@ def _write(
     known: Mapping[str, Verdict],
     over: Spread | None,
 ) -> list[Verdict]:
-    """Judge what isn't known yet, and write the summary, and the report with what is to draw figures, if anything.
+    """Judge what isn't known yet, and write the summary, and the report with what is to draw
+    figures, if anything.
 
     Return the verdicts on all claims.
     """
@@ -221,8 +262,11 @@ def _write(
     return verdicts
 
 
-def _announced(announce: Announce, claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str]) -> Verdict:
-    """Judge a claim, an error if one of its protocols broke down, and hand the verdict to whoever wants to know."""
+def _announced(
+    announce: Announce, claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str]
+) -> Verdict:
+    """Judge a claim, an error if one of its protocols broke down, and hand the verdict to whoever
+    wants to know."""
     judged = full_verdict(claim, testimony)
     if errors := [why for name, why in broken.items() if name in claim.protocols]:
         judged = replace(judged, outcome=Outcome.ERROR, error="; ".join(errors))

@@ -1,4 +1,5 @@
-"""The documentation site: ``make docs``. Strict, and offline: formulas, search and pictures need no other server."""
+"""The documentation site: ``make docs``. Strict, and offline: formulas, search and pictures need no
+other server."""
 
 from __future__ import annotations
 
@@ -28,7 +29,9 @@ log = logging.getLogger(__name__)
 
 project = "dualball"
 author = "The dualball developers"
-version = release = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+version = release = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"][
+    "version"
+]
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
 exclude_patterns = ["_build", "conf.py", "studies"]
@@ -49,7 +52,9 @@ nb_execution_timeout = 600  # a machine may be busy
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
 os.environ |= {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
-os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for !dualball
+os.environ["PATH"] = (
+    f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for !dualball
+)
 myst_enable_extensions = ["dollarmath", "attrs_inline"]
 myst_heading_anchors = 3
 
@@ -86,12 +91,16 @@ def page(package: ModuleType) -> None:
     for each in (getattr(package, name) for name in getattr(package, "__all__", ())):
         summary = literal_bars(inspect.getdoc(each).split("\n")[0])
         lines += ["", f"* :py:obj:`~{each.__module__}.{each.__qualname__}`: {summary}"]
-    modules = [each for each in pkgutil.iter_modules(package.__path__) if not each.name.startswith("_")]
+    modules = [
+        each for each in pkgutil.iter_modules(package.__path__) if not each.name.startswith("_")
+    ]
     for module in modules:
         if not module.ispkg:
             name = f"{package.__name__}.{module.name}"
             lines += ["", name, "-" * len(name), "", f".. automodule:: {name}"]
-    rooms = [importlib.import_module(f"{package.__name__}.{each.name}") for each in modules if each.ispkg]
+    rooms = [
+        importlib.import_module(f"{package.__name__}.{each.name}") for each in modules if each.ispkg
+    ]
     rooms = [room for room in rooms if any(pkgutil.iter_modules(room.__path__))]
     if rooms:
         lines += ["", ".. toctree::", "   :hidden:", "", *(f"   {room.__name__}" for room in rooms)]
@@ -101,9 +110,12 @@ def page(package: ModuleType) -> None:
 
 
 def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
-    """Links to modules, which a repository shows as files, lead to the reference; those to tests are only names."""
+    """Links to modules, which a repository shows as files, lead to the reference; those to tests
+    are only names."""
     text = source[-1]  # of a page, or of what a page includes
-    if str(where).startswith("attractors/"):  # tables written by `dualball attractors --page`, to which a page links
+    if str(where).startswith(
+        "attractors/"
+    ):  # tables written by `dualball attractors --page`, to which a page links
         text[0] = f"---\norphan: true\n---\n\n{text[0]}"
 
     def to_reference(link: re.Match[str]) -> str:
@@ -113,14 +125,19 @@ def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
         return f"{{py:mod}}`{link[1].strip('`')} <{name}>`"
 
     text[0] = re.sub(
-        rf"\[([^\]]+)\]\((?:\.\./)*((?:{'|'.join(PACKAGES)})/(?:[\w/]*\.py|[\w/]*))\)", to_reference, text[0]
+        rf"\[([^\]]+)\]\((?:\.\./)*((?:{'|'.join(PACKAGES)})/(?:[\w/]*\.py|[\w/]*))\)",
+        to_reference,
+        text[0],
     )
     text[0] = re.sub(r"\[([^\]]+)\]\((?:(?:\.\./)*tests/[^)]*|CITATION\.cff)\)", r"`\1`", text[0])
-    text[0] = re.sub(r"\]\((CONTRIBUTING|CHANGELOG)\.md\)", lambda link: f"](docs/{link[1].lower()}.md)", text[0])
+    text[0] = re.sub(
+        r"\]\((CONTRIBUTING|CHANGELOG)\.md\)", lambda link: f"](docs/{link[1].lower()}.md)", text[0]
+    )
 
 
 def as_typed(app: Sphinx, tree: nodes.document) -> None:
-    """Cells look like the shell or the file that they are, long values are left out; formulas are checked."""
+    """Cells look like the shell or the file that they are, long values are left out; formulas are
+    checked."""
     for block in tree.findall(nodes.literal_block):
         first, _, rest = block.astext().partition("\n")
         if first.startswith("!"):
@@ -133,11 +150,19 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
             block[:] = [nodes.Text(rest.lstrip())]
         block.rawsource = block.astext()
     for said in list(tree.findall(addnodes.desc_annotation)):
-        if said.astext().startswith(" = ") and len(said.astext()) > 100:  # a table, which its module shows better
+        if (
+            said.astext().startswith(" = ") and len(said.astext()) > 100
+        ):  # a table, which its module shows better
             said.parent.remove(said)
     entry: addnodes.desc | None = None
-    for each in list(tree.findall(addnodes.desc)):  # constants that are declared together have one text
-        if entry and each["objtype"] == entry["objtype"] == "data" and each[-1].astext() == entry[-1].astext() != "":
+    for each in list(
+        tree.findall(addnodes.desc)
+    ):  # constants that are declared together have one text
+        if (
+            entry
+            and each["objtype"] == entry["objtype"] == "data"
+            and each[-1].astext() == entry[-1].astext() != ""
+        ):
             entry[-1:-1] = each[:-1]
             each.parent.remove(each)
         else:
@@ -149,24 +174,39 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
             log.warning("formula %s: %s", formula.astext(), error, location=formula)
 
 
-_AS_IT_IS = (nodes.FixedTextElement, nodes.literal, nodes.math, nodes.title, nodes.raw, addnodes.desc_signature)
+_AS_IT_IS = (
+    nodes.FixedTextElement,
+    nodes.literal,
+    nodes.math,
+    nodes.title,
+    nodes.raw,
+    addnodes.desc_signature,
+)
 
 
 def symbols(app: Sphinx, tree: nodes.document) -> None:
-    """Symbols in running text are set as on the pages of results; code, titles and docstrings stay as they are."""
+    """Symbols in running text are set as on the pages of results; code, titles and docstrings stay
+    as they are."""
     if app.env.docname.startswith("api/"):
         return
     for text in list(tree.findall(nodes.Text)):
         up, shown = text.parent, typeset(text.astext())
         while up and not isinstance(up, _AS_IT_IS):
             up = up.parent
-        if up is None and "<" in shown and "rhdf5" not in text.parent.astext():  # R is a program there
+        if (
+            up is None and "<" in shown and "rhdf5" not in text.parent.astext()
+        ):  # R is a program there
             text.parent.replace(text, nodes.raw("", shown, format="html"))
 
 
-def docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Plain text with `names` between backticks and sections of numpy's kind, as reStructuredText."""
-    text = "" if lines[:1] and lines[0].startswith("Alias for field number") else "\n".join(lines)  # says nothing
+def docstring(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Plain text with `names` between backticks and sections of numpy's kind, as
+    reStructuredText."""
+    text = (
+        "" if lines[:1] and lines[0].startswith("Alias for field number") else "\n".join(lines)
+    )  # says nothing
     text = re.sub(r"^(\w+)\n-{3,}$", r"**\1**\n", text, flags=re.MULTILINE)
     text = re.sub(r"^(\w[\w, ]*) : ", r"``\1``\n    ", text, flags=re.MULTILINE)
     text = re.sub(r"(^\S.*\n)\n(?= {4}\S)", r"\1\n::\n\n", text, flags=re.MULTILINE)
@@ -174,13 +214,20 @@ def docstring(app: Sphinx, what: str, name: str, obj: object, options: object, l
 
 
 def literal_bars(text: str) -> str:
-    """Text in which |x| is an absolute value and no substitution; code and formulas stay as they are."""
+    """Text in which |x| is an absolute value and no substitution; code and formulas stay as they
+    are."""
     code = r"(^::\n\n(?:(?: {4}.*)?(?:\n|\Z))+|``.+?``|`[^`]*`)"
     return re.sub(rf"{code}|\|", lambda part: part[1] or r"\|", text, flags=re.MULTILINE)
 
 
 def signature(
-    app: Sphinx, what: str, name: str, obj: object, options: object, arguments: str | None, returned: str | None
+    app: Sphinx,
+    what: str,
+    name: str,
+    obj: object,
+    options: object,
+    arguments: str | None,
+    returned: str | None,
 ) -> tuple[str | None, str | None]:
     """Aliases of types by their names."""
     array = "ndarray[tuple[Any, ...], dtype[float64]]"

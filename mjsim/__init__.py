@@ -1,4 +1,5 @@
-"""The dual-point contact ball in MuJoCo, and Coulomb's law for any model; knows no solution of the problem."""
+"""The dual-point contact ball in MuJoCo, and Coulomb's law for any model; knows no solution of the
+problem."""
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -8,11 +9,15 @@ import mujoco
 import model
 
 if not hasattr(model, "Parameters"):
-    raise ImportError(f"{model.__file__} hides the package model of dualball: rename that, or work in another folder")
+    raise ImportError(
+        f"{model.__file__} hides the package model of dualball: rename that, or work in another "
+        f"folder"
+    )
 
 if not hasattr(mujoco.MjModel, "pair_adhesion"):
     raise ImportError(
-        f"dualball needs MuJoCo 4.0, and this is {mujoco.__version__}: Coulomb's law alone, package mujoco-coulomb, "
+        f"dualball needs MuJoCo 4.0, and this is {mujoco.__version__}: Coulomb's law alone, "
+        f"package mujoco-coulomb, "
         "runs on 3.3 and later"
     )
 

@@ -1,13 +1,15 @@
-"""Which kinematic case is it, and when does it change? Detected step by step from slip speed and force.
+"""Which kinematic case is it, and when does it change? Detected step by step from slip speed and
+force.
 
-A contact is open where it carries no force. A closed one slips where it uses the whole of the friction and moves faster
-than a dead band; it rolls where either is clearly not so; in between it keeps its state. A state counts only if it
-lasts for `PERSISTENCE` steps: single steps of a contact that hovers or rebounds change nothing.
+A contact is open where it carries no force. A closed one slips where it uses the whole of the
+friction and moves faster than a dead band; it rolls where either is clearly not so; in between it
+keeps its state. A state counts only if it lasts for `PERSISTENCE` steps: single steps of a contact
+that hovers or rebounds change nothing.
 
-Events are located between steps: a contact closes where the parabola through its last three gaps vanishes, opens where
-that through its normal forces does, and sticks where that through its slip speeds does; it slips where that through the
-share of the friction in use reaches one. Where that isn't within the step of the change, it is the nearer end of it.
-"""
+Events are located between steps: a contact closes where the parabola through its last three gaps
+vanishes, opens where that through its normal forces does, and sticks where that through its slip
+speeds does; it slips where that through the share of the friction in use reaches one. Where that
+isn't within the step of the change, it is the nearer end of it."""
 
 from __future__ import annotations
 
@@ -27,13 +29,17 @@ PERSISTENCE = 3
 _CONTACTS = (Contact.R, Contact.S, Contact.N)
 _R, _S, _N, _AS_BEFORE = range(4)
 _SATURATED, _FREE = 1e-6, 1e-4
-"""How far from its Coulomb value friction may be for slipping, and must be for rolling, relative."""
+"""How far from its Coulomb value friction may be for slipping, and must be for rolling,
+relative."""
 _SLIDES = 3.0
-"""A sliding contact is faster than so many times the change of its speed in a step: ending slip changes faster."""
+"""A sliding contact is faster than so many times the change of its speed in a step: ending slip
+changes faster."""
 _SHARED = 10.0
-"""A contact that creeps no faster than so many times as another one that holds doesn't slip by itself."""
+"""A contact that creeps no faster than so many times as another one that holds doesn't slip by
+itself."""
 _BACK = 16
-"""Steps that are kept to locate a change: how long a slip that sets in may take to leave the dead band."""
+"""Steps that are kept to locate a change: how long a slip that sets in may take to leave the dead
+band."""
 
 
 class Contacts(NamedTuple):
@@ -56,11 +62,15 @@ class Classifier:
     ----------
     timestep : s
     midpoint : where in a step forces are found, in steps after its beginning
-    dead_band : slip speeds, m s-1, below which contacts roll, of their friction forces divided by the mass, m s-2
-    """
+    dead_band : slip speeds, m s-1, below which contacts roll, of their friction forces divided by
+    the mass, m s-2"""
 
     def __init__(
-        self, p: Parameters, timestep: float, midpoint: float, dead_band: Callable[[npt.ArrayLike], Array]
+        self,
+        p: Parameters,
+        timestep: float,
+        midpoint: float,
+        dead_band: Callable[[npt.ArrayLike], Array],
     ) -> None:
         self._p, self._timestep, self._midpoint, self._dead_band = p, timestep, midpoint, dead_band
         self._coefficients = np.array([p.mu, p.eta])
@@ -69,16 +79,20 @@ class Classifier:
         self._waiting = 0
         """How many are not."""
         self._latest = np.empty((len(Contacts._fields) + 1, 0, 2))
-        """The last steps, decided or not, and the state of the contacts in each of them judged alone."""
+        """The last steps, decided or not, and the state of the contacts in each of them judged
+        alone."""
         self._changes: list[tuple[int, float, int, int]] = []
-        """The first step of a new case, when it began in s, the case before and the new one; from the first case on."""
+        """The first step of a new case, when it began in s, the case before and the new one; from
+        the first case on."""
 
     def add(self, contacts: Contacts, last: bool = False) -> None:
         """Take in the next steps; with `last` all are decided, since no more will come."""
         first = self._latest.shape[1] - self._waiting
         steps = np.concatenate([self._latest, [*contacts, self._judge(contacts)]], axis=1)
         shown = steps[-1]
-        shown[:] = _carried_on(shown, shown != _AS_BEFORE)  # between the bands a contact is what it was
+        shown[:] = _carried_on(
+            shown, shown != _AS_BEFORE
+        )  # between the bands a contact is what it was
         shown[shown == _AS_BEFORE] = _R
         stop = max(first, len(shown) - (0 if last else PERSISTENCE - 1))
         if stop > first:
@@ -92,22 +106,26 @@ class Classifier:
         """States of the contacts (rolling, slipping, open) by each step alone, (steps, 2)."""
         normal, friction, speed, _ = contacts
         limit = self._coefficients * normal
-        # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
-        # below the speed that belongs to all of it.
+        # A friction force of which one step can build up only a part leaves, while it changes
+        # slowly, a creep far below the speed that belongs to all of it.
         load = self._coefficients * np.maximum(normal / self._p.m, self._p.g)
         band = self._dead_band(load)
         saturated = friction >= (1 - _SATURATED) * limit
-        # A rotation that slips at both contacts alike while one of them holds is creep, too: the load moves from one
-        # to the other, as it may where both roll, and slip would be stopped by the one that holds.
+        # A rotation that slips at both contacts alike while one of them holds is creep, too: the
+        # load moves from one to the other, as it may where both roll, and slip would be stopped by
+        # the one that holds.
         held = ((normal > 0) & ~saturated)[..., ::-1] & (speed < _SHARED * speed[..., ::-1])
         slips = saturated & (speed > 3 * band) & ~held
         rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
         return np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
 
     def _lasting(self, shown: Array) -> Array:
-        """The states of the contacts that last, (steps + 1, 2): before these steps, and in each of them."""
+        """The states of the contacts that last, (steps + 1, 2): before these steps, and in each of
+        them."""
         lasts = np.zeros(shown.shape, dtype=bool)
-        alike = np.lib.stride_tricks.sliding_window_view(shown, min(PERSISTENCE, len(shown)), axis=0)
+        alike = np.lib.stride_tricks.sliding_window_view(
+            shown, min(PERSISTENCE, len(shown)), axis=0
+        )
         lasts[: len(alike)] = (alike == alike[..., :1]).all(axis=-1)
         if not self._changes:  # the first that lasts, or the first of all
             begin = _case_number(shown[lasts.argmax(axis=0), [0, 1]])
@@ -116,7 +134,8 @@ class Classifier:
         return _carried_on(np.vstack([now, shown]), np.vstack([[True, True], lasts]))
 
     def _note(self, step: int, steps: Array, old: Array, new: Array) -> None:
-        """Note that a case begins with a step, the last one of `steps` (4, n, 2), and locate its beginning."""
+        """Note that a case begins with a step, the last one of `steps` (4, n, 2), and locate its
+        beginning."""
         mid = self._midpoint
         closes, other = list[float](), list[float]()
         for contact in np.flatnonzero(old != new).tolist():
@@ -130,16 +149,23 @@ class Classifier:
                     k -= 1
                 values, ahead, within = speed, 0.0, (-1.0, last - k + 3.0)
             elif new[contact] == _S:
-                values = 1 - _SATURATED - friction / (self._coefficients[contact] * np.maximum(normal, 1e-300))
+                values = (
+                    1
+                    - _SATURATED
+                    - friction / (self._coefficients[contact] * np.maximum(normal, 1e-300))
+                )
                 while last - k < _BACK - 1 and k > 1 and values[k - 1] <= 0:
                     k -= 1
             found = k - last + _vanishes(values[:k], ahead, within)
             (closes if old[contact] == _N else other).append(found)
         located = (step + (min(closes) if closes else max(other))) * self._timestep
-        self._changes.append((step, max(self._changes[-1][1], located), _case_number(old), _case_number(new)))
+        self._changes.append(
+            (step, max(self._changes[-1][1], located), _case_number(old), _case_number(new))
+        )
 
     def cases(self, steps: npt.NDArray[np.int_]) -> npt.NDArray[np.int8]:
-        """Numbers of the cases in these steps; steps not yet decided get the case of the last decided one."""
+        """Numbers of the cases in these steps; steps not yet decided get the case of the last
+        decided one."""
         first, codes = [step for step, *_ in self._changes], [code for *_, code in self._changes]
         return np.array(codes, dtype=np.int8)[np.searchsorted(first, steps, side="right") - 1]
 
@@ -147,19 +173,28 @@ class Classifier:
         """Changes of case so far, up to a time in s."""
         changes = [change for change in self._changes[1:] if change[1] <= until]
         _, time, before, after = np.array(changes).reshape(-1, 4).T
-        none, codes = np.zeros((len(time), 3)), {"from_case": before.astype(np.int8), "to_case": after.astype(np.int8)}
+        none, codes = (
+            np.zeros((len(time), 3)),
+            {"from_case": before.astype(np.int8), "to_case": after.astype(np.int8)},
+        )
         return Events(time=time, **codes, impulse_A=none, impulse_B=none)
 
     def state(self) -> dict[str, npt.NDArray[Any]]:
         """Copies of all that is carried from one call to the next, for `restore`."""
         counts = np.array([self.decided, self._waiting])
-        return {"latest": self._latest.copy(), "counts": counts, "changes": np.array(self._changes).reshape(-1, 4)}
+        return {
+            "latest": self._latest.copy(),
+            "counts": counts,
+            "changes": np.array(self._changes).reshape(-1, 4),
+        }
 
     def restore(self, state: dict[str, npt.NDArray[Any]]) -> None:
         """Go on from what `state` returned."""
         self._latest, (self.decided, self._waiting) = state["latest"], state["counts"].tolist()
         changes = state["changes"].tolist()
-        self._changes = [(int(step), time, int(before), int(after)) for step, time, before, after in changes]
+        self._changes = [
+            (int(step), time, int(before), int(after)) for step, time, before, after in changes
+        ]
 
 
 def _case_number(states: Array) -> int:
@@ -174,14 +209,16 @@ def _carried_on(states: Array, known: npt.NDArray[np.bool_]) -> Array:
 
 
 def _vanishes(values: Array, ahead: float, within: tuple[float, float]) -> float:
-    """Where the parabola through the last three values of successive steps vanishes, in steps after the next one.
+    """Where the parabola through the last three values of successive steps vanishes, in steps after
+    the next one.
 
-    A value is that of so many steps `ahead` of the beginning of its step. The result is the nearest root `within` an
-    interval, or else the end of it nearest to a root.
-    """
+    A value is that of so many steps `ahead` of the beginning of its step. The result is the nearest
+    root `within` an interval, or else the end of it nearest to a root."""
     if len(values) < 3 or not np.isfinite(values[-3:]).all():
         return within[0]
     a, b, c = values[-3:].tolist()
-    roots = np.roots([(a - 2 * b + c) / 2, (a - 4 * b + 3 * c) / 2, c]).real + ahead - 1  # in steps after the last
+    roots = (
+        np.roots([(a - 2 * b + c) / 2, (a - 4 * b + 3 * c) / 2, c]).real + ahead - 1
+    )  # in steps after the last
     inside = np.clip(roots, *within)
     return float(inside[np.abs(inside - roots).argmin()]) if len(roots) else within[0]

@@ -23,9 +23,9 @@ def loop(function: Any) -> Any:
 
     So are the functions of mjsim that it calls, which must be known above it.
 
-    Numba keeps what it compiles on disk by name, and compiles it again when the function's own file has changed, but
-    not when that of a function has which it calls: the name contains the digest of those.
-    """
+    Numba keeps what it compiles on disk by name, and compiles it again when the function's own file
+    has changed, but not when that of a function has which it calls: the name contains the digest of
+    those."""
     if not kernels.COMPILES:
         return function
     called = _called(function)
@@ -52,5 +52,9 @@ def loop(function: Any) -> Any:
 def _called(function: Any) -> set[Any]:
     """The functions of mjsim that a function calls, and those that they call."""
     names = map(function.__globals__.get, function.__code__.co_names)
-    own = {each for each in names if inspect.isfunction(each) and each.__module__.startswith(f"{__package__}.")}
+    own = {
+        each
+        for each in names
+        if inspect.isfunction(each) and each.__module__.startswith(f"{__package__}.")
+    }
     return own.union(*map(_called, own))

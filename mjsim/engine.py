@@ -19,7 +19,17 @@ from mjsim import recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
-from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory, time_scales
+from model import (
+    Events,
+    Flow,
+    Header,
+    InputError,
+    Parameters,
+    SimulationError,
+    State,
+    Trajectory,
+    time_scales,
+)
 from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES, check_place
@@ -30,12 +40,14 @@ EVENT_TIMES = "located between the time steps; what jumps only to the step"
 NOTED = 4096
 """Steps that are noted before their cases are told, and samples handed out."""
 RUNS_A_THREAD = 16
-"""Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's Python."""
+"""Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's
+Python."""
 MOST_THREADS = 1024
 
 
 class Run:
-    """A simulation under way: iterating advances it and yields blocks of samples, of dtype `model.trajectory.SAMPLE`.
+    """A simulation under way: iterating advances it and yields blocks of samples, of dtype
+    `model.trajectory.SAMPLE`.
 
     Parameters
     ----------
@@ -46,14 +58,15 @@ class Run:
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
     state : `state()` of an earlier process, from which to go on
-    progress : called with the fraction done, from time to time; an error that it raises ends the run
+    progress : called with the fraction done, from time to time; an error that it raises ends the
+    run
 
     A run that diverges yields what it has, and its header says why.
 
     Raises
     ------
-    InputError
-        If an argument is of another type or out of range, or the time step is too large for the problem.
+    InputError If an argument is of another type or out of range, or the time step is too large for
+        the problem.
     """
 
     def __init__(
@@ -72,7 +85,10 @@ class Run:
         check_type("p", p, Parameters)
         check_type("flow", flow, Flow | None)
         check_type("settings", settings, ContactSettings | None)
-        self._flow, self._settings = flow or Flow.steady(p.omega_0), settings or ContactSettings.for_problem(p)
+        self._flow, self._settings = (
+            flow or Flow.steady(p.omega_0),
+            settings or ContactSettings.for_problem(p),
+        )
         self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
         self._state, self._progress = state, progress or (lambda done: None)
         self._timestep = self._settings.timestep
@@ -86,7 +102,9 @@ class Run:
         }  # fmt: skip
         self.header = Header("mujoco", p, self._flow, shown, mjcf)
         """Where the trajectory comes from; a failure appears here."""
-        self._classifier = Classifier(p, self._timestep, self._settings.midpoint, self._settings.dead_band)
+        self._classifier = Classifier(
+            p, self._timestep, self._settings.midpoint, self._settings.dead_band
+        )
         self._end = math.inf
         """When it broke down, s."""
 
@@ -106,20 +124,32 @@ class Run:
             ball.restore(self._state)
             self._classifier.restore(self._state)
         noted, steps = np.empty((NOTED, recorder.COLUMNS)), (self._count - 1) * self._interval + 1
-        while self._step < steps and not self.header.failure:  # nothing is needed of steps after the last sample
+        while (
+            self._step < steps and not self.header.failure
+        ):  # nothing is needed of steps after the last sample
             rows = noted[: steps - self._step]
-            ball.advance(self._flow((self._step + np.arange(len(rows)) + 0.5) * self._timestep), rows)
-            waiting = np.concatenate([self._waiting, rows[-self._step % self._interval :: self._interval]])
+            ball.advance(
+                self._flow((self._step + np.arange(len(rows)) + 0.5) * self._timestep), rows
+            )
+            waiting = np.concatenate(
+                [self._waiting, rows[-self._step % self._interval :: self._interval]]
+            )
             self._step += len(rows)
             self._classifier.add(recorder.contacts(rows), self._step == steps)
             self._progress(self._step / steps)
             first = -(-self._step // self._interval) - len(waiting)
-            raw, self._waiting = np.split(waiting, [-(-self._classifier.decided // self._interval) - first])
+            raw, self._waiting = np.split(
+                waiting, [-(-self._classifier.decided // self._interval) - first]
+            )
             yield self._finish(first, raw)
 
     def state(self) -> dict[str, Any]:
         """All that is carried on from the blocks so far, for another run of the same to go on."""
-        return {"step": np.array(self._step), "waiting": self._waiting} | self.ball.state() | self._classifier.state()
+        return (
+            {"step": np.array(self._step), "waiting": self._waiting}
+            | self.ball.state()
+            | self._classifier.state()
+        )
 
     def trajectory(self) -> Trajectory:
         """The whole run, carried out to its end."""
@@ -128,7 +158,8 @@ class Run:
         return Trajectory.from_blocks(self.header, blocks, self.events)
 
     def _finish(self, first: int, raw: Array) -> npt.NDArray[np.void]:
-        """Turn raw samples (n, columns) into a block, up to where the run diverges or the ball breaks through."""
+        """Turn raw samples (n, columns) into a block, up to where the run diverges or the ball
+        breaks through."""
         p, samples = self._p, np.arange(first, first + len(raw))
         time = samples.astype(float) * (self._interval * self._timestep)
         sound = (np.abs(raw) < recorder.HUGE).all(axis=1) & (raw[:, 1:3] > -p.r).all(axis=1)
@@ -137,7 +168,11 @@ class Run:
         block["case"] = self._classifier.cases(samples[:count] * self._interval)
         if count < len(raw):
             self._end = end = float(time[count])
-            left = [f"{x} = {block[x][-1]:.6g} {unit}" for x, unit in zip(VARIABLES, UNITS, strict=True) if count]
+            left = [
+                f"{x} = {block[x][-1]:.6g} {unit}"
+                for x, unit in zip(VARIABLES, UNITS, strict=True)
+                if count
+            ]
             failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
             self.header = dataclasses.replace(self.header, failure=failure)
         return block
@@ -147,7 +182,8 @@ def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
     """`check_place`, and a warning if friction at both contacts makes them chatter."""
     if settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
-            f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters with these settings; "
+            f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters "
+            f"with these settings; "
             "ContactSettings.suited gives slower contacts",
             stacklevel=4,
         )
@@ -157,7 +193,9 @@ def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
 def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> None:
     """`time_scales.check_timestep` with the drag of these engines."""
     ball = Ball.of(p, ContactSettings())
-    time_scales.check_timestep(timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m)
+    time_scales.check_timestep(
+        timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m
+    )
 
 
 def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tuple[int, int]:
@@ -165,7 +203,13 @@ def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tu
     t_end = check_number("t_end", t_end, "s", Range(timestep), "to hold a time step it")
     if sample_interval is None:
         sample_interval = max(t_end / 1000, timestep)
-    check_number("sample_interval", sample_interval, "s", Range(timestep * (1 - 1e-9)), "to hold a time step it")
+    check_number(
+        "sample_interval",
+        sample_interval,
+        "s",
+        Range(timestep * (1 - 1e-9)),
+        "to hold a time step it",
+    )
     steps = max(1, round(sample_interval / timestep))
     return steps, math.floor(t_end / (steps * timestep) + 1e-9) + 1
 
@@ -186,7 +230,9 @@ def simulate(
     Raises `SimulationError` if the run diverges; it carries the samples so far.
     """
     run = p, x0, t_end, flow, settings
-    trajectory = Run(*run, sample_interval=sample_interval, theta_0=theta_0, progress=progress).trajectory()
+    trajectory = Run(
+        *run, sample_interval=sample_interval, theta_0=theta_0, progress=progress
+    ).trajectory()
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
     return trajectory
@@ -204,12 +250,13 @@ def simulate_many(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Trajectory]:
-    """Simulate many runs, in this process; arguments as of `Run`, parameters and starts one for each.
+    """Simulate many runs, in this process; arguments as of `Run`, parameters and starts one for
+    each.
 
-    `flow` is one for all, one for each, or None for each one's own omega_0; settings, if None, are the softest that any
-    of the runs asks for. `threads` of them go on at once; None is a thread for each processor that has `RUNS_A_THREAD`
-    of them. Results are the same to the bit whatever the number. A run that breaks down has a header that says so; the
-    others go on.
+    `flow` is one for all, one for each, or None for each one's own omega_0; settings, if None, are
+    the softest that any of the runs asks for. `threads` of them go on at once; None is a thread for
+    each processor that has `RUNS_A_THREAD` of them. Results are the same to the bit whatever the
+    number. A run that breaks down has a header that says so; the others go on.
 
     Raises
     ------
@@ -220,7 +267,8 @@ def simulate_many(
     flows = flow if isinstance(flow, Sequence) else [flow] * len(parameters)
     if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
         raise InputError(
-            f"every run needs parameters, a start and a flow, but there are {len(parameters)} parameter sets, "
+            f"every run needs parameters, a start and a flow, but there are {len(parameters)} "
+            f"parameter sets, "
             f"{len(x0s)} starts and {len(flows)} flows"
         )
     if threads is None:

@@ -1,10 +1,11 @@
-"""The ball on a free joint, which may cross the axis, under Coulomb's law: whole runs, and landings of balls on joints.
+"""The ball on a free joint, which may cross the axis, under Coulomb's law: whole runs, and landings
+of balls on joints.
 
-The law is `mjsim.Coulomb`, rigid, which serves any model and knows nothing of this one; of what is done between the
-steps there is drag alone. Semi-implicit steps are leapfrog: places are half a step ahead of velocities. The wall is a
-block that is turned to the ball before each step and moves during it as a cylinder does past the ball (`against`).
-A ball that lands, or comes near the vessel's axis, takes that step in shorter ones (`through`).
-"""
+The law is `mjsim.Coulomb`, rigid, which serves any model and knows nothing of this one; of what is
+done between the steps there is drag alone. Semi-implicit steps are leapfrog: places are half a step
+ahead of velocities. The wall is a block that is turned to the ball before each step and moves
+during it as a cylinder does past the ball (`against`). A ball that lands, or comes near the
+vessel's axis, takes that step in shorter ones (`through`)."""
 
 from __future__ import annotations
 
@@ -32,13 +33,15 @@ COARSE = 64
 _FIRST = 8
 """and the longest before one."""
 _SHARE = 5e-3
-"""`share` of the law: contact forces must be steady enough for their change in a step to be told."""
+"""`share` of the law: contact forces must be steady enough for their change in a step to be
+told."""
 _MEAN = 4
 """Steps over which contact forces are taken: they may go up and down from step to step."""
 _TOUCHES = 1e-6
 """Gap of a contact that touches, in units of R."""
 _LEAST = 16
-"""A blow just after the beginning or before the end of a whole step has a step shorter by up to that."""
+"""A blow just after the beginning or before the end of a whole step has a step shorter by up to
+that."""
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 _PLACE, _SEEN, (_A_x, _A_y, _B_x, _B_y) = recorder.COORDINATES, recorder.SENSORS, recorder.SLIPS
@@ -67,7 +70,8 @@ class Body(NamedTuple):
 
 
 def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, seen: Any) -> float:
-    """Take a step of so many seconds under Coulomb's law, places half of it ahead of velocities; `seen` gets sensors.
+    """Take a step of so many seconds under Coulomb's law, places half of it ahead of velocities;
+    `seen` gets sensors.
 
     `theta` is the azimuth before the last step; that before this one is returned.
     """
@@ -93,10 +97,13 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
 
 @loop
 def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) -> float:
-    """Take a `step` for each omega_0, noted in rows (steps, `COLUMNS`) as those of a ball on joints."""
+    """Take a `step` for each omega_0, noted in rows (steps, `COLUMNS`) as those of a ball on
+    joints."""
     for number in range(len(fluid)):
         row = rows[number]
-        qpos = body.qpos  # half a step ahead of velocities, and these along the axes of where the ball was
+        qpos = (
+            body.qpos
+        )  # half a step ahead of velocities, and these along the axes of where the ball was
         row[1], row[2] = body.ball.R - math.hypot(qpos[0], qpos[1]), qpos[2] - body.ball.r
         velocities = joint_velocities(qpos, qpos[3:], body.qvel, duration / 2)
         for i in range(6):
@@ -116,7 +123,8 @@ def closes(gap: float, speed: float, rate: float, fall: float) -> float:
 
 
 def average(means: Any, sensors: Any, count: int) -> None:
-    """Update means of force sensors over `count` steps by those of one more; axes are those of the last contact."""
+    """Update means of force sensors over `count` steps by those of one more; axes are those of the
+    last contact."""
     for contact in range(0, 28, 14):
         for i in range(contact + 1, contact + 4):
             means[i] = (count * means[i] + sensors[i]) / (count + 1)
@@ -129,20 +137,21 @@ def through(
     body: Body, whole: float, longest: float, fall: float, reach: float, omega_0: float, theta: float,
     rates: tuple[float, float], seen: Any,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float, float]:  # fmt: skip
-    """Take a ball through one whole step in short ones that end at its landings; place and velocities at one time.
+    """Take a ball through one whole step in short ones that end at its landings; place and
+    velocities at one time.
 
-    A contact that closes faster than `fall` does so in the middle of a short step: of a blow that two steps share,
-    friction, which turns, would have two directions. Until then it isn't seen; others are within `reach`, m. `rates`
-    are what a second changes of the speeds of h and y, m s-2.
+    A contact that closes faster than `fall` does so in the middle of a short step: of a blow that
+    two steps share, friction, which turns, would have two directions. Until then it isn't seen;
+    others are within `reach`, m. `rates` are what a second changes of the speeds of h and y, m s-2.
 
-    `seen` gets the sensors at the beginning (after a landing in the first fine step), their means over `_MEAN` steps
-    half a whole one before the end, or after the last blow, and at the end; and has room for a row.
+    `seen` gets the sensors at the beginning (after a landing in the first fine step), their means
+    over `_MEAN` steps half a whole one before the end, or after the last blow, and at the end; and
+    has room for a row.
 
     Returns
     -------
-    azimuth, h and y; velocities of the joints, and those before the last step; its duration; time between what was seen
-    last, or 0, s
-    """
+    azimuth, h and y; velocities of the joints, and those before the last step; its duration; time
+    between what was seen last, or 0, s"""
     qpos, qvel, last, ball, margins = body.qpos, body.qvel, body.last, body.ball, body.margins
     rate_h, rate_y = rates
     left, growing, finest, shown, first, latest = whole, longest, whole / FINE, False, 0, 0
@@ -196,13 +205,20 @@ def through(
 
 
 class FreeBall:
-    """A ball on a free joint, with an engine of its own; arguments and methods as of `mjsim.stepping.JointedBall`.
+    """A ball on a free joint, with an engine of its own; arguments and methods as of
+    `mjsim.stepping.JointedBall`.
 
     `law`: numbers of `mjsim.Coulomb`.
     """
 
     def __init__(
-        self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float, **law: float
+        self,
+        model: Any,
+        p: Parameters,
+        settings: ContactSettings,
+        x: State,
+        theta_0: float,
+        **law: float,
     ) -> None:
         self.p, self._timestep, self.lead = p, settings.timestep, settings.timestep / 2
         self.model, self.data = model, mujoco.MjData(model)
@@ -264,16 +280,18 @@ class Fine:
     def step(
         self, x: State, theta: float, rates: Array, omega_0: float, finely: bool
     ) -> tuple[Array, Array, Array, Array, float, Array]:
-        """Take a whole step in short ones from a state, with velocities of the joints that change at such rates.
+        """Take a whole step in short ones from a state, with velocities of the joints that change
+        at such rates.
 
-        `finely` if there was a blow a short time ago, or none in a first step, whose forces are the start of all.
+        `finely` if there was a blow a short time ago, or none in a first step, whose forces are the
+        start of all.
 
         Returns
         -------
-        azimuth, h and y; velocities of the joints, and what a second changes of them; generalised forces of the
-        contacts (6) and normal ones (2), as the engine has them, N and N m; what a component of the contact forces
-        would change in a whole step at the pace of the end, at most, N; sensors at the beginning
-        """
+        azimuth, h and y; velocities of the joints, and what a second changes of them; generalised
+        forces of the contacts (6) and normal ones (2), as the engine has them, N and N m; what a
+        component of the contact forces would change in a whole step at the pace of the end, at
+        most, N; sensors at the beginning"""
         ball, seen = self._ball, np.zeros((4, recorder.NSENSOR))
         ball.place(x, theta)
         rho = self._p.R - float(x.h)
@@ -282,7 +300,17 @@ class Fine:
             away, along = -rates[1] - rho * turn * turn, rho * rates[0] - 2 * x.v_h * turn
             ball.body.last[:3] = away * cos - along * sin, away * sin + along * cos, rates[2]
         longest = self._whole / (COARSE if finely else _FIRST)
-        given = ball.body, self._whole, longest, self._fall, self._reach, omega_0, theta, (rates[1], rates[2]), seen
+        given = (
+            ball.body,
+            self._whole,
+            longest,
+            self._fall,
+            self._reach,
+            omega_0,
+            theta,
+            (rates[1], rates[2]),
+            seen,
+        )
         place, velocity, before, duration, since = through(*given)
         v = np.array(velocity)
         first, last = recorder.forces(seen[1:3], np.array([place[0] - v[0] * since, place[0]]))

@@ -11,7 +11,8 @@ from model.arrays import Array
 from model.kinematics import frame
 
 COORDINATES, NSENSOR = 3, 28
-"""Sizes of the row of a step: azimuth, inward and upward; after their velocities and spin two contact sensors."""
+"""Sizes of the row of a step: azimuth, inward and upward; after their velocities and spin two
+contact sensors."""
 SENSORS = COORDINATES + 6
 """Where the sensors begin; place and velocities are those before the step."""
 COLUMNS = SENSORS + NSENSOR
@@ -21,19 +22,28 @@ NORMALS = slice(1, 28, 14)
 """Where they hold the normal forces."""
 HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
-_COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
+_COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = (
+    0,
+    slice(1, 4),
+    4,
+    slice(5, 8),
+    slice(8, 11),
+    slice(12, 14),
+)
 
 
 def joint_state(x: npt.ArrayLike, theta: float, p: Parameters) -> tuple[Array, Array]:
     """Places (..., 3) and velocities (..., 6) of the joints of states x (..., 6 or 8).
 
-    The axes of the joints are the paper's, so that the velocities are v_A, v_B and the slip of (4) rearranged:
-    ``qvel = (omega_c, v_h, v_y, o_x, o_y - omega_c, o_z)`` with the angular velocity o of the ball.
-    """
+    The axes of the joints are the paper's, so that the velocities are v_A, v_B and the slip of (4)
+    rearranged: ``qvel = (omega_c, v_h, v_y, o_x, o_y - omega_c, o_z)`` with the angular velocity o
+    of the ball."""
     y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = State.of(x)
     roll = (p.R - h) / p.r * omega_c
     place = np.stack([np.zeros_like(y) + theta, h, y], axis=-1)
-    qvel = np.stack([omega_c, v_h, v_y, slip_x + roll, slip_y - roll - omega_c, slip_z + v_y / p.r], axis=-1)
+    qvel = np.stack(
+        [omega_c, v_h, v_y, slip_x + roll, slip_y - roll - omega_c, slip_z + v_y / p.r], axis=-1
+    )
     return place, qvel
 
 
@@ -46,17 +56,28 @@ def state(place: Array, qvel: Array, p: Parameters) -> State:
 
 
 def contacts(rows: Array) -> Contacts:
-    """Loads, friction, slip speeds and gaps of contacts in successive steps, from rows (steps, `COLUMNS`)."""
+    """Loads, friction, slip speeds and gaps of contacts in successive steps, from rows (steps,
+    `COLUMNS`)."""
     each = rows[:, SENSORS:].reshape(len(rows), 2, NSENSOR // 2)
     normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
     slips = np.moveaxis(each[..., _SLIP], -1, 0)
-    return Contacts(normal, np.hypot(first, second), np.hypot(slips[0], slips[1]), rows[:, COORDINATES - 1 : 0 : -1])
+    return Contacts(
+        normal,
+        np.hypot(first, second),
+        np.hypot(slips[0], slips[1]),
+        rows[:, COORDINATES - 1 : 0 : -1],
+    )
 
 
 def forces(sensors: Array, theta: npt.ArrayLike) -> Array:
-    """Forces at A and B in the paper's axes, (n, 2, 3), of sensors (n, `NSENSOR`) at an azimuth, or one each, N."""
+    """Forces at A and B in the paper's axes, (n, 2, 3), of sensors (n, `NSENSOR`) at an azimuth, or
+    one each, N."""
     each = sensors.reshape(len(sensors), 2, NSENSOR // 2)
-    (normal, first, second), n, t = np.moveaxis(each[..., _FORCE, None], 2, 0), each[..., _NORMAL], each[..., _TANGENT]
+    (normal, first, second), n, t = (
+        np.moveaxis(each[..., _FORCE, None], 2, 0),
+        each[..., _NORMAL],
+        each[..., _TANGENT],
+    )
     in_world: Array = normal * n + first * t + second * np.cross(n, t)
     return in_world @ np.swapaxes(frame(np.asarray(theta)), -1, -2)
 
@@ -64,14 +85,18 @@ def forces(sensors: Array, theta: npt.ArrayLike) -> Array:
 def samples(time: Array, rows: Array, lead: float, p: Parameters) -> npt.NDArray[np.void]:
     """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), rows (n, `COLUMNS`).
 
-    Places are `lead` s ahead of velocities, and are brought back by these: that leaves h^2/8 times the acceleration.
-    """
+    Places are `lead` s ahead of velocities, and are brought back by these: that leaves h^2/8 times
+    the acceleration."""
     place, qvel, sensors = np.split(rows, [COORDINATES, SENSORS], axis=1)
     loads = forces(sensors, place[:, 0])
     place = place - lead * qvel[:, :3]
     block = trajectory.samples(time, place[:, 0], state(place, qvel, p), p)
     for k, (contact, sensor) in enumerate(zip("AB", np.split(sensors, 2, axis=1), strict=True)):
-        gap, speed, touches = block[f"gap_{contact}"], block[f"slip_speed_{contact}"], sensor[:, _COUNT] > 0
+        gap, speed, touches = (
+            block[f"gap_{contact}"],
+            block[f"slip_speed_{contact}"],
+            sensor[:, _COUNT] > 0,
+        )
         block[f"force_{contact}"] = loads[:, k]
         # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
         gap[touches] = sensor[touches, _DIST]

@@ -31,10 +31,14 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     spec.geom("ball").size = (p.r, 0.0, 0.0)
     wall.pos, wall.size = (p.R + p.r, 0.0, height), (height, height, p.r)
     spec.geom("floor").size = (4 * p.R, 4 * p.R, p.r)
-    spec.geom("vessel").pos, spec.geom("vessel").size = (0.0, 0.0, height * 1.005), (p.R + p.r, height, 0.0)
+    spec.geom("vessel").pos, spec.geom("vessel").size = (
+        (0.0, 0.0, height * 1.005),
+        (p.R + p.r, height, 0.0),
+    )
     for name, friction in (("A", p.mu), ("B", p.eta)):
         pair = spec.pair(name)
-        # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one row.
+        # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one
+        # row.
         pair.condim = 3 if friction > 0 else 1
         pair.friction = (friction, friction, 0.0, 0.0, 0.0)
         time, ratio = (
@@ -52,7 +56,10 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
         half, (box, slide) = 4 * p.R, (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_SLIDE)
         moving = spec.worldbody.add_body(name="wall", explicitinertial=True)
-        moving.mass, moving.inertia = p.m / _HEAVY, body.inertia  # it doesn't turn: of any ball that MuJoCo takes
+        moving.mass, moving.inertia = (
+            p.m / _HEAVY,
+            body.inertia,
+        )  # it doesn't turn: of any ball that MuJoCo takes
         for axis in ([-1, 0, 0], [0, 1, 0], [0, 0, 1]):  # inwards, onwards, up
             moving.add_joint(type=slide, axis=axis, armature=_HEAVY * p.m)
         rgba = list(wall.rgba)
@@ -66,11 +73,14 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
 def build(p: Parameters, settings: ContactSettings, shown: bool = False) -> tuple[Any, str]:
     """The scene compiled to an `mujoco.MjModel` of its own, and as the MJCF text that is simulated.
 
-    The model has the textures of the text only if it is to be `shown`: they are 1.7 MB, and no step looks at them.
+    The model has the textures of the text only if it is to be `shown`: they are 1.7 MB, and no step
+    looks at them.
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
-    model, text = _compiled(p.replace(omega_0=0.0), settings, shown)  # the fluid is no part of a scene
+    model, text = _compiled(
+        p.replace(omega_0=0.0), settings, shown
+    )  # the fluid is no part of a scene
     return copy.copy(model), text
 
 
@@ -87,7 +97,13 @@ def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[An
                 material.textures = [""] * len(material.textures)
         model = filled.compile()
     except ValueError as error:
-        raise InputError(f"MuJoCo cannot compile the scene: {' '.join(str(error).split())}") from error
-    # Without any in the scene, the engine looks at surface velocities and adhesion only if these flags say so.
-    model.flg_surfacevel, model.flg_adhesion = settings.memory or settings.friction_lag != 0, settings.memory
+        raise InputError(
+            f"MuJoCo cannot compile the scene: {' '.join(str(error).split())}"
+        ) from error
+    # Without any in the scene, the engine looks at surface velocities and adhesion only if these
+    # flags say so.
+    model.flg_surfacevel, model.flg_adhesion = (
+        settings.memory or settings.friction_lag != 0,
+        settings.memory,
+    )
     return model, text

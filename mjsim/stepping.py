@@ -1,13 +1,14 @@
 """Balls on joints along the paper's coordinates, and the loop round MuJoCo's step.
 
-Before each step the wall is turned to be tangent at the ball's azimuth, the margins follow the gaps, and
-`mjsim.corrections` says what drives the step. The body axes of a homogeneous ball are arbitrary: they are set upright,
-so that forces and velocities of the ball's joint are along the paper's axes. Positions are kept half a step ahead of
-velocities (leapfrog). Contacts are in the order A, B.
+Before each step the wall is turned to be tangent at the ball's azimuth, the margins follow the
+gaps, and `mjsim.corrections` says what drives the step. The body axes of a homogeneous ball are
+arbitrary: they are set upright, so that forces and velocities of the ball's joint are along the
+paper's axes. Positions are kept half a step ahead of velocities (leapfrog). Contacts are in the
+order A, B.
 
-A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as `mjsim.free` says; so
-it does the first one, which finds the margins and forces that belong to the start.
-"""
+A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as
+`mjsim.free` says; so it does the first one, which finds the margins and forces that belong to the
+start."""
 
 from __future__ import annotations
 
@@ -29,11 +30,13 @@ from model import Parameters, State
 from model.arrays import Array
 
 _CHANGE = 0.5
-"""Most that contact forces may change in a step before the ball goes on upon its joints, in units of what the
-largest force, at least that of gravity and the wall's friction, does as the ball goes round."""
+"""Most that contact forces may change in a step before the ball goes on upon its joints, in units
+of what the largest force, at least that of gravity and the wall's friction, does as the ball goes
+round."""
 NOT, LANDS, GOES_ON, BEGINS = range(4)
-"""Whether a ball takes the next step in fine ones: not; as it lands; in the shortest, as it did the last one; or in
-these as the first of all, without a blow, after which it goes on upon its joints however forces change."""
+"""Whether a ball takes the next step in fine ones: not; as it lands; in the shortest, as it did the
+last one; or in these as the first of all, without a blow, after which it goes on upon its joints
+however forces change."""
 _DUE, _HELD = 0, 1
 _NORMAL_A, _NORMAL_B = range(NSENSOR)[NORMALS]
 """Where sensors have the normal forces."""
@@ -49,7 +52,8 @@ class Joints(NamedTuple):
     margins: Any
     """Of the contacts, m."""
     contact: Any
-    """Generalised forces of the contacts: the second to the fifth are inward, upward, moments about x and y."""
+    """Generalised forces of the contacts: the second to the fifth are inward, upward, moments about
+    x and y."""
     sensors: Any
     applied: Any
     adhesion: Any
@@ -62,16 +66,19 @@ class Joints(NamedTuple):
     last: Any
     """Velocities a step ago."""
     forces: Any
-    """Generalised forces of the contacts in the last step (6), N and N m, and normal ones (2), N."""
+    """Generalised forces of the contacts in the last step (6), N and N m, and normal ones (2),
+    N."""
     marks: Any
-    """Whether the next step is due to be taken in fine ones, and whether the last one was, with its forces held."""
+    """Whether the next step is due to be taken in fine ones, and whether the last one was, with its
+    forces held."""
     ball: Ball
     served: Any
     """Addresses of the engine's model and data."""
 
 
 def seen_forces(body: Joints) -> None:
-    """Copy the contact forces of the last step from the engine, unless that step was taken in fine ones."""
+    """Copy the contact forces of the last step from the engine, unless that step was taken in fine
+    ones."""
     if body.marks[_HELD] == 0:
         for i in range(6):
             body.forces[i] = body.contact[i]
@@ -80,11 +87,18 @@ def seen_forces(body: Joints) -> None:
 
 
 def drive(omega_0: float, row: Any, body: Joints) -> None:
-    """Let the margins follow the gaps and set what drives the next step; say if the ball is due to land in it.
+    """Let the margins follow the gaps and set what drives the next step; say if the ball is due to
+    land in it.
 
     Place and velocities are noted in the row.
     """
-    qpos, forces, margins, applied, ball = body.qpos, body.forces, body.margins, body.applied, body.ball
+    qpos, forces, margins, applied, ball = (
+        body.qpos,
+        body.forces,
+        body.margins,
+        body.applied,
+        body.ball,
+    )
     seen_forces(body)
     v, before = velocity_of(body.qvel), velocity_of(body.last)
     theta, h, y = float(qpos[0]), float(qpos[1]), float(qpos[2])
@@ -92,20 +106,30 @@ def drive(omega_0: float, row: Any, body: Joints) -> None:
     loads = float(forces[6]), float(forces[7])
     if body.marks[_DUE] == NOT and loads[0] * loads[1] == 0:
         floor = loads[0] == 0 and lands(y, v.v_y, before.v_y, ball)
-        if floor or (loads[1] == 0 and (lands(h, v.v_h, before.v_h, ball) or near_axis(ball.R - h, v, ball))):
+        if floor or (
+            loads[1] == 0 and (lands(h, v.v_h, before.v_h, ball) or near_axis(ball.R - h, v, ball))
+        ):
             body.marks[_DUE] = LANDS
-    if ball.gain > 0:  # a ball that sinks in rolls on a shorter lever: its contact point lies midway in the overlap
-        margins[0], margins[1] = max(0.0, margins[0] - ball.gain * y), max(0.0, margins[1] - ball.gain * h)
+    if (
+        ball.gain > 0
+    ):  # a ball that sinks in rolls on a shorter lever: its contact point lies midway in the overlap
+        margins[0], margins[1] = (
+            max(0.0, margins[0] - ball.gain * y),
+            max(0.0, margins[1] - ball.gain * h),
+        )
     body.turn[0], body.turn[3] = math.cos(theta / 2), math.sin(theta / 2)
     qpos[3], qpos[4], qpos[5], qpos[6] = 1.0, 0.0, 0.0, 0.0
-    driving, surfaces, (lift_A, lift_B) = corrections(v, before, ball.R - h, omega_0, given, loads, ball)
+    driving, surfaces, (lift_A, lift_B) = corrections(
+        v, before, ball.R - h, omega_0, given, loads, ball
+    )
     for i in range(COORDINATES):
         row[i] = qpos[i]
     for i in range(6):
         row[COORDINATES + i], applied[i] = body.qvel[i], driving[i]
     body.floor[0], body.floor[1], body.wall[0], body.wall[1] = surfaces
-    # Adhesion of a contact adds R times itself to the reference acceleration of its normal row, and pulls the body
-    # by as much. With the pull taken back, minus what slip would take from the contact leaves De Saxce's share.
+    # Adhesion of a contact adds R times itself to the reference acceleration of its normal row, and
+    # pulls the body by as much. With the pull taken back, minus what slip would take from the
+    # contact leaves De Saxce's share.
     lift_A, lift_B = lift_A * (y < margins[0]), lift_B * (h < margins[1])
     body.adhesion[0], body.adhesion[1] = -lift_A, -lift_B
     applied[1] -= lift_B
@@ -119,7 +143,8 @@ def velocity_of(v: Any) -> Velocity:
 
 @loop
 def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
-    """Take a step for each omega_0 from number `done` on, up to one with a landing: the number of that.
+    """Take a step for each omega_0 from number `done` on, up to one with a landing: the number of
+    that.
 
     Steps are noted in rows (steps, `COLUMNS`); a ball that has diverged takes none."""
     while done < len(fluid):
@@ -153,7 +178,9 @@ class JointedBall:
     theta_0 : azimuth at the start, rad
     """
 
-    def __init__(self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float) -> None:
+    def __init__(
+        self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float
+    ) -> None:
         self.model, self.data = model, mujoco.MjData(model)
         self._p, self._settings, self._h = p, settings, settings.timestep
         self.lead = self._h * settings.midpoint
@@ -179,7 +206,9 @@ class JointedBall:
         )
         place, v = recorder.joint_state(x, theta_0, p)
         fall = settings.slowest_fall(p.g)
-        calm = all(speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h)))
+        calm = all(
+            speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h))
+        )
         self.body.marks[_DUE] = (BEGINS if calm else LANDS) if settings.servo else NOT
         self._set(place, v, np.zeros(6))
 
@@ -189,14 +218,16 @@ class JointedBall:
         return Fine(self._p, self._settings)
 
     def _set(self, place: Array, v: Array, rates: Array) -> None:
-        """Set place, velocities and accelerations, all at one time, from which to go on; contact forces are kept."""
+        """Set place, velocities and accelerations, all at one time, from which to go on; contact
+        forces are kept."""
         body = self.body
         body.qvel[:], body.last[:], body.start[:] = v, v - self._h * rates, rates
         body.qpos[:3] = place + self.lead * (v + rates * self.lead / 2)[:3]
         body.marks[_HELD] = 1
 
     def advance(self, fluid: Array, rows: Array) -> None:
-        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`); those in which it lands in fine ones."""
+        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`); those in which it lands
+        in fine ones."""
         p, body, done = self._p, self.body, 0
         while (done := up_to_landing(body, fluid, rows, done)) < len(fluid):
             how, v = int(body.marks[_DUE]), body.qvel.copy()
@@ -209,11 +240,15 @@ class JointedBall:
             pace = max(abs(v[0]), math.sqrt(p.g / p.R))
             most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(body.forces[[1, 2]]).max())
             fast = change > _CHANGE * self._h * pace * most and how != BEGINS
-            body.marks[_DUE] = GOES_ON if near or fast else NOT  # on the joints where forces change slowly
+            body.marks[_DUE] = (
+                GOES_ON if near or fast else NOT
+            )  # on the joints where forces change slowly
             self._set(place, v, rates * (not near))
             if self._settings.servo:  # margins with which contacts bear their forces
                 loads = body.forces[6:] / p.m
-                body.margins[:] = np.maximum(place[:0:-1] + self._settings.margin(loads), 0.0) * (loads > 0)
+                body.margins[:] = np.maximum(place[:0:-1] + self._settings.margin(loads), 0.0) * (
+                    loads > 0
+                )
             done += 1
 
     def state(self) -> dict[str, Array]:

@@ -17,7 +17,8 @@ class Contact(Enum):
 
 
 class Case(IntEnum):
-    """Kinematic case: first letter for the floor (A), second for the wall (B); the value is the HDF5 code."""
+    """Kinematic case: first letter for the floor (A), second for the wall (B); the value is the
+    HDF5 code."""
 
     RR = 0
     RS = 1
@@ -31,7 +32,8 @@ class Case(IntEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> Case:
-        """Let ``Case("SS")`` give the case of that name; raise `InputError` for a name or number of no case."""
+        """Let ``Case("SS")`` give the case of that name; raise `InputError` for a name or number of
+        no case."""
         if isinstance(value, str) and value in cls.__members__:
             return cls[value]
         raise InputError(f"case = {value!r} must be one of {', '.join(cls.__members__)}")
@@ -56,9 +58,9 @@ class Case(IntEnum):
 class CaseTraits:
     """One row of Tables 3 and 4, extended to motion away from the wall.
 
-    ``constraints`` are expressions in the variables of `model.kinematics.VARIABLES` that vanish in the case;
-    ``active`` are the independent variables left, as many as the third number of each panel of Fig. 2 says.
-    """
+    ``constraints`` are expressions in the variables of `model.kinematics.VARIABLES` that vanish in
+    the case; ``active`` are the independent variables left, as many as the third number of each
+    panel of Fig. 2 says."""
 
     constraints: tuple[str, ...]
     active: tuple[str, ...]
@@ -71,8 +73,11 @@ TRAITS: dict[Case, CaseTraits] = {
     Case.SS: CaseTraits(("y", "v_y", "h", "v_h"), ("omega_c", "slip_x", "slip_y", "slip_z")),
     Case.NR: CaseTraits(("h", "v_h", "slip_y", "slip_z"), ("y", "v_y", "omega_c", "slip_x")),
     Case.NS: CaseTraits(("h", "v_h"), ("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z")),
-    # Rolling on the floor away from the wall: the contact point rests, v_A = (v_h + r slip_z, 0, -r slip_x) = 0.
-    Case.RN: CaseTraits(("y", "v_y", "slip_x", "v_h + r slip_z"), ("omega_c", "slip_y", "h", "v_h")),
+    # Rolling on the floor away from the wall: the contact point rests, v_A = (v_h + r slip_z, 0, -r
+    # slip_x) = 0.
+    Case.RN: CaseTraits(
+        ("y", "v_y", "slip_x", "v_h + r slip_z"), ("omega_c", "slip_y", "h", "v_h")
+    ),
     Case.SN: CaseTraits(("y", "v_y"), ("omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")),
     Case.NN: CaseTraits((), ("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")),
 }

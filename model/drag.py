@@ -1,11 +1,13 @@
-"""The drag of the fluid on the ball: -m c(|w|) w, with w the velocity of the ball's centre relative to the fluid.
+"""The drag of the fluid on the ball: -m c(|w|) w, with w the velocity of the ball's centre relative
+to the fluid.
 
-c(|w|) = c C_D(Re) Re/24 with Re = 2 r |w|/nu_f: Stokes' coefficient c (10) times what the drag of the sphere is greater
-by. A law is that factor as a function of Re:
+c(|w|) = c C_D(Re) Re/24 with Re = 2 r |w|/nu_f: Stokes' coefficient c (10) times what the drag of
+the sphere is greater by. A law is that factor as a function of Re:
 
 * ``stokes``: 1 (the paper's);
-* ``schiller-naumann``: 1 + 0.15 Re^0.687, and from where that is less (Re = 989) that of a constant C_D = 0.44
-  (Schiller and Naumann 1935; Clift, Grace and Weber, "Bubbles, Drops, and Particles", 1978);
+* ``schiller-naumann``: 1 + 0.15 Re^0.687, and from where that is less (Re = 989) that of a constant
+  C_D = 0.44 (Schiller and Naumann 1935; Clift, Grace and Weber, "Bubbles, Drops, and Particles",
+  1978);
 * ``quadratic``: C_D Re/24 with a constant C_D.
 """
 

@@ -8,7 +8,8 @@ from typing import Any, get_args
 
 
 class InputError(ValueError):
-    """A user's mistake: the message is one line naming the field, the value, its unit and the range."""
+    """A user's mistake: the message is one line naming the field, the value, its unit and the
+    range."""
 
 
 class StorageError(InputError):

@@ -1,4 +1,5 @@
-"""Files that are whole or not there: written under a temporary name beside theirs, which they get at the end."""
+"""Files that are whole or not there: written under a temporary name beside theirs, which they get
+at the end."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ _under_way: set[Path] = set()
 
 
 def make_directory(path: Path) -> None:
-    """Make a directory where there is none; raises `StorageError` if that, or writing in it, is not allowed."""
+    """Make a directory where there is none; raises `StorageError` if that, or writing in it, is not
+    allowed."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -29,13 +31,15 @@ def make_directory(path: Path) -> None:
 
 
 def check_ours(path: Path, beside: Path) -> None:
-    """Raise `StorageError` if `path` exists and `beside`, which this program always writes with it, does not."""
+    """Raise `StorageError` if `path` exists and `beside`, which this program always writes with it,
+    does not."""
     if path.exists() and not beside.exists():
         raise StorageError(f"{path} is not of this program: choose another directory with --output")
 
 
 def check_writable(path: str | Path) -> None:
-    """Raise `StorageError` if a file of that name could not be written: better before a long run than after."""
+    """Raise `StorageError` if a file of that name could not be written: better before a long run
+    than after."""
     folder = Path(path).parent
     try:
         if not folder.is_dir():
@@ -62,13 +66,15 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file as `write_bytes` does; a file name in it that is no UTF-8 stays as it is."""
+    """Write a text file as `write_bytes` does; a file name in it that is no UTF-8 stays as it
+    is."""
     write_bytes(path, text.encode("utf-8", "surrogateescape"))
 
 
 @contextmanager
 def reading_json(path: Path, what: str) -> Iterator[Any]:
-    """What a JSON file holds; an error within the context is a `StorageError` that says it isn't what it should be."""
+    """What a JSON file holds; an error within the context is a `StorageError` that says it isn't
+    what it should be."""
     try:
         yield json.loads(path.read_text("utf-8"))
     except OSError as error:
@@ -91,11 +97,11 @@ def remove_leftovers(directory: Path) -> None:
 
 
 def temporary(path: Path) -> Path:
-    """A name beside a file's, with the machine and process that write it, to be given to `remove` in the end.
+    """A name beside a file's, with the machine and process that write it, to be given to `remove`
+    in the end.
 
-    Raises `StorageError` for what is no file: the new file takes the place of the old one, and as the superuser that
-    would replace /dev/null.
-    """
+    Raises `StorageError` for what is no file: the new file takes the place of the old one, and as
+    the superuser that would replace /dev/null."""
     if path.exists() and not path.is_file():
         raise StorageError(f"cannot write {path}: it is not a file")
     end = path.name[-50:]  # what tells files of one program apart; a name has at most 255 bytes

@@ -16,19 +16,20 @@ from model.errors import InputError, StorageError
 from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, REACH, Range, check_number, parse_number
 
 GAP = 10.0
-"""An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't measured there. A few
-samples lost, or knots written by hand at uneven times, stay below it."""
+"""An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't
+measured there. A few samples lost, or knots written by hand at uneven times, stay below it."""
 _COLUMNS = {"time": ("s", ["t"]), "omega_0": ("rad s-1", ["omega0", "omega", "ω₀", "ω_0"])}
 """Of a measured flow: units, and other names."""
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The flow omega_0(t): a piecewise linear function of time, which may jump between pieces, plus sine waves.
+    """The flow omega_0(t): a piecewise linear function of time, which may jump between pieces, plus
+    sine waves.
 
-    Piece k holds from ``start[k]`` on and is ``value[k] + slope[k] (t - start[k])``; before the first start its
-    value holds. Make one with `steady`, `ramp`, `staircase`, `sampled`, `sine`, `sines` or `from_csv`.
-    """
+    Piece k holds from ``start[k]`` on and is ``value[k] + slope[k] (t - start[k])``; before the
+    first start its value holds. Make one with `steady`, `ramp`, `staircase`, `sampled`, `sine`,
+    `sines` or `from_csv`."""
 
     kind: str
     """How it was made, for display."""
@@ -39,14 +40,16 @@ class Flow:
     slope: Array
     """Rate of change in the pieces, shape (n,), rad s-2."""
     waves: Array = field(default_factory=lambda: np.empty((0, 3)))
-    """Waves amplitude sin(2 pi frequency t + phase) as rows of amplitude in rad s-1, frequency > 0 in Hz and phase in
-    rad, shape (k, 3)."""
+    """Waves amplitude sin(2 pi frequency t + phase) as rows of amplitude in rad s-1, frequency > 0
+    in Hz and phase in rad, shape (k, 3)."""
 
     def __call__(self, t: npt.ArrayLike) -> Array:
         """omega_0 in rad s-1 at times t in s, same shape."""
         t = np.asarray(t, dtype=float)
         amplitude, frequency, phase = self.waves.T
-        return np.asarray(self.line(t) + np.sin(2 * np.pi * frequency * t[..., None] + phase) @ amplitude)
+        return np.asarray(
+            self.line(t) + np.sin(2 * np.pi * frequency * t[..., None] + phase) @ amplitude
+        )
 
     def line(self, t: npt.ArrayLike) -> Array:
         """omega_0 in rad s-1 without the waves."""
@@ -55,7 +58,8 @@ class Flow:
         return np.asarray(self.value[k] + self.slope[k] * np.maximum(t - self.start[k], 0.0))
 
     def knots(self, t_end: float) -> Array:
-        """Times in s between 0 and t_end at which omega_0 or its slope jumps: an integrator should stop there."""
+        """Times in s between 0 and t_end at which omega_0 or its slope jumps: an integrator should
+        stop there."""
         return self.start[(self.start > 0) & (self.start < t_end)]
 
     @property
@@ -69,8 +73,11 @@ class Flow:
         return cls._from_pieces("steady", [0.0], [omega_0], [0.0])
 
     @classmethod
-    def ramp(cls, omega_start: float, omega_end: float, duration: float, t_start: float = 0.0) -> Self:
-        """From omega_start to omega_end linearly within `duration` seconds from t_start, held on either side."""
+    def ramp(
+        cls, omega_start: float, omega_end: float, duration: float, t_start: float = 0.0
+    ) -> Self:
+        """From omega_start to omega_end linearly within `duration` seconds from t_start, held on
+        either side."""
         check_number("duration", duration, "s", POSITIVE)
         check_number("t_start", t_start, "s", NOT_NEGATIVE)
         return cls.sampled([t_start, t_start + duration], [omega_start, omega_end], kind="ramp")
@@ -79,13 +86,19 @@ class Flow:
     def staircase(cls, levels: Sequence[float], hold: float) -> Self:
         """Each level in turn held for `hold` seconds, the last one from then on."""
         check_number("hold", hold, "s", POSITIVE)
-        return cls._from_pieces("staircase", [hold * k for k in range(len(levels))], levels, [0.0] * len(levels))
+        return cls._from_pieces(
+            "staircase", [hold * k for k in range(len(levels))], levels, [0.0] * len(levels)
+        )
 
     @classmethod
-    def sampled(cls, times: Sequence[float], omega_0: Sequence[float], kind: str = "sampled") -> Self:
+    def sampled(
+        cls, times: Sequence[float], omega_0: Sequence[float], kind: str = "sampled"
+    ) -> Self:
         """Linear interpolation between samples, held at both ends; times must increase."""
         if len(times) != len(omega_0):
-            raise InputError(f"a sampled flow has {len(times)} times but {len(omega_0)} values of omega_0")
+            raise InputError(
+                f"a sampled flow has {len(times)} times but {len(omega_0)} values of omega_0"
+            )
         level = cls._from_pieces(kind, times, omega_0, [0.0] * len(times))
         return replace(level, slope=np.append(np.diff(level.value) / np.diff(level.start), 0.0))
 
@@ -99,31 +112,43 @@ class Flow:
         """The sum of a mean and waves (amplitude, frequency, phase) as in `sine`."""
         flow = cls._from_pieces("sines", [0.0], [mean], [0.0])
         frequencies = Range(0.0, REACH.high, open=True)
-        kinds = ("amplitude", "rad s-1", REACH), ("frequency", "Hz", frequencies), ("phase", "rad", ANY)
+        kinds = (
+            ("amplitude", "rad s-1", REACH),
+            ("frequency", "Hz", frequencies),
+            ("phase", "rad", ANY),
+        )
         rows = [
-            [check_number(f"{n} of wave {k}", x, unit, of) for x, (n, unit, of) in zip(wave, kinds, strict=True)]
+            [
+                check_number(f"{n} of wave {k}", x, unit, of)
+                for x, (n, unit, of) in zip(wave, kinds, strict=True)
+            ]
             for k, wave in enumerate(waves)
         ]
         return replace(flow, waves=np.array(rows).reshape(-1, 3))
 
     @classmethod
     def from_csv(cls, path: str | Path, longest_interval: float | None = None) -> Self:
-        """A measured flow: lines of time in s and omega_0 in rad s-1, with linear interpolation between them.
+        """A measured flow: lines of time in s and omega_0 in rad s-1, with linear interpolation
+        between them.
 
-        Commas, semicolons or white space separate the two; numbers may have decimal commas between semicolons or tabs.
-        A first line without numbers is the head: columns are found by their names in it, and may be more and in any
-        order; a unit in it must be that. What follows a # is a comment. Over more than `longest_interval`, in s,
-        nothing is interpolated; `GAP` times the median interval if None. Raises `StorageError` for a file that can't be
-        read, `InputError` that names the line where a field is missing or not a finite number, where times don't
-        increase, or after a gap.
-        """
+        Commas, semicolons or white space separate the two; numbers may have decimal commas between
+        semicolons or tabs. A first line without numbers is the head: columns are found by their
+        names in it, and may be more and in any order; a unit in it must be that. What follows a #
+        is a comment. Over more than `longest_interval`, in s, nothing is interpolated; `GAP` times
+        the median interval if None. Raises `StorageError` for a file that can't be read,
+        `InputError` that names the line where a field is missing or not a finite number, where
+        times don't increase, or after a gap."""
         try:
             lines = Path(path).read_text("utf-8-sig").rstrip().splitlines()
         except OSError as error:
             raise StorageError(f"cannot read the flow from {path}: {error.strerror}") from error
         except UnicodeDecodeError as error:
             raise InputError(f"{path} is not a text file: {error.reason}") from error
-        rows = [(n, table.fields(line)) for n, line in enumerate(lines, 1) if not line.lstrip().startswith("#")]
+        rows = [
+            (n, table.fields(line))
+            for n, line in enumerate(lines, 1)
+            if not line.lstrip().startswith("#")
+        ]
         samples, place, width = list[tuple[float, float]](), {"time": 0, "omega_0": 1}, 2
         if rows and not any(table.is_number(text) for text in rows[0][1]):
             n, head = rows.pop(0)
@@ -134,12 +159,25 @@ class Flow:
         for n, texts in rows:
             try:
                 if len(texts) != width:
-                    needed = "two values, time and omega_0" if width == 2 else f"{width} values, as the head"
-                    comma = "; with decimal commas, separate them by semicolons" if len(texts) == 2 * width else ""
+                    needed = (
+                        "two values, time and omega_0"
+                        if width == 2
+                        else f"{width} values, as the head"
+                    )
+                    comma = (
+                        "; with decimal commas, separate them by semicolons"
+                        if len(texts) == 2 * width
+                        else ""
+                    )
                     raise InputError(f"needs {needed}, but has {len(texts)}{comma}")
-                time, omega_0 = (parse_number(name, texts[place[name]], unit) for name, (unit, _) in _COLUMNS.items())
+                time, omega_0 = (
+                    parse_number(name, texts[place[name]], unit)
+                    for name, (unit, _) in _COLUMNS.items()
+                )
                 if samples and time <= samples[-1][0]:
-                    raise InputError(f"times must increase, but {time:g} s comes after {samples[-1][0]:g} s")
+                    raise InputError(
+                        f"times must increase, but {time:g} s comes after {samples[-1][0]:g} s"
+                    )
                 samples.append((time, omega_0))
             except InputError as error:
                 raise InputError(f"{path}, line {n}: {error}") from error
@@ -151,38 +189,58 @@ class Flow:
             usual = float(np.median(intervals))
             if longest_interval is None:
                 longest_interval = GAP * usual
-            for k in np.flatnonzero(intervals > check_number("longest_interval", longest_interval, "s", POSITIVE))[:1]:
+            for k in np.flatnonzero(
+                intervals > check_number("longest_interval", longest_interval, "s", POSITIVE)
+            )[:1]:
                 raise InputError(
-                    f"{path}, line {rows[k + 1][0]}: a gap of {intervals[k]:g} s from t = {times[k]:g} s on; usual are "
+                    f"{path}, line {rows[k + 1][0]}: a gap of {intervals[k]:g} s from t = "
+                    f"{times[k]:g} s on; usual are "
                     f"{usual:g} s, and longest_interval = {longest_interval:g} s"
                 )
         return cls.sampled(times, values, kind="measured")
 
     @classmethod
-    def _from_pieces(cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]) -> Self:
-        """A flow that is linear from each start on, without waves; `InputError` for values or times that cannot be."""
-        t = [check_number(f"time of flow sample {k}", time, "s", REACH) for k, time in enumerate(start)]
-        v = [check_number(f"omega_0 of flow sample {k}", omega, "rad s-1", REACH) for k, omega in enumerate(value)]
+    def _from_pieces(
+        cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]
+    ) -> Self:
+        """A flow that is linear from each start on, without waves; `InputError` for values or times
+        that cannot be."""
+        t = [
+            check_number(f"time of flow sample {k}", time, "s", REACH)
+            for k, time in enumerate(start)
+        ]
+        v = [
+            check_number(f"omega_0 of flow sample {k}", omega, "rad s-1", REACH)
+            for k, omega in enumerate(value)
+        ]
         if not v:
             raise InputError("a flow needs at least one value of omega_0")
         if np.any(np.diff(t) <= 0):
             k = int(np.argmax(np.diff(t) <= 0))
-            raise InputError(f"flow times must increase, but sample {k + 1} is at {t[k + 1]:g} s after {t[k]:g} s")
+            raise InputError(
+                f"flow times must increase, but sample {k + 1} is at {t[k + 1]:g} s after {t[k]:g} s"
+            )
         return cls(kind, np.array(t), np.array(v), np.array(list(slope), dtype=float))
 
     def to_mapping(self) -> dict[str, Any]:
         """A JSON-able description, exact."""
-        pieces = {name: getattr(self, name).tolist() for name in ("start", "value", "slope", "waves")}
+        pieces = {
+            name: getattr(self, name).tolist() for name in ("start", "value", "slope", "waves")
+        }
         return {"kind": self.kind} | pieces
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
         """Inverse of `to_mapping`; raises `InputError` if it isn't one."""
         try:
-            flow = cls._from_pieces(str(values["kind"]), values["start"], values["value"], values["slope"])
+            flow = cls._from_pieces(
+                str(values["kind"]), values["start"], values["value"], values["slope"]
+            )
             flow = replace(flow, waves=cls.sines(0.0, values.get("waves", ())).waves)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"not a flow: {error}") from error
-        if not flow.start.shape == flow.value.shape == flow.slope.shape or not np.all(np.isfinite(flow.slope)):
+        if not flow.start.shape == flow.value.shape == flow.slope.shape or not np.all(
+            np.isfinite(flow.slope)
+        ):
             raise InputError("not a flow: start, value and slope must be finite and of one length")
         return flow

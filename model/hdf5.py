@@ -1,8 +1,9 @@
-"""HDF5 files that are either complete or absent, and that are read only if nothing in them has changed.
+"""HDF5 files that are either complete or absent, and that are read only if nothing in them has
+changed.
 
-Each ends with the SHA-256 checksum of all that comes before, which HDF5 itself ignores. It is compared before HDF5
-looks at the file: on damaged metadata the library may hang, and give wrong numbers.
-"""
+Each ends with the SHA-256 checksum of all that comes before, which HDF5 itself ignores. It is
+compared before HDF5 looks at the file: on damaged metadata the library may hang, and give wrong
+numbers."""
 
 from __future__ import annotations
 
@@ -25,16 +26,25 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"\ndualball sha256 "
 _TRAILER = len(_SEAL) + 64
 _BLOCK = 1 << 20
-_DAMAGE = OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError, MemoryError
+_DAMAGE = (
+    OSError,
+    RuntimeError,
+    LookupError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+)
 """What reading a file that does not hold what it should may end in."""
 
 
 class WholeFile:
     """An HDF5 file under construction; a context manager.
 
-    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file.
-    Raises `StorageError`, in one line, when it can't be written (no such directory, no permission, disk full).
-    """
+    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is
+    the h5py file. Raises `StorageError`, in one line, when it can't be written (no such directory,
+    no permission, disk full)."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -51,7 +61,9 @@ class WholeFile:
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         if not self._finished:
-            with suppress(*_DAMAGE if self._disk.error else ()):  # HDF5 misses what could not be written
+            with suppress(
+                *_DAMAGE if self._disk.error else ()
+            ):  # HDF5 misses what could not be written
                 self.file.close()
             self._disk.close()
             remove(self._temporary)
@@ -64,7 +76,8 @@ class WholeFile:
         self._check()
 
     def finish(self, path: str | Path | None = None) -> None:
-        """Close the file, add its checksum and give it its name, or another in the same directory."""
+        """Close the file, add its checksum and give it its name, or another in the same
+        directory."""
         self.file.close()
         self._check()
         try:
@@ -81,15 +94,18 @@ class WholeFile:
     def _check(self) -> None:
         """Raise `StorageError` if something could not be written."""
         if self._disk.error:
-            raise StorageError(f"cannot write {self.path}: {self._disk.error.strerror}") from self._disk.error
+            raise StorageError(
+                f"cannot write {self.path}: {self._disk.error.strerror}"
+            ) from self._disk.error
 
 
 class _Disk(io.FileIO):
-    """A file that stores the first write error instead of raising it, and keeps what it could not write in memory.
+    """A file that stores the first write error instead of raising it, and keeps what it could not
+    write in memory.
 
-    HDF5 neither closes a file that it could not write nor bears that what it wrote isn't there: it crashes the process
-    (HDF5 1.14, disk full). So it is told that all is well, and `WholeFile` raises the error after each flush.
-    """
+    HDF5 neither closes a file that it could not write nor bears that what it wrote isn't there: it
+    crashes the process (HDF5 1.14, disk full). So it is told that all is well, and `WholeFile`
+    raises the error after each flush."""
 
     error: OSError | None = None
 
@@ -130,14 +146,17 @@ class _Disk(io.FileIO):
 
 @contextmanager
 def reading(path: str | Path, remedy: str = "", sealed: bool = True) -> Iterator[h5py.File]:
-    """An HDF5 file that `WholeFile` wrote, open for reading; or any, if it need not be `sealed` by a checksum.
+    """An HDF5 file that `WholeFile` wrote, open for reading; or any, if it need not be `sealed` by
+    a checksum.
 
-    Raises `StorageError`, in one line that names the file and what to do, the `remedy`, if it is missing, damaged, cut,
-    changed, or foreign; an `InputError` or error of HDF5 within the context becomes one, too.
-    """
+    Raises `StorageError`, in one line that names the file and what to do, the `remedy`, if it is
+    missing, damaged, cut, changed, or foreign; an `InputError` or error of HDF5 within the context
+    becomes one, too."""
     try:
         if not Path(path).is_file():
-            raise StorageError("it is a directory" if Path(path).is_dir() else "there is no such file")
+            raise StorageError(
+                "it is a directory" if Path(path).is_dir() else "there is no such file"
+            )
         with Path(path).open("rb") as content:
             if content.read(len(_SIGNATURE)) != _SIGNATURE:
                 raise StorageError("it is not an HDF5 file")
@@ -146,7 +165,9 @@ def reading(path: str | Path, remedy: str = "", sealed: bool = True) -> Iterator
                 content.seek(max(size, 0))
                 trailer = content.read()
                 if not trailer.startswith(_SEAL):
-                    raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
+                    raise StorageError(
+                        "it is cut short, changed, or not of this program (no checksum at its end)"
+                    )
                 if trailer != _SEAL + _checksum(content, size):
                     raise StorageError("it is damaged (its content does not match its checksum)")
         with h5py.File(path, "r") as file:
@@ -181,11 +202,18 @@ def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
 def write_columns(
     file: h5py.File, columns: Mapping[str, Sequence[Any] | npt.NDArray[Any]], *scales: str
 ) -> dict[str, h5py.Dataset]:
-    """Write columns of numbers or of text; the first ones, `scales`, are the scales of the dimensions of the others."""
+    """Write columns of numbers or of text; the first ones, `scales`, are the scales of the
+    dimensions of the others."""
     written: dict[str, h5py.Dataset] = {}
     for name, values in columns.items():
-        text = h5py.string_dtype() if np.size(values) and isinstance(np.ravel(values)[0], str) else None
-        written[name] = file.create_dataset(name, data=np.asarray(values, object) if text else values, dtype=text)
+        text = (
+            h5py.string_dtype()
+            if np.size(values) and isinstance(np.ravel(values)[0], str)
+            else None
+        )
+        written[name] = file.create_dataset(
+            name, data=np.asarray(values, object) if text else values, dtype=text
+        )
         if name in scales:
             written[name].make_scale(name)
         else:

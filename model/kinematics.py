@@ -1,13 +1,13 @@
 """State, frames and slip: equations (1)-(8), in both directions.
 
-The state of the paper is ``x = [y, v_y, omega_c, slip_x, slip_y, slip_z]`` (19). Motion away from the wall adds
-``h = R - rho``, the gap at B (rho is the radius of the centre's orbit), and its rate ``v_h``, so that the full state
-has eight entries, those of `State`; a state of six entries means ``h = v_h = 0``.
+The state of the paper is ``x = [y, v_y, omega_c, slip_x, slip_y, slip_z]`` (19). Motion away from
+the wall adds ``h = R - rho``, the gap at B (rho is the radius of the centre's orbit), and its rate
+``v_h``, so that the full state has eight entries, those of `State`; a state of six entries means
+``h = v_h = 0``.
 
-Vectors are given in the co-rotating frame of the paper: i points radially inwards, j upwards, k = i x j along the
-orbit. The world frame has z along the vessel's axis, up from the floor, and the centre of the ball stands at
-``(rho cos theta, rho sin theta, r + y)``.
-"""
+Vectors are given in the co-rotating frame of the paper: i points radially inwards, j upwards, k = i
+x j along the orbit. The world frame has z along the vessel's axis, up from the floor, and the
+centre of the ball stands at ``(rho cos theta, rho sin theta, r + y)``."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ from model.parameters import Parameters, Range, check_number
 
 
 class State(NamedTuple):
-    """The state (19) of a ball, or its rate of change: floats, or arrays of one shape for many states.
+    """The state (19) of a ball, or its rate of change: floats, or arrays of one shape for many
+    states.
 
-    A tuple of eight, which is taken wherever a state is asked for: ``State(omega_c=3.0, slip_x=-1.0)``.
-    """
+    A tuple of eight, which is taken wherever a state is asked for: ``State(omega_c=3.0,
+    slip_x=-1.0)``."""
 
     y: Real = 0.0
     """Gap at A, m."""
@@ -45,7 +46,8 @@ class State(NamedTuple):
 
     @classmethod
     def of(cls, x: npt.ArrayLike) -> State:
-        """The state in a sequence of 6 or 8 numbers, as floats, or the states in an array (..., 6 or 8), as columns.
+        """The state in a sequence of 6 or 8 numbers, as floats, or the states in an array (..., 6
+        or 8), as columns.
 
         A `State` is returned as it is. Raises `InputError` as `full_state`.
         """
@@ -81,9 +83,12 @@ def state_units(p: Parameters) -> Array:
 
 
 def check_place(x: State, p: Parameters, depth: float = 0.0) -> None:
-    """`InputError` for a ball deeper in floor or wall than `depth`, m, or on the axis, where polar coordinates end."""
+    """`InputError` for a ball deeper in floor or wall than `depth`, m, or on the axis, where polar
+    coordinates end."""
     check_number("y", x.y, "m", Range(0.0 - depth), "to be above the floor it")
-    check_number("h", x.h, "m", Range(0.0 - depth, p.R, below=True), "to be between wall and axis it")
+    check_number(
+        "h", x.h, "m", Range(0.0 - depth, p.R, below=True), "to be between wall and axis it"
+    )
 
 
 class Motion(NamedTuple):
@@ -133,7 +138,8 @@ def frame(theta: Array | float) -> Array:
 
 
 def angular_velocity(x: npt.ArrayLike, p: Parameters) -> Array:
-    """Angular velocity of the ball (4) in the co-rotating frame, shape (..., 3), with rho for R off the wall."""
+    """Angular velocity of the ball (4) in the co-rotating frame, shape (..., 3), with rho for R off
+    the wall."""
     _, v_y, omega_c, slip_x, slip_y, slip_z, h, _ = State.of(x)
     roll = (p.R - h) / p.r * omega_c
     return np.stack([roll + slip_x, slip_y - roll, v_y / p.r + slip_z], axis=-1)
@@ -165,12 +171,15 @@ def to_world(x: npt.ArrayLike, theta: npt.ArrayLike, p: Parameters) -> Motion:
     velocity = np.stack([state.v_h, state.v_y, rho * state.omega_c], axis=-1)
     turn = np.swapaxes(frame(theta), -1, -2)
     return Motion(
-        np.stack(position, axis=-1), _matrix_product(turn, velocity), _matrix_product(turn, angular_velocity(x, p))
+        np.stack(position, axis=-1),
+        _matrix_product(turn, velocity),
+        _matrix_product(turn, angular_velocity(x, p)),
     )
 
 
 def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
-    """States, as columns, and azimuths theta (...) of a motion in the world frame; the inverse of `to_world`.
+    """States, as columns, and azimuths theta (...) of a motion in the world frame; the inverse of
+    `to_world`.
 
     On the axis itself the orbit has no direction: theta is 0 there and omega_c is nan.
     """
@@ -182,7 +191,9 @@ def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
     with np.errstate(invalid="ignore", divide="ignore"):
         omega_c = np.where(rho > 0, v_k / rho, np.nan)
     # v_k is rho omega_c: the rolling part needs no division by rho.
-    return State(pz - p.r, v_y, omega_c, o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, p.R - rho, v_h), theta
+    return State(
+        pz - p.r, v_y, omega_c, o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, p.R - rho, v_h
+    ), theta
 
 
 def _matrix_product(matrix: Array, vector: Array) -> Array:
@@ -191,6 +202,7 @@ def _matrix_product(matrix: Array, vector: Array) -> Array:
 
 
 def tangent(radius: float, azimuth: float) -> tuple[Array, Array]:
-    """Point and inward normal, each (3,), of the plane that touches a cylinder about the z axis there."""
+    """Point and inward normal, each (3,), of the plane that touches a cylinder about the z axis
+    there."""
     normal = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     return -radius * normal, normal

@@ -24,7 +24,8 @@ _SETS = Path(__file__).parent / "parameter_sets"
 
 @dataclass(frozen=True)
 class Range:
-    """The numbers from `low` to `high`: without `low` if `open`, without `high` if `below`, only whole if `whole`."""
+    """The numbers from `low` to `high`: without `low` if `open`, without `high` if `below`, only
+    whole if `whole`."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -40,7 +41,9 @@ class Range:
     def __str__(self) -> str:
         """As a person reads it: ``> 0 and <= 2/3``."""
         ends = ((">" if self.open else ">=", self.low), ("<" if self.below else "<=", self.high))
-        limits = " and ".join(f"{sign} {_exact_text(end)}" for sign, end in ends if math.isfinite(end))
+        limits = " and ".join(
+            f"{sign} {_exact_text(end)}" for sign, end in ends if math.isfinite(end)
+        )
         return f"{'a whole number' * self.whole} {limits}".strip() or "any"
 
 
@@ -53,19 +56,26 @@ REACH = Range(-1e12, 1e12)
 """Of flows and states, for the same reason."""
 
 
-def check_number(name: str, value: Any, unit: str, allowed: Range = ANY, meaning: str = "") -> float:
-    """Return `value` as a float; `InputError` if it is not a finite real number in the allowed range."""
+def check_number(
+    name: str, value: Any, unit: str, allowed: Range = ANY, meaning: str = ""
+) -> float:
+    """Return `value` as a float; `InputError` if it is not a finite real number in the allowed
+    range."""
     try:
         if isinstance(value, bool | str) or not hasattr(value, "__float__"):
             raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} = {value!r} must be a number{f' in {unit}' * (unit != '1')}") from error
+        raise InputError(
+            f"{name} = {value!r} must be a number{f' in {unit}' * (unit != '1')}"
+        ) from error
     of = f" {unit}" * (unit != "1")
     if not math.isfinite(number):
         raise InputError(f"{name} = {number}{of} must be finite")
     if number not in allowed:
-        raise InputError(f"{name} = {number:g}{of} is out of range: {f'{meaning} must'.strip()} be {allowed}")
+        raise InputError(
+            f"{name} = {number:g}{of} is out of range: {f'{meaning} must'.strip()} be {allowed}"
+        )
     return number
 
 
@@ -74,7 +84,9 @@ def parse_number(name: str, text: str, unit: str, allowed: Range = ANY) -> float
     try:
         number = float(text)
     except ValueError as error:
-        raise InputError(f"{name} = {text!r} must be a number{f' in {unit}' * (unit != '1')}") from error
+        raise InputError(
+            f"{name} = {text!r} must be a number{f' in {unit}' * (unit != '1')}"
+        ) from error
     return check_number(name, number, unit, allowed)
 
 
@@ -82,14 +94,20 @@ def check_choice(name: str, value: Any, known: Sequence[Any]) -> None:
     """`InputError` if `value` is none of the known ones."""
     if value not in known:
         names = [str(each) for each in known]
-        raise InputError(f"{name} = {value!r} must be one of {', '.join(names)}{suggestion(str(value), names)}")
+        raise InputError(
+            f"{name} = {value!r} must be one of {', '.join(names)}{suggestion(str(value), names)}"
+        )
 
 
-def check_names(given: Collection[str], known: Sequence[str], kind: str, needed: Iterable[str] = ()) -> None:
+def check_names(
+    given: Collection[str], known: Sequence[str], kind: str, needed: Iterable[str] = ()
+) -> None:
     """`InputError` if a given name is none of the known ones, or a needed one is not given."""
     for name in given:
         if name not in known:
-            raise InputError(f"unknown {kind} {name!r}{suggestion(name, known)}; known: {', '.join(known)}")
+            raise InputError(
+                f"unknown {kind} {name!r}{suggestion(name, known)}; known: {', '.join(known)}"
+            )
     if missing := [name for name in needed if name not in given]:
         raise InputError(f"missing {kind} {', '.join(repr(name) for name in missing)}")
 
@@ -97,7 +115,11 @@ def check_names(given: Collection[str], known: Sequence[str], kind: str, needed:
 def _exact_text(number: float) -> str:
     """A number as text, short and exact where that can be: 0.1, 2/3."""
     fraction = Fraction(number).limit_denominator(9)
-    return f"{number:g}" if float(f"{number:g}") == number or float(fraction) != number else str(fraction)
+    return (
+        f"{number:g}"
+        if float(f"{number:g}") == number or float(fraction) != number
+        else str(fraction)
+    )
 
 
 def _quantity(symbol: str, unit: str, meaning: str, allowed: Range, **default: Any) -> Any:
@@ -109,28 +131,36 @@ def _quantity(symbol: str, unit: str, meaning: str, allowed: Range, **default: A
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """Everything the model depends on, in SI units: Table 1 of the paper, and the law of drag (`model.drag`).
+    """Everything the model depends on, in SI units: Table 1 of the paper, and the law of drag
+    (`model.drag`).
 
     QUANTITIES
 
     Raises
     ------
-    InputError
-        If a value is not a finite number in its range, or the law of drag lacks the fluid's viscosity; the message
-        names field, value, unit and range.
+    InputError If a value is not a finite number in its range, or the law of drag lacks the fluid's
+        viscosity; the message names field, value, unit and range.
     """
 
     m: float = _quantity("m", "kg", "mass of the ball", POSITIVE)
     r: float = _quantity("r", "m", "radius of the ball", POSITIVE)
-    R: float = _quantity("R", "m", "radius of the centre's orbit; the vessel's radius is R + r", POSITIVE)
-    j: float = _quantity("j", "1", "dimensionless moment of inertia", Range(0.0, 2.0 / 3.0, open=True))
+    R: float = _quantity(
+        "R", "m", "radius of the centre's orbit; the vessel's radius is R + r", POSITIVE
+    )
+    j: float = _quantity(
+        "j", "1", "dimensionless moment of inertia", Range(0.0, 2.0 / 3.0, open=True)
+    )
     mu: float = _quantity("μ", "1", "friction coefficient between ball and floor (A)", NOT_NEGATIVE)
     eta: float = _quantity("η", "1", "friction coefficient between ball and wall (B)", NOT_NEGATIVE)
     g: float = _quantity("g", "m s-2", "gravitational acceleration reduced by buoyancy", POSITIVE)
     c: float = _quantity("c", "s-1", "viscous drag coefficient divided by mass", NOT_NEGATIVE)
     omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", ANY)
-    nu_f: float = _quantity("ν_f", "m2 s-1", "kinematic viscosity of the fluid (0: not known)", NOT_NEGATIVE, default=0)
-    C_D: float = _quantity("C_D", "1", "drag coefficient of the quadratic law", POSITIVE, default=0.44)
+    nu_f: float = _quantity(
+        "ν_f", "m2 s-1", "kinematic viscosity of the fluid (0: not known)", NOT_NEGATIVE, default=0
+    )
+    C_D: float = _quantity(
+        "C_D", "1", "drag coefficient of the quadratic law", POSITIVE, default=0.44
+    )
     density_ratio: float = _quantity(
         "ρ_f/ρ_b",
         "1",
@@ -145,7 +175,8 @@ class Parameters:
         NOT_NEGATIVE,
         default=0.0,
     )
-    """Time stepping and MuJoCo take it; closed forms and the event-driven simulation leave it out, and say so."""
+    """Time stepping and MuJoCo take it; closed forms and the event-driven simulation leave it out,
+    and say so."""
     drag: str = laws.STOKES
     """The law of drag, one of `model.drag.LAWS`."""
 
@@ -158,7 +189,9 @@ class Parameters:
             object.__setattr__(self, field.name, value)
         check_choice("drag", self.drag, laws.LAWS)
         if self.drag != laws.STOKES and self.nu_f == 0:
-            raise InputError(f"drag = {self.drag!r} needs the Reynolds number: nu_f in m2 s-1 must be given")
+            raise InputError(
+                f"drag = {self.drag!r} needs the Reynolds number: nu_f in m2 s-1 must be given"
+            )
 
     @classmethod
     @functools.cache
@@ -183,9 +216,18 @@ class Parameters:
 
     @classmethod
     def from_fluid(
-        cls, *, nu_f: float, rho_f: float, rho_b: float, r: float, gravity: float = 9.81, j: float = 0.4, **rest: Any
+        cls,
+        *,
+        nu_f: float,
+        rho_f: float,
+        rho_b: float,
+        r: float,
+        gravity: float = 9.81,
+        j: float = 0.4,
+        **rest: Any,
     ) -> Self:
-        """Parameters of a uniform ball in a fluid: mass, Stokes drag by (10), gravity less buoyancy.
+        """Parameters of a uniform ball in a fluid: mass, Stokes drag by (10), gravity less
+        buoyancy.
 
         Parameters
         ----------
@@ -194,22 +236,36 @@ class Parameters:
         gravity : gravitational acceleration in vacuum, m s-2
         r, j, rest : R, mu, eta and omega_0 (0 if not given), drag and C_D, as in `Parameters`
         """
-        given = {"nu_f": (nu_f, "m2 s-1"), "rho_f": (rho_f, "kg m-3"), "r": (r, "m"), "gravity": (gravity, "m s-2")}
+        given = {
+            "nu_f": (nu_f, "m2 s-1"),
+            "rho_f": (rho_f, "kg m-3"),
+            "r": (r, "m"),
+            "gravity": (gravity, "m s-2"),
+        }
         for name, (value, unit) in given.items():
             check_number(name, value, unit, POSITIVE)
             check_number(name, value, unit, SIZES)
-        check_number("rho_b", rho_b, "kg m-3", Range(rho_f, open=True), "a ball not denser than the fluid floats; it")
+        check_number(
+            "rho_b",
+            rho_b,
+            "kg m-3",
+            Range(rho_f, open=True),
+            "a ball not denser than the fluid floats; it",
+        )
         m, c = 4 / 3 * math.pi * r**3 * rho_b, 9 * nu_f / (2 * r**2) * rho_f / rho_b
         fluid = {"nu_f": nu_f, "density_ratio": rho_f / rho_b}
-        return cls(m=m, r=r, j=j, g=gravity * (1 - rho_f / rho_b), c=c, **{"omega_0": 0.0} | rest | fluid)
+        return cls(
+            m=m, r=r, j=j, g=gravity * (1 - rho_f / rho_b), c=c, **{"omega_0": 0.0} | rest | fluid
+        )
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
-        """Build from a mapping: the parameters, or the arguments of `from_fluid` with a ``fluid`` table.
+        """Build from a mapping: the parameters, or the arguments of `from_fluid` with a ``fluid``
+        table.
 
-        The table ``fluid`` holds nu_f, rho_f, rho_b and optionally gravity; m, g, c and density_ratio then follow from
-        it and may not be given. Raises `InputError` for an unknown, missing or contradictory key.
-        """
+        The table ``fluid`` holds nu_f, rho_f, rho_b and optionally gravity; m, g, c and
+        density_ratio then follow from it and may not be given. Raises `InputError` for an unknown,
+        missing or contradictory key."""
         names = [f.name for f in dataclasses.fields(cls)]
         if "fluid" not in values:
             needed = (f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING)
@@ -221,9 +277,16 @@ class Parameters:
         rest = {k: v for k, v in values.items() if k != "fluid"}
         for name in ("m", "g", "c", "nu_f", "density_ratio"):
             if name in rest:
-                raise InputError(f"{name} follows from the [fluid] table and may not be given beside it")
+                raise InputError(
+                    f"{name} follows from the [fluid] table and may not be given beside it"
+                )
         check_names(rest, names, "parameter", ("r", "R", "mu", "eta"))
-        check_names(fluid, ("nu_f", "rho_f", "rho_b", "gravity"), "fluid property", ("nu_f", "rho_f", "rho_b"))
+        check_names(
+            fluid,
+            ("nu_f", "rho_f", "rho_b", "gravity"),
+            "fluid property",
+            ("nu_f", "rho_f", "rho_b"),
+        )
         return cls.from_fluid(**rest, **fluid)
 
     @classmethod
@@ -241,7 +304,8 @@ class Parameters:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a TOML file; raises `StorageError` if it can't be read, `InputError` for what it says."""
+        """Read a TOML file; raises `StorageError` if it can't be read, `InputError` for what it
+        says."""
         values = read_toml(path)
         try:
             return cls.from_mapping(values)
@@ -256,7 +320,9 @@ class Parameters:
 _table = ["Parameters", "----------"]
 for _field in Parameters.quantities():
     _usual = "" if _field.default is dataclasses.MISSING else f", default {_field.default:g}"
-    _said = "{name} : {meaning}, in {unit}, {allowed}{usual}".format(name=_field.name, usual=_usual, **_field.metadata)
+    _said = "{name} : {meaning}, in {unit}, {allowed}{usual}".format(
+        name=_field.name, usual=_usual, **_field.metadata
+    )
     _table.append(_said.replace(", in 1", "").replace(", any", ""))
 _table.append(f"drag : one of {', '.join(laws.LAWS)}")
 Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", "\n    ".join(_table))

@@ -1,10 +1,11 @@
-"""The HDF5 form of trajectories, flat, whole or not there at all: one run a file, or the runs of a batch in one.
+"""The HDF5 form of trajectories, flat, whole or not there at all: one run a file, or the runs of a
+batch in one.
 
-`TrajectoryWriter` appends blocks of samples while a simulation runs, to a temporary name that becomes the final one
-only when the file is whole. `save_batch` writes many short runs at once, along a dimension ``run`` where each has a
-name: ``FILE/NAME`` is read as if it were a file of its own. Readers trust nothing: links that lead out of the file are
-refused, and so is a file that is damaged, foreign, or written by a newer version.
-"""
+`TrajectoryWriter` appends blocks of samples while a simulation runs, to a temporary name that
+becomes the final one only when the file is whole. `save_batch` writes many short runs at once,
+along a dimension ``run`` where each has a name: ``FILE/NAME`` is read as if it were a file of its
+own. Readers trust nothing: links that lead out of the file are refused, and so is a file that is
+damaged, foreign, or written by a newer version."""
 
 from __future__ import annotations
 
@@ -48,7 +49,8 @@ _TEXT = h5py.string_dtype()
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
-    """Write a whole trajectory; raises `StorageError` if that can't be done, leaving nothing behind."""
+    """Write a whole trajectory; raises `StorageError` if that can't be done, leaving nothing
+    behind."""
     samples = np.empty(len(trajectory.time), SAMPLE)
     for name in columns(Trajectory):
         samples[name] = getattr(trajectory, name)
@@ -58,7 +60,8 @@ def save(trajectory: Trajectory, path: str | Path) -> None:
 
 
 class TrajectoryWriter(WholeFile):
-    """Writes a trajectory block by block; a context manager, at whose end `end` is to be called, see `WholeFile`."""
+    """Writes a trajectory block by block; a context manager, at whose end `end` is to be called,
+    see `WholeFile`."""
 
     def __init__(self, path: str | Path, header: Header) -> None:
         super().__init__(path)
@@ -71,13 +74,28 @@ class TrajectoryWriter(WholeFile):
             for of, time in ((Trajectory, "time"), (Events, "event_time")):
                 for meta in [*columns(of).values(), *([FLUID] if of is Trajectory else [])]:
                     shape = meta["shape"]
-                    sizes = {"shape": (0, *shape), "maxshape": (None, *shape), "chunks": (1024, *shape)}
-                    _create_column(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
+                    sizes = {
+                        "shape": (0, *shape),
+                        "maxshape": (None, *shape),
+                        "chunks": (1024, *shape),
+                    }
+                    _create_column(
+                        self.file,
+                        meta,
+                        (time, "axis"),
+                        scales,
+                        **sizes,
+                        compression="gzip",
+                        shuffle=True,
+                    )
             begun.pop_all()
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
-        """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
-        added = {name: samples[name] for name in columns(Trajectory)} | {"omega_0": self._flow(samples["time"])}
+        """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush
+        it."""
+        added = {name: samples[name] for name in columns(Trajectory)} | {
+            "omega_0": self._flow(samples["time"])
+        }
         for name, values in added.items():
             column = self.file[name]
             n = column.shape[0]
@@ -86,7 +104,8 @@ class TrajectoryWriter(WholeFile):
         self.flush()
 
     def end(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
-        """Write the events and why the run stopped early, if it did; then give the file its name, or `path`."""
+        """Write the events and why the run stopped early, if it did; then give the file its name,
+        or `path`."""
         for name, meta in columns(Events).items() if len(events) else ():
             column = self.file[meta["name"]]
             column.resize(len(events), axis=0)
@@ -96,19 +115,24 @@ class TrajectoryWriter(WholeFile):
 
 
 def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
-    """Write runs by name into one file; raises `StorageError` if that can't be done, leaving nothing behind.
+    """Write runs by name into one file; raises `StorageError` if that can't be done, leaving
+    nothing behind.
 
-    Columns have shape (run, sample, ...) and (run, event, ...); behind the samples and events that a run has they are
-    filled with nan, and cases with -1. What a file of one run says in attributes is JSON in `header` (run).
-    """
+    Columns have shape (run, sample, ...) and (run, event, ...); behind the samples and events that
+    a run has they are filled with nan, and cases with -1. What a file of one run says in attributes
+    is JSON in `header` (run)."""
     with WholeFile(path) as whole:
         file = whole.file
         scales = _write_common(file, BATCH, BATCH_VERSION)
-        file.attrs.update(Conventions=CONVENTIONS, title=f"Motions of dual-point contact balls: {len(runs)} runs")
+        file.attrs.update(
+            Conventions=CONVENTIONS, title=f"Motions of dual-point contact balls: {len(runs)} runs"
+        )
         file.attrs["versions"] = json.dumps(dict(current_versions()))
         scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
         scales["run"].make_scale("run")
-        headers = [json.dumps(run.header.attributes() | {"mjcf": run.header.mjcf}) for run in runs.values()]
+        headers = [
+            json.dumps(run.header.attributes() | {"mjcf": run.header.mjcf}) for run in runs.values()
+        ]
         file.create_dataset("header", data=headers, dtype=_TEXT).dims[0].attach_scale(scales["run"])
         for dimension, of in (("sample", Trajectory), ("event", Events)):
             tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
@@ -122,8 +146,14 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):
                     row[:count] = getattr(table, name)
-                packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size else {}
-                _create_column(file, meta, ("run", dimension, "axis"), scales, data=values, **packed)
+                packed = (
+                    {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+                    if values.size
+                    else {}
+                )
+                _create_column(
+                    file, meta, ("run", dimension, "axis"), scales, data=values, **packed
+                )
         whole.finish()
 
 
@@ -137,16 +167,19 @@ def load(path: str | Path) -> Trajectory:
 
 
 def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
-    """Read a trajectory `size` samples at a time, so that it may be larger than memory; at least one part.
+    """Read a trajectory `size` samples at a time, so that it may be larger than memory; at least
+    one part.
 
-    Each part has the header and all events; a run from a batch comes as one part. Raises `StorageError` as `load` does.
-    """
+    Each part has the header and all events; a run from a batch comes as one part. Raises
+    `StorageError` as `load` does."""
     path = Path(path)
     if path.parent.is_file():
         try:
             yield load_runs(path.parent)[path.name]
         except KeyError as error:
-            raise StorageError(f"cannot read {path}: {path.parent} holds no run of that name") from error
+            raise StorageError(
+                f"cannot read {path}: {path.parent} holds no run of that name"
+            ) from error
         return
     with reading(path) as file:
         for start in range(0, max(len(dataset(file, "time")), 1), size):
@@ -154,7 +187,8 @@ def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
 
 
 def contents(path: str | Path) -> tuple[str, list[str]]:
-    """The version of dualball that wrote a file, and the names of the runs in it; no names if it holds a single run.
+    """The version of dualball that wrote a file, and the names of the runs in it; no names if it
+    holds a single run.
 
     Raises `StorageError` as `load` does.
     """
@@ -169,7 +203,8 @@ def exists(path: str | Path) -> bool:
 
 
 def load_runs(path: str | Path) -> dict[str, Trajectory]:
-    """All runs of a file by name; the name of a single one is empty. Raises `StorageError` as `load` does."""
+    """All runs of a file by name; the name of a single one is empty. Raises `StorageError` as
+    `load` does."""
     with reading(path) as file:
         if file.attrs.get("schema") != BATCH:
             return {"": _read(file, slice(None))}
@@ -179,13 +214,17 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
         tables = _table(file, Trajectory, 2), _table(file, Events, 2)
         runs = {}
         for k, (name, header, *sizes) in enumerate(zip(names, headers, *counts, strict=True)):
-            own = ({c: each[k, :n].copy() for c, each in table.items()} for table, n in zip(tables, sizes, strict=True))
+            own = (
+                {c: each[k, :n].copy() for c, each in table.items()}
+                for table, n in zip(tables, sizes, strict=True)
+            )
             runs[name] = _trajectory(_attribute({"header": header}, "header", dict), *own)
         return runs
 
 
 def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
-    """Write schema and axes, which all files have; return the HDF5 dimension scales by name, so far of axes."""
+    """Write schema and axes, which all files have; return the HDF5 dimension scales by name, so far
+    of axes."""
     file.attrs.update(schema=schema, schema_version=version)
     axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
     axis.attrs.update(AXIS_ATTRIBUTES)
@@ -194,10 +233,17 @@ def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.
 
 
 def _create_column(
-    file: h5py.File, meta: Mapping[str, Any], dimensions: Sequence[str], scales: dict[str, h5py.Dataset], **layout: Any
+    file: h5py.File,
+    meta: Mapping[str, Any],
+    dimensions: Sequence[str],
+    scales: dict[str, h5py.Dataset],
+    **layout: Any,
 ) -> None:
-    """Create a column along the first of these dimensions; it becomes the HDF5 scale of one that has none yet."""
-    column = file.create_dataset(meta["name"], dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
+    """Create a column along the first of these dimensions; it becomes the HDF5 scale of one that
+    has none yet."""
+    column = file.create_dataset(
+        meta["name"], dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout
+    )
     column.attrs.update(attributes(meta))
     for dimension, scale in zip(column.dims, dimensions, strict=False):
         if scale in scales:
@@ -229,11 +275,18 @@ def _check_schema(file: h5py.File, name: str, newest: int) -> None:
 
 
 def _trajectory(
-    texts: Mapping[str, Any], samples: Mapping[str, npt.NDArray[Any]], events: Mapping[str, npt.NDArray[Any]]
+    texts: Mapping[str, Any],
+    samples: Mapping[str, npt.NDArray[Any]],
+    events: Mapping[str, npt.NDArray[Any]],
 ) -> Trajectory:
     """A run from the texts of its header and its columns."""
-    values = {field.name: _attribute(texts, field.name, str) for field in dataclasses.fields(Header)}
-    values |= {name: _attribute(texts, name, dict) for name in ("parameters", "flow", "settings", "versions")}
+    values = {
+        field.name: _attribute(texts, field.name, str) for field in dataclasses.fields(Header)
+    }
+    values |= {
+        name: _attribute(texts, name, dict)
+        for name in ("parameters", "flow", "settings", "versions")
+    }
     values["parameters"] = Parameters.from_mapping(values["parameters"])
     values["flow"] = Flow.from_mapping(values["flow"])
     codes = np.concatenate([samples["case"], events["from_case"], events["to_case"]])
@@ -243,7 +296,8 @@ def _trajectory(
 
 
 def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
-    """The attribute `name` of a file: a text as it is (kind str), or a dict decoded from JSON; `StorageError` else."""
+    """The attribute `name` of a file: a text as it is (kind str), or a dict decoded from JSON;
+    `StorageError` else."""
     value = texts.get(name)
     if not isinstance(value, str):
         raise StorageError(f"its attribute {name!r} is missing")
@@ -261,11 +315,15 @@ def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
 def _table(
     file: h5py.File, of: type[Trajectory] | type[Events], leading: int, part: slice = slice(None)
 ) -> dict[str, npt.NDArray[Any]]:
-    """Read and check all columns of a table whose arrays have `leading` dimensions before those of one entry."""
+    """Read and check all columns of a table whose arrays have `leading` dimensions before those of
+    one entry."""
     values = {}
     for column, meta in columns(of).items():
         name, stored = meta["name"], dataset(file, meta["name"])
-        if len(stored.shape or ()) != leading + len(meta["shape"]) or stored.shape[leading:] != meta["shape"]:
+        if (
+            len(stored.shape or ()) != leading + len(meta["shape"])
+            or stored.shape[leading:] != meta["shape"]
+        ):
             raise StorageError(f"{name!r} has shape {stored.shape}")
         if stored.dtype.kind != np.dtype(meta["dtype"]).kind:
             raise StorageError(f"{name!r} has type {stored.dtype}")

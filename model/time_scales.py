@@ -13,15 +13,18 @@ from model.flow import Flow
 from model.parameters import Parameters
 
 
-def shortest_time(p: Parameters, flow: Flow, t_end: float, c: Callable[[float], float]) -> tuple[float, str]:
-    """The shortest time of a run of t_end s, in s, and its formula; c(|w|) in s-1 is the law of drag.
+def shortest_time(
+    p: Parameters, flow: Flow, t_end: float, c: Callable[[float], float]
+) -> tuple[float, str]:
+    """The shortest time of a run of t_end s, in s, and its formula; c(|w|) in s-1 is the law of
+    drag.
 
-    Within two steps h an acceleration a may not move the ball by the size of the vessel, a (2 h)^2 <= R: gravity's,
-    a = g, asks for 2 h <= sqrt(R/g), and that of the orbit, a = R omega_0^2, for 2 h <= 1/omega_0. Drag, extrapolated
-    to mid step, leaves z of a speed in a step, where z^2 - (1 - 3/2 c h) z - c h/2 = 0; that is stable up to c h = 1,
-    and 2 h <= 1/c keeps to half of it. Where c depends on the speed w, c w changes by up to 2 c(w) with w, taken where
-    the ball lags by all of the fluid's speed. A wave of the flow is met at least twice a radian, 2 h <= 1/(2 pi f).
-    """
+    Within two steps h an acceleration a may not move the ball by the size of the vessel, a (2 h)^2
+    <= R: gravity's, a = g, asks for 2 h <= sqrt(R/g), and that of the orbit, a = R omega_0^2, for 2
+    h <= 1/omega_0. Drag, extrapolated to mid step, leaves z of a speed in a step, where z^2 - (1 -
+    3/2 c h) z - c h/2 = 0; that is stable up to c h = 1, and 2 h <= 1/c keeps to half of it. Where
+    c depends on the speed w, c w changes by up to 2 c(w) with w, taken where the ball lags by all
+    of the fluid's speed. A wave of the flow is met at least twice a radian, 2 h <= 1/(2 pi f)."""
     times = np.append(flow.knots(t_end), [0.0, t_end])
     # Just before and after the jumps: between them omega_0 is linear.
     fastest = float(np.abs(flow.line(np.append(times, np.nextafter(times, -np.inf)))).max())
@@ -37,11 +40,15 @@ def shortest_time(p: Parameters, flow: Flow, t_end: float, c: Callable[[float], 
     return 1 / rate, name
 
 
-def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float, c: Callable[[float], float]) -> None:
-    """`InputError` for a step beyond half of `shortest_time`; every engine that takes steps is held to this."""
+def check_timestep(
+    timestep: float, p: Parameters, flow: Flow, t_end: float, c: Callable[[float], float]
+) -> None:
+    """`InputError` for a step beyond half of `shortest_time`; every engine that takes steps is held
+    to this."""
     shortest, name = shortest_time(p, flow, t_end, c)
     if timestep > shortest / 2:
         raise InputError(
-            f"timestep = {timestep:g} s is out of range: must be <= {shortest / 2:.3g} s, half of {name}, "
+            f"timestep = {timestep:g} s is out of range: must be <= {shortest / 2:.3g} s, half of "
+            f"{name}, "
             "the shortest time of the problem"
         )

@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 """The paper's axes: x radially inwards, y upwards, z along the orbit."""
-AXIS_ATTRIBUTES = {"units": "1", "long_name": "axes of the co-rotating frame: x inwards, y up, z along"}
+AXIS_ATTRIBUTES = {
+    "units": "1",
+    "long_name": "axes of the co-rotating frame: x inwards, y up, z along",
+}
 SCHEMA, SCHEMA_VERSION = "dualball-trajectory", 1
 """What a file or an xarray data set of a trajectory says of itself."""
 CONVENTIONS = "CF-1.11"
@@ -34,14 +37,28 @@ CONVENTIONS = "CF-1.11"
 
 
 def _column(
-    units: str, long_name: str, equation: str = "", shape: tuple[int, ...] = (), dtype: Any = np.float64, **more: Any
+    units: str,
+    long_name: str,
+    equation: str = "",
+    shape: tuple[int, ...] = (),
+    dtype: Any = np.float64,
+    **more: Any,
 ) -> Any:
     """Declare a field that is a column of the HDF5 file, with its metadata."""
-    about = {"units": units, "long_name": long_name, "equation": equation, "shape": shape, "dtype": dtype}
+    about = {
+        "units": units,
+        "long_name": long_name,
+        "equation": equation,
+        "shape": shape,
+        "dtype": dtype,
+    }
     return field(repr=False, metadata=about, **more)
 
 
-FLUID: Mapping[str, Any] = {"name": "omega_0", **_column("rad s-1", "angular velocity of the fluid").metadata}
+FLUID: Mapping[str, Any] = {
+    "name": "omega_0",
+    **_column("rad s-1", "angular velocity of the fluid").metadata,
+}
 """The column of a file that follows from the flow, and isn't read back."""
 
 
@@ -67,8 +84,11 @@ class Header:
     """UTC time."""
 
     def attributes(self) -> dict[str, Any]:
-        """What a file says of itself: its conventions, each parameter, and all but the MJCF as text or JSON."""
-        texts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "mjcf"}
+        """What a file says of itself: its conventions, each parameter, and all but the MJCF as text
+        or JSON."""
+        texts = {
+            f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "mjcf"
+        }
         parameters = dataclasses.asdict(self.parameters)
         mappings = {"parameters": parameters, "flow": self.flow.to_mapping()}
         mappings |= {name: dict(texts[name]) for name in ("settings", "versions")}
@@ -81,7 +101,8 @@ class Header:
 class Trajectory:
     """A motion of the ball, sampled: n samples and k events, in the axes and symbols of the paper.
 
-    Arrays have shape (n,), forces (n, 3) along `AXES`; `events` are changes of case, `header` says what was simulated.
+    Arrays have shape (n,), forces (n, 3) along `AXES`; `events` are changes of case, `header` says
+    what was simulated.
 
     COLUMNS
     """
@@ -133,10 +154,13 @@ class Trajectory:
         return [Case(code) for code in self.case]
 
     def phases(self) -> list[tuple[Case, float, float]]:
-        """The cases that the run goes through in order, with the times of the first and last sample in each, s."""
+        """The cases that the run goes through in order, with the times of the first and last sample
+        in each, s."""
         starts = np.flatnonzero(np.diff(self.case, prepend=-1))
         ends = np.append(starts, len(self.case))[1:] - 1
-        stretches = zip(self.case[starts], self.time[starts].tolist(), self.time[ends].tolist(), strict=True)
+        stretches = zip(
+            self.case[starts], self.time[starts].tolist(), self.time[ends].tolist(), strict=True
+        )
         return [(Case(code), first, last) for code, first, last in stretches]
 
     @property
@@ -145,7 +169,8 @@ class Trajectory:
         return not self.header.failure
 
     def to_xarray(self) -> xarray.Dataset:
-        """The trajectory as xarray opens its file: units, names of the cases, events, where it comes from.
+        """The trajectory as xarray opens its file: units, names of the cases, events, where it
+        comes from.
 
         Raises `InputError` if xarray, an optional dependency, isn't installed.
         """
@@ -153,7 +178,10 @@ class Trajectory:
             import xarray  # here, because it is optional and takes a second to load
         except ImportError as error:
             raise InputError("to_xarray() needs xarray: pip install xarray h5netcdf") from error
-        variables: dict[str, Any] = {"axis": ("axis", list(AXES), AXIS_ATTRIBUTES), "mjcf": ((), self.header.mjcf)}
+        variables: dict[str, Any] = {
+            "axis": ("axis", list(AXES), AXIS_ATTRIBUTES),
+            "mjcf": ((), self.header.mjcf),
+        }
         for table, time in ((self, "time"), (self.events, "event_time")):
             for name, meta in columns(type(table)).items():
                 values = getattr(table, name)
@@ -163,16 +191,16 @@ class Trajectory:
         return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 
     def table(self) -> dict[str, Array]:
-        """Everything that a sample holds, number by number: forces split along `AXES` (force_Ax …), each shape (n,)."""
+        """Everything that a sample holds, number by number: forces split along `AXES` (force_Ax …),
+        each shape (n,)."""
         return {name: component(self, name) for name in COMPONENTS} | {"omega_0": self.omega_0}
 
     def to_pandas(self) -> pandas.DataFrame:
         """The samples as a pandas table, one row each, with the time in s as its index.
 
-        Columns have the names and units of a file's; forces are split along `AXES` (force_Ax …), cases are categories
-        by name, and `attrs` says where the motion comes from. Raises `InputError` if pandas, an optional dependency,
-        isn't installed.
-        """
+        Columns have the names and units of a file's; forces are split along `AXES` (force_Ax …),
+        cases are categories by name, and `attrs` says where the motion comes from. Raises
+        `InputError` if pandas, an optional dependency, isn't installed."""
         try:
             import pandas  # here, because it is optional and takes a second to load
         except ImportError as error:
@@ -184,12 +212,17 @@ class Trajectory:
         return found
 
     @classmethod
-    def from_blocks(cls, header: Header, blocks: list[npt.NDArray[np.void]], events: Events) -> Self:
+    def from_blocks(
+        cls, header: Header, blocks: list[npt.NDArray[np.void]], events: Events
+    ) -> Self:
         """Join blocks of samples, structured arrays of dtype `SAMPLE`.
 
         They are taken out of the list one by one, so that most of what they hold is in memory once.
         """
-        columns = {name: np.empty((sum(map(len, blocks)), *meta["shape"]), meta["dtype"]) for name, meta in _SAMPLED}
+        columns = {
+            name: np.empty((sum(map(len, blocks)), *meta["shape"]), meta["dtype"])
+            for name, meta in _SAMPLED
+        }
         last = len(columns["time"])
         while blocks:
             block = blocks.pop()
@@ -199,9 +232,13 @@ class Trajectory:
         return cls(header=header, events=events, **columns)
 
 
-def _event_column(units: str, long_name: str, shape: tuple[int, ...] = (), dtype: Any = np.float64) -> Any:
+def _event_column(
+    units: str, long_name: str, shape: tuple[int, ...] = (), dtype: Any = np.float64
+) -> Any:
     """As `_column`, of the table of events, which may be empty."""
-    return _column(units, long_name, "", shape, dtype, default_factory=lambda: np.empty((0, *shape), dtype))
+    return _column(
+        units, long_name, "", shape, dtype, default_factory=lambda: np.empty((0, *shape), dtype)
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,15 +248,20 @@ class Events:
     time: Array = _event_column("s", "time of the event, located between time steps")
     from_case: npt.NDArray[np.int8] = _event_column("1", "case before the event", dtype=np.int8)
     to_case: npt.NDArray[np.int8] = _event_column("1", "case after the event", dtype=np.int8)
-    impulse_A: Array = _event_column("N s", "impulse of the floor on the ball, zero without impact", (3,))
-    impulse_B: Array = _event_column("N s", "impulse of the wall on the ball, zero without impact", (3,))
+    impulse_A: Array = _event_column(
+        "N s", "impulse of the floor on the ball, zero without impact", (3,)
+    )
+    impulse_B: Array = _event_column(
+        "N s", "impulse of the wall on the ball, zero without impact", (3,)
+    )
 
     def __len__(self) -> int:
         return len(self.time)
 
 
 def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
-    """Metadata of every array column, in order: name in a file, units, long_name, equation, shape, dtype."""
+    """Metadata of every array column, in order: name in a file, units, long_name, equation, shape,
+    dtype."""
     table = "event_" if of is Events else ""
     fields = [f for f in dataclasses.fields(of) if "units" in f.metadata]
     return {f.name: {"name": table + f.name.removesuffix("_case"), **f.metadata} for f in fields}
@@ -227,26 +269,34 @@ def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]
 
 _SAMPLED = columns(Trajectory).items()
 COMPONENTS: dict[str, tuple[str, str]] = {
-    name + axis: (name, axis) for name, meta in _SAMPLED for axis in (AXES if meta["shape"] else ("",))
+    name + axis: (name, axis)
+    for name, meta in _SAMPLED
+    for axis in (AXES if meta["shape"] else ("",))
 }
-"""What a sample holds, number by number: the columns, forces once along each of the `AXES` (force_Ax ...)."""
+"""What a sample holds, number by number: the columns, forces once along each of the `AXES`
+(force_Ax ...)."""
 
 
 def component(of: Any, name: str) -> Array:
-    """A number by its name, such as omega_c or force_Ax, at each sample of a trajectory or its data set, shape (n,)."""
+    """A number by its name, such as omega_c or force_Ax, at each sample of a trajectory or its data
+    set, shape (n,)."""
     column, axis = COMPONENTS[name]
     values = np.asarray(getattr(of, column))
     return values[:, AXES.index(axis)] if axis else values
 
 
 _meanings = (f"* {name}: {meta['long_name']}, in {meta['units']}" for name, meta in _SAMPLED)
-Trajectory.__doc__ = (Trajectory.__doc__ or "").replace("COLUMNS", "\n    ".join(_meanings).replace(", in 1", ""))
+Trajectory.__doc__ = (Trajectory.__doc__ or "").replace(
+    "COLUMNS", "\n    ".join(_meanings).replace(", in 1", "")
+)
 
 
 def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
     """The attributes of a column in a file and in xarray."""
     attributes = {key: meta[key] for key in ("units", "long_name", "equation") if meta[key]}
-    if meta["dtype"] is np.int8:  # the CF convention's names of the codes, for readers that drop the HDF5 enum
+    if (
+        meta["dtype"] is np.int8
+    ):  # the CF convention's names of the codes, for readers that drop the HDF5 enum
         attributes["flag_values"] = np.array([case.value for case in Case], np.int8)
         attributes["flag_meanings"] = " ".join(case.name for case in Case)
     return attributes
@@ -257,7 +307,8 @@ SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in _SAMPL
 
 
 def samples(time: Array, theta: Array, x: State, p: Parameters) -> npt.NDArray[np.void]:
-    """Samples (n,) of dtype `SAMPLE` with gaps and slip speeds as the states say; forces and case are for the caller.
+    """Samples (n,) of dtype `SAMPLE` with gaps and slip speeds as the states say; forces and case
+    are for the caller.
 
     time, theta and the columns of x have shape (n,).
     """

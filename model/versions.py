@@ -22,7 +22,9 @@ def current_versions() -> Mapping[str, str]:
 @functools.cache
 def version(package: str) -> str:
     """The version of an installed package."""
-    from importlib import metadata  # here, because it takes longer to load than the program to say its version
+    from importlib import (
+        metadata,
+    )  # here, because it takes longer to load than the program to say its version
 
     try:
         return metadata.version(package)
@@ -34,9 +36,19 @@ def version(package: str) -> str:
 def current_commit() -> str:
     """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
     # Without locks: git leaves them in the checkout if it takes too long and is killed.
-    git = ["git", "--no-optional-locks", "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"]
+    git = [
+        "git",
+        "--no-optional-locks",
+        "describe",
+        "--always",
+        "--dirty=+",
+        "--abbrev=40",
+        "--exclude=*",
+    ]
     here = Path(__file__).resolve().parent
     try:
-        return subprocess.check_output(git, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10).strip()
+        return subprocess.check_output(
+            git, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10
+        ).strip()
     except (OSError, subprocess.SubprocessError):
         return ""

@@ -1,4 +1,5 @@
-"""What xarray reads a run with for ``engine="dualball"``: an entry point in pyproject.toml leads it here."""
+"""What xarray reads a run with for ``engine="dualball"``: an entry point in pyproject.toml leads it
+here."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from model.trajectory import COMPONENTS, FLUID, Trajectory, attributes, columns
 
 
 class RunBackend(BackendEntrypoint):
-    """A run, or one of a batch as ``FILE/KEY``, as columns along the time alone: its table has one row a sample."""
+    """A run, or one of a batch as ``FILE/KEY``, as columns along the time alone: its table has one
+    row a sample."""
 
     description = "Runs of dualball, one row a sample"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")
@@ -24,21 +26,30 @@ class RunBackend(BackendEntrypoint):
     def open_dataset(
         self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
     ) -> xarray.Dataset:
-        """Open a run's file: the columns of `Trajectory.table` along the time, cases by name, without the events.
+        """Open a run's file: the columns of `Trajectory.table` along the time, cases by name,
+        without the events.
 
         Raises `StorageError`, in one line, for a file that isn't a run or is damaged.
         """
         from model import storage  # here, because xarray loads this module whatever it is to open
 
         if not isinstance(filename_or_obj, str | os.PathLike):
-            raise InputError(f"engine='dualball' opens a file by its name, not a {type(filename_or_obj).__name__}")
+            raise InputError(
+                f"engine='dualball' opens a file by its name, not a "
+                f"{type(filename_or_obj).__name__}"
+            )
         run, about = storage.load(Path(filename_or_obj)), columns(Trajectory)
-        metas = {name: about[column] for name, (column, _) in COMPONENTS.items()} | {"omega_0": FLUID}
+        metas = {name: about[column] for name, (column, _) in COMPONENTS.items()} | {
+            "omega_0": FLUID
+        }
         found = xarray.Dataset(
-            {name: ("time", values, attributes(metas[name])) for name, values in run.table().items()},
+            {
+                name: ("time", values, attributes(metas[name]))
+                for name, values in run.table().items()
+            },
             attrs=run.header.attributes(),
         )
         names = [Case(code).name for code in run.case]
-        return found.assign(case=("time", names, {"long_name": about["case"]["long_name"]})).drop_vars(
-            drop_variables or (), errors="ignore"
-        )
+        return found.assign(
+            case=("time", names, {"long_name": about["case"]["long_name"]})
+        ).drop_vars(drop_variables or (), errors="ignore")

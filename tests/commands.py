@@ -34,7 +34,8 @@ SCENE = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
 
 
 def carried_out(capsys: pytest.CaptureFixture[str], *argv: object) -> tuple[int, str, str]:
-    """The exit code of a command, given in a line or by its words, what it prints, and what it says of trouble."""
+    """The exit code of a command, given in a line or by its words, what it prints, and what it says
+    of trouble."""
     capsys.readouterr()
     words = str(argv[0]).split() if len(argv) == 1 else map(str, argv)
     return cli.main([*words]), *capsys.readouterr()
@@ -56,8 +57,11 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
 
 
 def started(*words: object, **how: Any) -> subprocess.Popen[str]:
-    """A command in a process of its own, which hears Ctrl-C even if a shell ran the tests in the background."""
-    env = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}  # NiceGUI looks for it
+    """A command in a process of its own, which hears Ctrl-C even if a shell ran the tests in the
+    background."""
+    env = {
+        key: value for key, value in os.environ.items() if not key.startswith("PYTEST")
+    }  # NiceGUI looks for it
     return subprocess.Popen(
         [sys.executable, "-m", "compare", *map(str, words)],
         env=env | {"PYTHONPATH": str(ROOT)},

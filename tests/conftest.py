@@ -10,7 +10,8 @@ settings.load_profile("dualball")
 
 @pytest.hookimpl(trylast=True)  # of those that are left
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What numba takes longest to compile comes first, runs of theory, and in the middle, Coulomb's law in MuJoCo.
+    """What numba takes longest to compile comes first, runs of theory, and in the middle, Coulomb's
+    law in MuJoCo.
 
     Two workers begin there: each compiles what the other one then loads.
     """

@@ -16,5 +16,9 @@ def resistance(speed: npt.ArrayLike, p: Parameters) -> Array:
     """c(|w|) = c C_D Re/24, s-1, at speeds > 0."""
     Re = 2 * p.r * np.asarray(speed) / p.nu_f
     wake = 24 / Re * (1 + 0.15 * Re**0.687)
-    C_D = {"stokes": 24 / Re, "schiller-naumann": np.maximum(wake, 0.44), "quadratic": np.full_like(Re, p.C_D)}
+    C_D = {
+        "stokes": 24 / Re,
+        "schiller-naumann": np.maximum(wake, 0.44),
+        "quadratic": np.full_like(Re, p.C_D),
+    }
     return np.asarray(p.c * C_D[p.drag] * Re / 24)

@@ -1,4 +1,5 @@
-"""The exact cases by name, simulated when a test first asks for one: to collect tests takes none of them."""
+"""The exact cases by name, simulated when a test first asks for one: to collect tests takes none of
+them."""
 
 import json
 from importlib import resources
@@ -6,7 +7,9 @@ from importlib import resources
 from compare.bench import cases
 from compare.bench.case import Case
 
-LISTED = json.loads((resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8"))
+LISTED = json.loads(
+    (resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8")
+)
 
 
 class Cases(dict[str, Case]):

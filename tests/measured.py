@@ -36,9 +36,15 @@ def measured(
 
 
 def claim(name: str = "it", *bearings: Bearing, **others: Any) -> Claim:
-    """A claim, that a ball in a stationary state goes round with the flow unless bearings are given."""
+    """A claim, that a ball in a stationary state goes round with the flow unless bearings are
+    given."""
     own = bearings or (Bearing("settled", "omega_c", lambda m: m.parameters.omega_0),)
-    given = {"section": "Stationary states", "source": "(1)", "statement": "So it is.", "bearings": own}
+    given = {
+        "section": "Stationary states",
+        "source": "(1)",
+        "statement": "So it is.",
+        "bearings": own,
+    }
     return Claim(id=name, **(given | others))
 
 
@@ -51,10 +57,13 @@ def motion(p: Parameters, time: npt.ArrayLike, **columns: npt.ArrayLike) -> Traj
 
 
 def thresholds(set: str, p: Parameters, *names: str, uncertainty: float = 1e-6) -> Records:
-    """Flows at which rolling ends, those that there are, as if they had been measured before; uncertainty relative."""
+    """Flows at which rolling ends, those that there are, as if they had been measured before;
+    uncertainty relative."""
     values = {name: getattr(analytic.thresholds(p), name) for name in names}
     return Records(
         tuple(
-            measured("thresholds", name, w, uncertainty * w, p, set) for name, w in values.items() if math.isfinite(w)
+            measured("thresholds", name, w, uncertainty * w, p, set)
+            for name, w in values.items()
+            if math.isfinite(w)
         )
     )

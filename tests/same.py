@@ -1,7 +1,8 @@
-"""Do two results directories hold the same measurements, to the bit? ``python -m tests.same A B [PROTOCOL ...]``
+"""Do two results directories hold the same measurements, to the bit? ``python -m tests.same A B
+[PROTOCOL ...]``
 
-A pure refactoring of what measures must leave them so. Which runs a number came from is not compared.
-"""
+A pure refactoring of what measures must leave them so. Which runs a number came from is not
+compared."""
 
 from __future__ import annotations
 
@@ -26,14 +27,19 @@ def protocols(directory: Path) -> dict[str, Records]:
 
 
 def differences(one: Records, other: Records) -> list[str]:
-    """What differs between the records of a protocol, a line each; floats are compared to the bit."""
+    """What differs between the records of a protocol, a line each; floats are compared to the
+    bit."""
     found = [] if one.missing == other.missing else ["what is missing, or why"]
     if len(one.measurements) != len(other.measurements):
         return [*found, f"{len(one.measurements)} and {len(other.measurements)} measurements"]
     for a, b in zip(one.measurements, other.measurements, strict=True):
-        names = [name for name in vars(a) if name != "runs" and getattr(a, name) != getattr(b, name)]
+        names = [
+            name for name in vars(a) if name != "runs" and getattr(a, name) != getattr(b, name)
+        ]
         if names:
-            found.append(f"{a.quantity} of {a.set} at {a.parameters.omega_0:g} rad/s: {', '.join(names)}")
+            found.append(
+                f"{a.quantity} of {a.set} at {a.parameters.omega_0:g} rad/s: {', '.join(names)}"
+            )
     return found
 
 
@@ -44,7 +50,11 @@ def main(first: str, second: str, *names: str) -> int:
     for name in sorted(one.keys() | other.keys()):
         if names and name.partition(" by ")[0] not in names:
             continue
-        found = differences(one[name], other[name]) if name in one and name in other else ["in one of them only"]
+        found = (
+            differences(one[name], other[name])
+            if name in one and name in other
+            else ["in one of them only"]
+        )
         print(f"{name}: {f'{len(found)} differences, such as {found[0]}' if found else 'the same'}")
         worst = max(worst, bool(found))
     return worst

@@ -1,4 +1,5 @@
-"""Theory and MuJoCo move under each law of drag by the force of its source, and in no step too long for it."""
+"""Theory and MuJoCo move under each law of drag by the force of its source, and in no step too long
+for it."""
 
 import math
 
@@ -25,7 +26,9 @@ def test_the_force_in_mujoco_is_that_of_the_law(law):
     assert np.ptp(np.log10(2 * p.r * speeds / p.nu_f)) > 7
     force = in_mujoco(*w, ball)
     np.testing.assert_allclose(force, p.m * resistance(speeds, p), rtol=1e-13)
-    assert [in_mujoco(*one, ball) for one in w.T.tolist()] == pytest.approx(force.tolist(), rel=1e-14)
+    assert [in_mujoco(*one, ball) for one in w.T.tolist()] == pytest.approx(
+        force.tolist(), rel=1e-14
+    )
 
 
 def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient():
@@ -40,7 +43,9 @@ def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient():
     assert p.m * drag.coefficient(speed, p) * speed == pytest.approx(force, rel=1e-13)
 
 
-@pytest.mark.parametrize("ask", [lambda p: drag.coefficient(0.3, p), lambda p: Ball.of(p, ContactSettings())])
+@pytest.mark.parametrize(
+    "ask", [lambda p: drag.coefficient(0.3, p), lambda p: Ball.of(p, ContactSettings())]
+)
 def test_a_law_without_a_formula_is_not_taken_for_another(ask, monkeypatch):
     monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
     with pytest.raises(KeyError, match="oseen"):
@@ -49,11 +54,15 @@ def test_a_law_without_a_formula_is_not_taken_for_another(ask, monkeypatch):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_slipping_converges_with_the_square_of_the_step(law):
-    """Each variable's error against the event-driven simulation is less than a quarter at half the step."""
+    """Each variable's error against the event-driven simulation is less than a quarter at half the
+    step."""
     p, x = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0), [0, 0, 13.0, -20.0, -5.0, 22.0]
     exact = analytic.simulate(p, x, 0.08, rtol=1e-12).x[-1]
     coarse, fine = (
-        mjsim.simulate(p, x, 0.08, settings=ContactSettings.for_problem(p, h), sample_interval=0.02).x[-1] - exact
+        mjsim.simulate(
+            p, x, 0.08, settings=ContactSettings.for_problem(p, h), sample_interval=0.02
+        ).x[-1]
+        - exact
         for h in (2e-4, 1e-4)
     )
     assert np.all(np.abs(coarse[2:6]) > 1e-7)

@@ -1,17 +1,20 @@
-"""Sources are read at a glance: functions as long as their thought, and no class or constant of two meanings.
+"""Sources are read at a glance: functions as long as their thought, and no class or constant of two
+meanings.
 
-A function has no more than 60 lines beside the docstring, and six parameters. Exceptions are named, each with the
-reason for which it is one; a name that is none any more is to be taken out.
-"""
+A function has no more than 75 lines beside the docstring, and six parameters. Exceptions are named,
+each with the reason for which it is one; a name that is none any more is to be taken out."""
 
 import ast
 from collections import Counter
 from pathlib import Path
 
-LINES, PARAMETERS = 60, 6
+LINES, PARAMETERS = 75, 6
 ROOT = Path(__file__).parents[1]
 PACKAGES = {
-    package: {path.relative_to(ROOT): ast.parse(path.read_text("utf-8")) for path in (ROOT / package).rglob("*.py")}
+    package: {
+        path.relative_to(ROOT): ast.parse(path.read_text("utf-8"))
+        for path in (ROOT / package).rglob("*.py")
+    }
     for package in ("model", "analytic", "mjsim", "compare")
 }
 """The modules of each package by their files, parsed."""
@@ -22,23 +25,52 @@ EXCEPTIONS = {
     *("compare/validation.py:validate", "compare/view/render.py:write"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
     "analytic/simulation/equations.py:forces",
-    *(f"analytic/simulation/solvers.py:{name}" for name in ("_root", "_interpolant", "_first_fall")),
-    *("analytic/simulation/solvers.py:_explicit_steps", "analytic/simulation/solvers.py:_implicit_steps"),
+    *(
+        f"analytic/simulation/solvers.py:{name}"
+        for name in ("_root", "_interpolant", "_first_fall")
+    ),
+    *("analytic/simulation/solvers.py:_explicit_steps", "analytic/simulation/stepping.py:solve"),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
     *("mjsim/corrections.py:corrections", "mjsim/free.py:through"),
-    *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_match_contacts", "_would_hold", "_put_points_back")),
+    *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_would_hold", "_put_points_back")),
     "mjsim/world_axes.py:driven",
     # what an exact case is made of
     "compare/bench/closed_forms.py:closed_form",
+    # a figure of two panels
+    "compare/subjects/unsteady/figures.py:draw_unsteady",
     # all that a measured number is made of
     "compare/kit/record.py:measurement",
 }
 SAME = {
     # what every subject, file format, adapter or page has
-    *("CAPTION", "CLAIMS", "DEFAULTS", "FIGURES", "PROTOCOL", "PROTOCOLS", "SCHEMA", "SCHEMA_VERSION", "SECTIONS"),
+    *(
+        "CAPTION",
+        "CLAIMS",
+        "DEFAULTS",
+        "FIGURES",
+        "PROTOCOL",
+        "PROTOCOLS",
+        "SCHEMA",
+        "SCHEMA_VERSION",
+        "SECTIONS",
+    ),
     *("Scene", "Settings", "best", "defaults", "free"),
-    # the same, with another value: degrees of polynomials, records, random numbers, units and symbols of other names
-    *("DEGREES", "EPS", "FEWEST", "G", "LEAST", "LISTED", "PATIENCE", "PUSH", "REFINED", "RTOL", "SEED", "SET"),
+    # the same, with another value: degrees of polynomials, records, random numbers, units and
+    # symbols of other names
+    *(
+        "DEGREES",
+        "EPS",
+        "FEWEST",
+        "G",
+        "LEAST",
+        "LISTED",
+        "PATIENCE",
+        "PUSH",
+        "REFINED",
+        "RTOL",
+        "SEED",
+        "SET",
+    ),
     *("SKIPPED", "STARTS", "STEPS", "SYMBOLS", "T", "UNITS"),
 }
 """Names of which a package may have several."""
@@ -51,7 +83,10 @@ def test_functions_have_no_more_lines_and_parameters_than_a_reader_keeps_in_mind
             lines = node.end_lineno - node.lineno + 1
             if ast.get_docstring(node):
                 lines -= node.body[0].end_lineno - node.body[0].lineno + 1
-            names = {each.arg for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)}
+            names = {
+                each.arg
+                for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
+            }
             if lines > LINES or len(names - {"self", "cls"}) > PARAMETERS:
                 large.add(f"{path.as_posix()}:{node.name}")
     assert large == EXCEPTIONS
@@ -61,9 +96,18 @@ def test_names_have_one_meaning_in_a_package():
     for trees in PACKAGES.values():
         defined = Counter()
         for tree in trees.values():
-            targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
+            targets = [
+                each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets
+            ]
             targets += [node.target for node in tree.body if isinstance(node, ast.AnnAssign)]
-            parts = [each for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+            parts = [
+                each
+                for target in targets
+                for each in ast.walk(target)
+                if isinstance(each, ast.Name)
+            ]
             names = {each.id for each in parts if isinstance(each.ctx, ast.Store)}
-            defined.update(names | {node.name for node in tree.body if isinstance(node, ast.ClassDef)})
+            defined.update(
+                names | {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
+            )
         assert not {name for name, count in defined.items() if count > 1 and name[0] != "_"} - SAME

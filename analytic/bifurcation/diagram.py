@@ -1,4 +1,5 @@
-"""Bifurcations over omega_0: the thresholds omega_01 ... omega_04, eta_cr, and what meets there (section 5)."""
+"""Bifurcations over omega_0: the thresholds omega_01 ... omega_04, eta_cr, and what meets there
+(section 5)."""
 
 from __future__ import annotations
 
@@ -16,14 +17,17 @@ from model.errors import check_type
 
 @dataclass(frozen=True)
 class Thresholds:
-    """The flows omega_0 > 0 at which stationary solutions change, rad s-1, and eta_cr; nan for what doesn't exist."""
+    """The flows omega_0 > 0 at which stationary solutions change, rad s-1, and eta_cr; nan for what
+    doesn't exist."""
 
     omega_01: float
-    """(84): RR gives way to SS. nan for eta > j, where A_y would have to be negative. 0 for mu = 0."""
+    """(84): RR gives way to SS. nan for eta > j, where A_y would have to be negative. 0 for mu =
+    0."""
     omega_02: float
     """(85): the wall begins to carry the weight. nan for eta = 0: a smooth wall never does."""
     omega_03: float
-    """(86): the gyroscopic moment carries the weight, and RR lifts off the floor if nothing ended it before."""
+    """(86): the gyroscopic moment carries the weight, and RR lifts off the floor if nothing ended
+    it before."""
     omega_04: float
     """(88): the fold of SS. nan unless eta_cr < eta < j, mu > 0 and c > 0."""
     eta_cr: float
@@ -34,23 +38,28 @@ class Thresholds:
 
 
 def thresholds(p: Parameters) -> Thresholds:
-    """The flows in rad s-1 at which stationary solutions change, by name; nan for what doesn't exist. (84)-(88)
+    """The flows in rad s-1 at which stationary solutions change, by name; nan for what doesn't
+    exist. (84)-(88)
 
     p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only.
     """
     check_type("p", p, Parameters)
     Omega = threshold_curves(p, p.mu, p.eta)
     unit = np.sqrt(p.g / p.R)
-    omega = {name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+    omega = {
+        name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")
+    }
     return Thresholds(**omega, eta_cr=float(Omega["eta_cr"]))
 
 
-def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False) -> dict[str, Array]:
-    """The fields of `Thresholds` over arrays mu and eta, with Omega = omega sqrt(R/g); for the lines of Figs. 7, 8.
+def threshold_curves(
+    p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False
+) -> dict[str, Array]:
+    """The fields of `Thresholds` over arrays mu and eta, with Omega = omega sqrt(R/g); for the
+    lines of Figs. 7, 8.
 
-    `released` drops (12), as Fig. 12 does: omega_01 and omega_04 are then continued beyond eta = j as far as the
-    equations have solutions.
-    """
+    `released` drops (12), as Fig. 12 does: omega_01 and omega_04 are then continued beyond eta = j
+    as far as the equations have solutions."""
     mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
     fold = slipping_branch.fold(p, mu, eta, released)
     folds = np.isfinite(fold)
@@ -62,8 +71,11 @@ def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, relea
     }
 
 
-def curves_without_drag(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False) -> dict[str, Array]:
-    """omega_01, omega_02 and omega_03, in which drag plays no part, as `threshold_curves` gives them."""
+def curves_without_drag(
+    j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False
+) -> dict[str, Array]:
+    """omega_01, omega_02 and omega_03, in which drag plays no part, as `threshold_curves` gives
+    them."""
     mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
     divisor = mu * eta * (1 + j) + j - eta
     real = (divisor > 0) & ((eta <= j) | released)
@@ -76,21 +88,24 @@ def curves_without_drag(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, release
 
 
 def number_of_folds(p: Parameters) -> int:
-    """Folds along the branch of SS, counted: after Proposition 7 one for eta_cr < eta < j, and none for less eta.
+    """Folds along the branch of SS, counted: after Proposition 7 one for eta_cr < eta < j, and none
+    for less eta.
 
-    By the changes of sign of `slope`, a search that assumes nothing. `InputError` as `check_branch`.
-    """
+    By the changes of sign of `slope`, a search that assumes nothing. `InputError` as
+    `check_branch`."""
     check_branch(p)
-    values = slipping_branch.slope(np.linspace(-slipping_branch.END, slipping_branch.END, 20_001), p)
+    values = slipping_branch.slope(
+        np.linspace(-slipping_branch.END, slipping_branch.END, 20_001), p
+    )
     return int(np.sum(np.sign(values[1:]) != np.sign(values[:-1])))
 
 
 def critical_drag(p: Parameters) -> float:
-    """The drag c in s-1 at which p.eta is eta_cr, (87): for less of it SS has a fold. eta_cr rises like c^2.
+    """The drag c in s-1 at which p.eta is eta_cr, (87): for less of it SS has a fold. eta_cr rises
+    like c^2.
 
-    inf for the quadratic law, under which there is always a fold. `InputError` unless 0 < eta < j, mu > 0 and p.c > 0;
-    else p.c plays no part.
-    """
+    inf for the quadratic law, under which there is always a fold. `InputError` unless 0 < eta < j,
+    mu > 0 and p.c > 0; else p.c plays no part."""
     check_branch(p)
     eta_cr = float(slipping_branch.eta_critical(p.mu, p))
     return p.c * float(np.sqrt(p.eta / eta_cr)) if eta_cr else np.inf
@@ -100,7 +115,8 @@ def check_branch(p: Parameters) -> None:
     """`InputError` unless SS has a branch from RR to SR: 0 < eta < j, mu > 0 and c > 0."""
     if not (0 < p.eta < p.j and p.mu > 0 and p.c > 0):
         raise InputError(
-            f"eta = {p.eta:g} is out of range: SS has a branch from RR to SR for 0 < eta < j = {p.j:g}, mu > 0, "
+            f"eta = {p.eta:g} is out of range: SS has a branch from RR to SR for 0 < eta < j = "
+            f"{p.j:g}, mu > 0, "
             "c > 0 only"
         )
 
@@ -125,7 +141,11 @@ def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
     light = slipping_branch.light_drag(p)
     eta_cr = float(np.cbrt(light**2 / 4) if equal else slipping_branch.eta_critical(p.mu, p))
     folds = 0 < eta_cr < p.j
-    points = [DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04"))] if folds else []
+    points = (
+        [DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04"))]
+        if folds
+        else []
+    )
     if equal or p.mu > 0:
         meets = ("omega_01", "omega_02", "omega_03", *("omega_04",) * folds)
         points.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), meets))
@@ -133,7 +153,8 @@ def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
 
 
 class Exists(IntFlag):
-    """Which stationary solutions exist: the labels of the regions of Figs. 7 and 8 (RS exists on omega_0 = 0 only)."""
+    """Which stationary solutions exist: the labels of the regions of Figs. 7 and 8 (RS exists on
+    omega_0 = 0 only)."""
 
     RR = 1
     SS = 2
@@ -145,16 +166,19 @@ class Exists(IntFlag):
     NS = 32
 
 
-def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-    """Flags `Exists` at every point of a plane of parameters, shape (number of eta, number of omega_0).
+def case_map(
+    p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.ArrayLike
+) -> npt.NDArray[np.uint8]:
+    """Flags `Exists` at every point of a plane of parameters, shape (number of eta, number of
+    omega_0).
 
     Parameters
     ----------
     mu, eta : 1-D, of one length (Fig. 8) or mu a number (Fig. 7)
     omega_0 : 1-D, rad s-1, of either sign
 
-    RR counts where it is stable with respect to slipping; for mu > 1 it may also jam beyond that, see `rolling_forces`.
-    """
+    RR counts where it is stable with respect to slipping; for mu > 1 it may also jam beyond that,
+    see `rolling_forces`."""
     Omega = np.abs(np.asarray(omega_0, dtype=float)) / np.sqrt(p.g / p.R)
     eta = np.asarray(eta, dtype=float)
     curves = {name: value[:, None] for name, value in threshold_curves(p, mu, eta).items()}
@@ -181,23 +205,25 @@ def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.
 
 
 def wall_spin(state: State, p: Parameters) -> Real:
-    """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs. 9-12."""
+    """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs.
+    9-12."""
     return state.slip_x + p.R / p.r * state.omega_c
 
 
 SHIFTED = ("omega_01", "omega_02")
-"""Thresholds that the fluid's inertia shifts: at omega_03 the spin alone carries the weight, and the fold of SS has no
-closed form any more."""
+"""Thresholds that the fluid's inertia shifts: at omega_03 the spin alone carries the weight, and
+the fold of SS has no closed form any more."""
 
 
 def thresholds_with_inertia(p: Parameters) -> dict[str, float]:
-    """omega_01 and omega_02 with the added mass and the pressure gradient of the swirl, rad s-1; nan if there is none.
+    """omega_01 and omega_02 with the added mass and the pressure gradient of the swirl, rad s-1;
+    nan if there is none.
 
-    The paper leaves both out, and so do the simulators. A ball that goes round with the fluid needs a centripetal force
-    of its own mass less that of the fluid it displaces, while its spin is turned as before: (1 - s) m takes the place
-    of m, j/(1 - s) that of j and g/(1 - s) that of g, with s the density ratio. docs/theory.md derives it, and says why
-    it is an estimate beside the model and no part of it.
-    """
+    The paper leaves both out, and so do the simulators. A ball that goes round with the fluid needs
+    a centripetal force of its own mass less that of the fluid it displaces, while its spin is
+    turned as before: (1 - s) m takes the place of m, j/(1 - s) that of j and g/(1 - s) that of g,
+    with s the density ratio. docs/theory.md derives it, and says why it is an estimate beside the
+    model and no part of it."""
     rest = 1 - p.density_ratio
     curves = curves_without_drag(p.j / rest, p.mu, p.eta)
     return {name: float(curves[name] * np.sqrt(p.g / rest / p.R)) for name in SHIFTED}
@@ -206,9 +232,13 @@ def thresholds_with_inertia(p: Parameters) -> dict[str, float]:
 def inertia_shifts(p: Parameters) -> dict[str, float]:
     """Relative changes of the thresholds by the fluid's inertia, nan for what doesn't exist.
 
-    And of c/(1 + 2j), the rate of RR in (23), which added mass makes c/(1 + 2j + s/2) whatever the law of drag.
-    """
+    And of c/(1 + 2j), the rate of RR in (23), which added mass makes c/(1 + 2j + s/2) whatever the
+    law of drag."""
     before, after = thresholds(p), thresholds_with_inertia(p)
-    changes = {name: after[name] / getattr(before, name) - 1 for name in SHIFTED if getattr(before, name) != 0}
+    changes = {
+        name: after[name] / getattr(before, name) - 1
+        for name in SHIFTED
+        if getattr(before, name) != 0
+    }
     rolling = 1 + 2 * p.j
     return changes | {"rolling_rate": rolling / (rolling + p.density_ratio / 2) - 1}

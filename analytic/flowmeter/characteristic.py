@@ -1,4 +1,5 @@
-"""The ball as a flowmeter (section 5.3): its characteristic curve omega_c(omega_0), and its range."""
+"""The ball as a flowmeter (section 5.3): its characteristic curve omega_c(omega_0), and its
+range."""
 
 from __future__ import annotations
 
@@ -19,7 +20,9 @@ class End(Enum):
 
     SLIP = "it begins to slip at both points and lags"
     """At omega_01, for eta < j."""
-    UNLOADING = "the wall can carry it, and drops it with impacts when the flow falls below this again"
+    UNLOADING = (
+        "the wall can carry it, and drops it with impacts when the flow falls below this again"
+    )
     """At omega_02, for eta >= j: the black dot of Fig. 13."""
     SMOOTH = "a contact without friction never makes it roll"
     NO_DRAG = "without drag nothing makes it go round"
@@ -35,12 +38,13 @@ class OperatingLimit:
 
 
 def operating_limit(p: Parameters) -> OperatingLimit:
-    """The largest omega_0 below which rolling at both points (RR) is the ball's only lasting motion, and what ends it.
+    """The largest omega_0 below which rolling at both points (RR) is the ball's only lasting
+    motion, and what ends it.
 
-    Section 5.3. For eta < j it ends where RR ends in slipping, omega_01. For eta >= j RR itself goes on to omega_03,
-    where the floor lets go, but it is alone up to omega_02 only: a flow beyond may leave the ball on the wall, which
-    drops it with transients and impacts when the flow falls below omega_02 again (unloading).
-    """
+    Section 5.3. For eta < j it ends where RR ends in slipping, omega_01. For eta >= j RR itself
+    goes on to omega_03, where the floor lets go, but it is alone up to omega_02 only: a flow beyond
+    may leave the ball on the wall, which drops it with transients and impacts when the flow falls
+    below omega_02 again (unloading)."""
     check_type("p", p, Parameters)
     if p.c == 0:
         return OperatingLimit(0.0, End.NO_DRAG)
@@ -57,18 +61,19 @@ def operating_range(p: Parameters) -> float:
 
 
 def reading_range(p: Parameters) -> float:
-    """The largest omega_0 in rad s-1 up to which the ball reads the flow itself, omega_c = omega_0, in every motion.
+    """The largest omega_0 in rad s-1 up to which the ball reads the flow itself, omega_c = omega_0,
+    in every motion.
 
-    omega_01 for eta < j. inf for eta >= j, where RR, SR and NR all go round with the fluid, and on a smooth floor,
-    which can't hold the ball back. 0 without drag.
-    """
+    omega_01 for eta < j. inf for eta >= j, where RR, SR and NR all go round with the fluid, and on
+    a smooth floor, which can't hold the ball back. 0 without drag."""
     if p.c == 0:
         return 0.0
     return bifurcation.thresholds(p).omega_01 if p.eta < p.j and p.mu > 0 else np.inf
 
 
 def unloading_limit(p: Parameters) -> float:
-    """omega_02 in rad s-1: a ball on the wall (NR) stays there while omega_0 is above; below it slips, sinks and lands.
+    """omega_02 in rad s-1: a ball on the wall (NR) stays there while omega_0 is above; below it
+    slips, sinks and lands.
 
     nan for a smooth wall, which carries no ball.
     """
@@ -76,21 +81,28 @@ def unloading_limit(p: Parameters) -> float:
 
 
 def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
-    """d omega_c/d omega_0 along the attractors at p.omega_0: 1 in RR, SR and NR; in SS from (38) and (41), (89).
+    """d omega_c/d omega_0 along the attractors at p.omega_0: 1 in RR, SR and NR; in SS from (38)
+    and (41), (89).
 
     Parameters
     ----------
-    case : which attractor; needed between omega_02 and omega_04 only, where SS lags and SR and NR don't
+    case : which attractor; needed between omega_02 and omega_04 only, where SS lags and SR and NR
+    don't
 
     Raises `InputError` if there is no attractor (of that case), or if `case` is needed.
     """
     followed = stationary.stable_solutions(p) if case is None else [stationary.solution(p, case)]
     if p.c == 0 or not followed:
-        raise InputError(f"no motion follows the flow at omega_0 = {p.omega_0:g} rad s-1 with c = {p.c:g} s-1")
+        raise InputError(
+            f"no motion follows the flow at omega_0 = {p.omega_0:g} rad s-1 with c = {p.c:g} s-1"
+        )
     slips = {bool(np.isfinite(s.alpha)) for s in followed}
     if len(slips) > 1:
         names = ", ".join(s.case.name for s in followed)
-        raise InputError(f"the characteristic has several branches at omega_0 = {p.omega_0:g} rad s-1: choose {names}")
+        raise InputError(
+            f"the characteristic has several branches at omega_0 = {p.omega_0:g} rad s-1: choose "
+            f"{names}"
+        )
     if slips == {False}:
         return 1.0
     s = np.log(np.abs(np.tan(followed[0].alpha)))
@@ -98,19 +110,21 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
 
 
 def slope_jump(p: Parameters) -> float:
-    """By how much the slope of the characteristic jumps at omega_01, where slipping sets in: to zero, by -1.
+    """By how much the slope of the characteristic jumps at omega_01, where slipping sets in: to
+    zero, by -1.
 
-    The first bit of slip turns the friction at the floor without changing the load: omega_c doesn't rise at first.
-    """
+    The first bit of slip turns the friction at the floor without changing the load: omega_c doesn't
+    rise at first."""
     bifurcation.check_branch(p)
     return float(slipping_branch.characteristic_slope(-slipping_branch.END, p)) - 1.0
 
 
 def mean_slope(p: Parameters) -> float:
-    """Mean slope of the characteristic between omega_01 and omega_02, along SS from RR: "very small" (section 5.3).
+    """Mean slope of the characteristic between omega_01 and omega_02, along SS from RR: "very
+    small" (section 5.3).
 
-    1 for eta <= eta_cr, where the branch arrives at omega_02 without a lag. `InputError` unless 0 < eta < j, mu, c > 0.
-    """
+    1 for eta <= eta_cr, where the branch arrives at omega_02 without a lag. `InputError` unless 0 <
+    eta < j, mu, c > 0."""
     bifurcation.check_branch(p)
     t = bifurcation.thresholds(p)
     if np.isnan(t.omega_04):

@@ -1,9 +1,9 @@
-"""Design of a flowmeter: sensitivity of its limits to its data, its reading with tolerances, the best choice.
+"""Design of a flowmeter: sensitivity of its limits to its data, its reading with tolerances, the
+best choice.
 
-Everything rests on `thresholds`, `operating_range` and the branch of SS, whatever the law of drag. A meter is given as
-a function `make` that takes values by name and returns `Parameters`: `p.replace`, or `Parameters.from_fluid` with
-some arguments filled in.
-"""
+Everything rests on `thresholds`, `operating_range` and the branch of SS, whatever the law of drag.
+A meter is given as a function `make` that takes values by name and returns `Parameters`:
+`p.replace`, or `Parameters.from_fluid` with some arguments filled in."""
 
 from __future__ import annotations
 
@@ -39,15 +39,18 @@ THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
 _LOG_STEP = 1e-3
 """Of the differences, in the logarithm of a value."""
 _TIE = 1e-3
-"""Weight of the logarithm of the response time relative to the margin: it decides between equal margins."""
+"""Weight of the logarithm of the response time relative to the margin: it decides between equal
+margins."""
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """d ln omega_0k / d ln of a value: by how many per cent a threshold changes if the value does by one."""
+    """d ln omega_0k / d ln of a value: by how many per cent a threshold changes if the value does
+    by one."""
 
     value: float
-    """nan where the threshold doesn't exist on both sides, or the value may not be changed to one of them."""
+    """nan where the threshold doesn't exist on both sides, or the value may not be changed to one
+    of them."""
     error: float
     """Estimated from differences of two widths."""
 
@@ -55,9 +58,9 @@ class Sensitivity:
 def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Sensitivity]]:
     """Sensitivity of each threshold to each of the values `at`.
 
-    By central differences in the logarithm, extrapolated from two widths (Richardson). omega_01 to omega_03 have
-    closed forms (docs/design.md), with which tests compare; the differences serve any law of drag, and the fold.
-    """
+    By central differences in the logarithm, extrapolated from two widths (Richardson). omega_01 to
+    omega_03 have closed forms (docs/design.md), with which tests compare; the differences serve any
+    law of drag, and the fold."""
 
     def log_thresholds(name: str, step: float) -> Array:
         try:
@@ -71,52 +74,68 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
     with np.errstate(invalid="ignore"):
         for name in at:
             wide, narrow = (
-                (log_thresholds(name, h) - log_thresholds(name, -h)) / (2 * h) for h in (_LOG_STEP, _LOG_STEP / 2)
+                (log_thresholds(name, h) - log_thresholds(name, -h)) / (2 * h)
+                for h in (_LOG_STEP, _LOG_STEP / 2)
             )
             by_name[name] = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
     return {
-        key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
+        key: {
+            name: Sensitivity(float(value[k]), float(error[k]))
+            for name, (value, error) in by_name.items()
+        }
         for k, key in enumerate(THRESHOLDS)
     }
 
 
-def corners(make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]) -> Iterator[Parameters]:
-    """The meter with every value at one end of its tolerance, which is relative: x (1 - t) or x (1 + t).
+def corners(
+    make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]
+) -> Iterator[Parameters]:
+    """The meter with every value at one end of its tolerance, which is relative: x (1 - t) or x (1
+    + t).
 
-    Limits and readings are monotonic in friction and size, but for a ridge of the operating limit at eta = j; so their
-    extremes over all that the tolerances allow are at corners. A test samples between them.
-    """
-    inexact = {name: (at[name] * (1 - t), at[name] * (1 + t)) for name, t in tolerances.items() if t > 0}
+    Limits and readings are monotonic in friction and size, but for a ridge of the operating limit
+    at eta = j; so their extremes over all that the tolerances allow are at corners. A test samples
+    between them."""
+    inexact = {
+        name: (at[name] * (1 - t), at[name] * (1 + t)) for name, t in tolerances.items() if t > 0
+    }
     for values in itertools.product(*inexact.values()):
         yield make(**{**at, **dict(zip(inexact, values, strict=True))})
 
 
 def threshold_spread(meters: Sequence[Parameters]) -> dict[str, Interval]:
-    """Lowest and highest value of each threshold over some meters, rad s-1; nan if one of them doesn't have it."""
+    """Lowest and highest value of each threshold over some meters, rad s-1; nan if one of them
+    doesn't have it."""
     each = [dataclasses.asdict(bifurcation.thresholds(p)) for p in meters]
-    return {key: (float(np.min([t[key] for t in each])), float(np.max([t[key] for t in each]))) for key in THRESHOLDS}
+    return {
+        key: (float(np.min([t[key] for t in each])), float(np.max([t[key] for t in each])))
+        for key in THRESHOLDS
+    }
 
 
 def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
-    """The lowest and the highest omega_c of all stationary motions that attract, at flows omega_0 >= 0, rad s-1.
+    """The lowest and the highest omega_c of all stationary motions that attract, at flows omega_0
+    >= 0, rad s-1.
 
-    They differ where the reading depends on the past (Fig. 13): the lowest is read while the flow rises slowly from
-    rest, the highest while it falls. Only SS lags behind the flow, up to its fold; whether it swings there, as it may
-    for mu > 1.7, is left out. nan without drag.
-    """
+    They differ where the reading depends on the past (Fig. 13): the lowest is read while the flow
+    rises slowly from rest, the highest while it falls. Only SS lags behind the flow, up to its
+    fold; whether it swings there, as it may for mu > 1.7, is left out. nan without drag."""
     flows = np.asarray(omega_0, dtype=float) * (1.0 if p.c else np.nan)
     if p.mu == 0 or p.eta >= p.j or p.c == 0:
         return flows, flows
     t, turn, unit = bifurcation.thresholds(p), slipping_branch.fold(p), np.sqrt(p.g / p.R)
     end, ends_in_fold = (slipping_branch.END, False) if np.isnan(turn) else (float(turn), True)
-    s = roots.sign_change(lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end)
+    s = roots.sign_change(
+        lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end
+    )
     lagging = np.where(np.isnan(s), flows, slipping_branch.branch(s, p).Omega_c * unit)
     slips = (flows > t.omega_01) & ~(flows > (t.omega_04 if ends_in_fold else t.omega_02))
     return np.where(slips, lagging, flows), np.where(slips & ~(flows > t.omega_02), lagging, flows)
 
 
 def response_time(p: Parameters) -> float:
-    """Time constant (1 + 2j)/c in s with which a rolling ball follows a small change of the flow (docs/theory.md, 9).
+    """Time constant (1 + 2j)/c in s with which a rolling ball follows a small change of the flow
+    (docs/theory.md, 9).
 
     inf for the quadratic law, whose drag has no part linear in the lag.
     """
@@ -140,7 +159,9 @@ class Choice:
     """Time constant, s."""
 
 
-def choice(make: Make, values: Mapping[str, float], tolerances: Mapping[str, float], fastest: float) -> Choice:
+def choice(
+    make: Make, values: Mapping[str, float], tolerances: Mapping[str, float], fastest: float
+) -> Choice:
     """Limits, margin and response of a meter for flows up to `fastest`, rad s-1."""
     p = make(**values)
     limit = flowmeter.operating_limit(p)
@@ -157,15 +178,19 @@ def best(
     slowest_response: float = math.inf,
     seed: int = 0,
 ) -> Choice:
-    """The meter within the bounds whose operating range exceeds the fastest flow by the largest factor.
+    """The meter within the bounds whose operating range exceeds the fastest flow by the largest
+    factor.
 
-    Among all that answer within `slowest_response`, s, the one with the largest margin at the worst corner of the
-    tolerances; among equals the quickest. Differential evolution (scipy), as the margin has a ridge at eta = j; the
-    seed determines the result.
+    Among all that answer within `slowest_response`, s, the one with the largest margin at the worst
+    corner of the tolerances; among equals the quickest. Differential evolution (scipy), as the
+    margin has a ridge at eta = j; the seed determines the result.
 
-    Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one can.
-    """
-    from scipy.optimize import Bounds, differential_evolution  # here, because `predict` shall not wait for it
+    Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one
+    can."""
+    from scipy.optimize import (
+        Bounds,
+        differential_evolution,
+    )  # here, because `predict` shall not wait for it
 
     open_names = [name for name, (low, high) in bounds.items() if low < high]
     ends = np.array([bounds[name] for name in open_names]).reshape(-1, 2)
@@ -173,7 +198,12 @@ def best(
 
     def meter_at(unit: npt.ArrayLike) -> Choice:
         chosen = ends[:, 0] + np.asarray(unit) * (ends[:, 1] - ends[:, 0])
-        return choice(make, {**exact, **dict(zip(open_names, chosen.tolist(), strict=True))}, tolerances, fastest)
+        return choice(
+            make,
+            {**exact, **dict(zip(open_names, chosen.tolist(), strict=True))},
+            tolerances,
+            fastest,
+        )
 
     def cost(unit: Array) -> float:
         c = meter_at(unit)
@@ -191,7 +221,8 @@ def best(
         chosen = meter_at([])
     if chosen.response > slowest_response:
         raise InputError(
-            f"response = {slowest_response:g} s excludes everything: within the bounds the quickest ball has a time "
+            f"response = {slowest_response:g} s excludes everything: within the bounds the "
+            f"quickest ball has a time "
             f"constant of {chosen.response:.3g} s"
         )
     return chosen
@@ -221,7 +252,8 @@ class Request:
 
 @dataclass(frozen=True)
 class Curve:
-    """Characteristic curve: lowest and highest reading at each flow, rad s-1, arrays of one shape."""
+    """Characteristic curve: lowest and highest reading at each flow, rad s-1, arrays of one
+    shape."""
 
     omega_0: Array
     meant: tuple[Array, Array]
@@ -258,7 +290,8 @@ class Design:
 
 
 def design(request: Request, seed: int = 0) -> Design:
-    """Choose the material and the meter with the largest margin; raises `InputError` if no material can be used."""
+    """Choose the material and the meter with the largest margin; raises `InputError` if no material
+    can be used."""
     choices, refused, wanted = {}, {}, (request.tolerances, request.fastest, request.response, seed)
     for material, bounds in request.bounds.items():
         try:
@@ -284,9 +317,12 @@ def design(request: Request, seed: int = 0) -> Design:
         sensitivities=sensitivities(request.make, at),
         curve=characteristic(meters, 1.5 * max(request.fastest, chosen.limit.omega_0)),
         model_error=max(
-            real_fluid.model_error(chosen.p.replace(omega_0=flow)) for flow in (request.slowest, request.fastest)
+            real_fluid.model_error(chosen.p.replace(omega_0=flow))
+            for flow in (request.slowest, request.fastest)
         ),
-        with_inertia=min(t["omega_02"] if math.isnan(t["omega_01"]) else t["omega_01"] for t in with_inertia),
+        with_inertia=min(
+            t["omega_02"] if math.isnan(t["omega_01"]) else t["omega_01"] for t in with_inertia
+        ),
     )
 
 

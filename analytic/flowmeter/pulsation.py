@@ -1,9 +1,10 @@
-"""A ball that rolls at both points (RR) in a flow that pulsates: when it slips, and what it then reads on average.
+"""A ball that rolls at both points (RR) in a flow that pulsates: when it slips, and what it then
+reads on average.
 
-The flow is omega_0 = p.omega_0 + amplitude sin(2 pi frequency t). While the ball rolls, omega_c pulsates about the mean
-of the flow exactly, with any law of drag: no error of the mean. The friction that this takes grows with the lag
-omega_c - omega_0, whose drag accelerates the ball (23); the loads grow with omega_c^2. docs/theory.md derives the rest.
-"""
+The flow is omega_0 = p.omega_0 + amplitude sin(2 pi frequency t). While the ball rolls, omega_c
+pulsates about the mean of the flow exactly, with any law of drag: no error of the mean. The
+friction that this takes grows with the lag omega_c - omega_0, whose drag accelerates the ball (23);
+the loads grow with omega_c^2. docs/theory.md derives the rest."""
 
 from __future__ import annotations
 
@@ -25,22 +26,33 @@ from model.drag import STOKES
 from model.kinematics import TURNING
 
 PHASES, CLOSER = 360, 32
-"""Phases of a period at which slip is looked for; and in each of two refinements around the least margin."""
+"""Phases of a period at which slip is looked for; and in each of two refinements around the least
+margin."""
 HARMONICS, FINE = 32, 128
-"""Odd harmonics of the lag that are computed (drag is an odd function); those left out are some 1e-6 of it, or 1e-7."""
+"""Odd harmonics of the lag that are computed (drag is an odd function); those left out are some
+1e-6 of it, or 1e-7."""
 LAG_STEPS, SOLVED = 50, 1e-9
-"""Most steps of Newton's method for it, and the largest residual, divided by the flow's acceleration."""
+"""Most steps of Newton's method for it, and the largest residual, divided by the flow's
+acceleration."""
 ROUNDS, DEPTH, SETTLED, PERIODIC_RTOL = 100, 2, 1e-6, 1e-6
-"""Of `mean_error`: most periods simulated, depth of Anderson's extrapolation, tolerance of the change in a period
-relative to the flow, and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
+"""Of `mean_error`: most periods simulated, depth of Anderson's extrapolation, tolerance of the
+change in a period relative to the flow, and the integrator's rtol. The mean is then known to some
+1e-6 of the flow."""
 
 
-def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
-    """omega_c and omega_0 in rad s-1 of RR in a periodic pulsation, at phases of the flow in rad, same shape."""
-    return _swing(p, amplitude, lag_harmonics(p, amplitude, frequency), np.asarray(phase, dtype=float))
+def swing(
+    p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike
+) -> tuple[Array, Array]:
+    """omega_c and omega_0 in rad s-1 of RR in a periodic pulsation, at phases of the flow in rad,
+    same shape."""
+    return _swing(
+        p, amplitude, lag_harmonics(p, amplitude, frequency), np.asarray(phase, dtype=float)
+    )
 
 
-def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], phase: Array) -> tuple[Array, Array]:
+def _swing(
+    p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], phase: Array
+) -> tuple[Array, Array]:
     """As `swing`, from the harmonics of the lag."""
     omega_0 = p.omega_0 + amplitude * np.sin(phase)
     waves = np.exp(1j * phase[..., None] * np.arange(1, 2 * len(lag), 2))
@@ -48,18 +60,20 @@ def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], pha
 
 
 def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex:
-    """First harmonic of omega_c in `swing` divided by that of omega_0; with Stokes' law that is `response.transfer`."""
+    """First harmonic of omega_c in `swing` divided by that of omega_0; with Stokes' law that is
+    `response.transfer`."""
     return complex(1 + 1j * lag_harmonics(p, amplitude, frequency, FINE)[0] / amplitude)
 
 
 def lag_harmonics(
     p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS
 ) -> npt.NDArray[np.complex128]:
-    """Complex amplitudes of the first odd harmonics of the lag D = omega_c - omega_0 in a periodic RR (23), rad s-1.
+    """Complex amplitudes of the first odd harmonics of the lag D = omega_c - omega_0 in a periodic
+    RR (23), rad s-1.
 
-    D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With Stokes' law there is
-    one, and the first step of Newton's method has nothing left to do. Raises ArithmeticError if it doesn't converge.
-    """
+    D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With
+    Stokes' law there is one, and the first step of Newton's method has nothing left to do. Raises
+    ArithmeticError if it doesn't converge."""
     turn, inertia = 2 * math.pi * frequency, 1 + 2 * p.j
     phase, amplitudes, derivative = _collocation(1 if p.drag == STOKES else harmonics)
     push = amplitude * turn * np.cos(phase)
@@ -70,14 +84,22 @@ def lag_harmonics(
         left = turn * (derivative @ lag) + drag.coefficient(speed, p) * lag / inertia + push
         if np.abs(left).max() <= SOLVED * amplitude * turn:
             return np.asarray(amplitudes @ lag, dtype=np.complex128)
-        lag = lag - np.linalg.solve(turn * derivative + np.diag(drag.slope(speed, p) / inertia), left)
-    raise ArithmeticError(f"no periodic lag in a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz")
+        lag = lag - np.linalg.solve(
+            turn * derivative + np.diag(drag.slope(speed, p) / inertia), left
+        )
+    raise ArithmeticError(
+        f"no periodic lag in a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz"
+    )
 
 
 @functools.cache
 def _collocation(harmonics: int) -> tuple[Array, npt.NDArray[np.complex128], Array]:
-    """Phases of half a period, and matrices from values there to complex amplitudes and to derivatives by the phase."""
-    odd, phase = np.arange(1, 2 * harmonics, 2), np.linspace(0.0, math.pi, 2 * harmonics, endpoint=False)
+    """Phases of half a period, and matrices from values there to complex amplitudes and to
+    derivatives by the phase."""
+    odd, phase = (
+        np.arange(1, 2 * harmonics, 2),
+        np.linspace(0.0, math.pi, 2 * harmonics, endpoint=False),
+    )
     waves = np.exp(1j * phase[:, None] * odd)
     amplitudes = waves.conj().T / harmonics
     return phase, amplitudes, np.real(waves * (1j * odd) @ amplitudes)
@@ -88,10 +110,11 @@ _MARGINS = {"slip-stability": rolling_forces.slip_margin, "infeasible": rolling_
 
 
 def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stability") -> float:
-    """The least amplitude in rad s-1 at which slip begins at some phase of the pulsation, frequency > 0 in Hz.
+    """The least amplitude in rad s-1 at which slip begins at some phase of the pulsation, frequency
+    > 0 in Hz.
 
-    By the margin of `Settings.leave_rolling` along `swing`; on rough floors and at high frequencies "infeasible" gives
-    a larger amplitude. 0 where the mean flow alone ends RR, inf without drag.
+    By the margin of `Settings.leave_rolling` along `swing`; on rough floors and at high frequencies
+    "infeasible" gives a larger amplitude. 0 where the mean flow alone ends RR, inf without drag.
     """
     margin = _MARGINS[leave_rolling]
     if p.c == 0:
@@ -115,25 +138,35 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
 
 
 def slow_onset(p: Parameters) -> float:
-    """Low-frequency limit of `slip_onset`: the flow rises to omega_01 or omega_03, or falls to rest (67)."""
+    """Low-frequency limit of `slip_onset`: the flow rises to omega_01 or omega_03, or falls to rest
+    (67)."""
     t = bifurcation.thresholds(p)
-    return max(0.0, min((t.omega_01 if p.eta < p.j else t.omega_03) - abs(p.omega_0), abs(p.omega_0)))
+    return max(
+        0.0, min((t.omega_01 if p.eta < p.j else t.omega_03) - abs(p.omega_0), abs(p.omega_0))
+    )
 
 
 def fast_onset(p: Parameters) -> float:
-    """The limit of `slip_onset` for high frequencies, at which omega_c stands still and the lag is that of the flow.
+    """The limit of `slip_onset` for high frequencies, at which omega_c stands still and the lag is
+    that of the flow.
 
-    The least of (66), of (73) if the wall can turn the spin at that lag, and of the lag at which both cones are full.
-    """
+    The least of (66), of (73) if the wall can turn the spin at that lag, and of the lag at which
+    both cones are full."""
     u, unit = p.R / p.g * p.omega_0**2, p.j / ((1 + 2 * p.j) * p.g)
     k, ju = (1 + p.j) * u, p.j * u
     wall, floor = (
-        abs(bound(p, p.omega_0, 1).zero - p.omega_0) for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr)
+        abs(bound(p, p.omega_0, 1).zero - p.omega_0)
+        for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr)
     )
     push = drag.coefficient(p.R * floor, p) * p.R * floor
     lags = [wall] if math.hypot(ju, unit * push) > p.eta * u else [wall, floor]
-    # B_y = s m g with s^2 + z^2 = eta^2 (k - s)^2 and (ju - s)^2 + z^2 = mu^2 (1 - s)^2; z^2 drops out.
-    both = [p.eta**2 - p.mu**2, 2 * (p.mu**2 - p.eta**2 * k - ju), (p.eta * k) ** 2 - p.mu**2 + ju**2]
+    # B_y = s m g with s^2 + z^2 = eta^2 (k - s)^2 and (ju - s)^2 + z^2 = mu^2 (1 - s)^2; z^2 drops
+    # out.
+    both = [
+        p.eta**2 - p.mu**2,
+        2 * (p.mu**2 - p.eta**2 * k - ju),
+        (p.eta * k) ** 2 - p.mu**2 + ju**2,
+    ]
     for s in np.roots(both):
         if np.isreal(s) and 0 <= s.real <= min(ju, p.eta * k / (1 + p.eta)):
             push = math.sqrt((p.eta * (k - s.real)) ** 2 - s.real**2) / unit
@@ -148,12 +181,13 @@ def mean_error(
     settled: float = SETTLED,
     leave_rolling: str = "slip-stability",
 ) -> float:
-    """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
+    """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic;
+    frequency in Hz.
 
-    0 if the ball rolls on; else from the gain of azimuth in the event-driven simulation. Each period starts from an
-    extrapolation of the last few (Anderson's method), until the motion repeats itself to `settled` times the flow.
-    `leave_rolling` as in `Settings`. Raises `SimulationError` if it never does.
-    """
+    0 if the ball rolls on; else from the gain of azimuth in the event-driven simulation. Each
+    period starts from an extrapolation of the last few (Anderson's method), until the motion
+    repeats itself to `settled` times the flow. `leave_rolling` as in `Settings`. Raises
+    `SimulationError` if it never does."""
     settings = Settings(rtol=PERIODIC_RTOL, leave_rolling=leave_rolling)
     flow = Flow.sine(p.omega_0, amplitude, frequency)
     x = State(omega_c=swing(p, amplitude, frequency, 0.0)[0]).stacked()
@@ -162,10 +196,17 @@ def mean_error(
         run = simulate(p, x, 1 / frequency, flow, settings, sample_interval=1 / frequency)
         if not len(starts) and not len(run.events.time) and run.case[0] == Case.RR:
             return 0.0
-        starts, ends = np.vstack([starts[-DEPTH:], x[TURNING]]), np.vstack([ends[-DEPTH:], run.x[-1, TURNING]])
+        starts, ends = (
+            np.vstack([starts[-DEPTH:], x[TURNING]]),
+            np.vstack([ends[-DEPTH:], run.x[-1, TURNING]]),
+        )
         change = ends - starts
         if np.abs(change[-1]).max() <= settled * abs(p.omega_0):
             return float(run.theta[-1]) * frequency - p.omega_0
         x = run.x[-1].copy()
-        x[TURNING] -= np.diff(ends, axis=0).T @ np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
-    raise SimulationError(f"a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz doesn't become periodic", run)
+        x[TURNING] -= (
+            np.diff(ends, axis=0).T @ np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
+        )
+    raise SimulationError(
+        f"a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz doesn't become periodic", run
+    )

@@ -1,9 +1,9 @@
-"""How the reading follows a flow that changes: linear response of the stationary motions, and ramps past the fold.
+"""How the reading follows a flow that changes: linear response of the stationary motions, and ramps
+past the fold.
 
-About a stationary motion x' = J x + b (omega_0 - p.omega_0), with J of `dynamics.jacobian` and b the derivative of the
-vector field by omega_0. In RR this is (23) itself, exact for any amplitude: a first-order lag of rate c/(1+2j).
-docs/theory.md derives all of it. Frequencies are in Hz.
-"""
+About a stationary motion x' = J x + b (omega_0 - p.omega_0), with J of `dynamics.jacobian` and b
+the derivative of the vector field by omega_0. In RR this is (23) itself, exact for any amplitude: a
+first-order lag of rate c/(1+2j). docs/theory.md derives all of it. Frequencies are in Hz."""
 
 from __future__ import annotations
 
@@ -27,25 +27,31 @@ _BRANCH_STEP = 1e-3
 
 
 def rolling_rate(p: Parameters) -> float:
-    """Rate c/(1+2j) in s-1 at which omega_c follows omega_0 in RR (23); `InputError` for another law than Stokes'."""
+    """Rate c/(1+2j) in s-1 at which omega_c follows omega_0 in RR (23); `InputError` for another
+    law than Stokes'."""
     if p.drag != STOKES:
-        raise InputError(f"drag = {p.drag!r}: omega_c follows the flow at one rate with Stokes' drag only")
+        raise InputError(
+            f"drag = {p.drag!r}: omega_c follows the flow at one rate with Stokes' drag only"
+        )
     return p.c / (1 + 2 * p.j)
 
 
 def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-    """omega_c divided by omega_0, complex, in small pulsations about p.omega_0 at frequencies in Hz, same shape.
+    """omega_c divided by omega_0, complex, in small pulsations about p.omega_0 at frequencies in
+    Hz, same shape.
 
-    About the stable motion of the case; its modulus is the gain, its argument the phase lead (negative: a lag).
-    Raises `InputError` if there is no such motion.
-    """
+    About the stable motion of the case; its modulus is the gain, its argument the phase lead
+    (negative: a lag). Raises `InputError` if there is no such motion."""
     J, b, own = _linearised(p, case)
     s = 2j * np.pi * np.asarray(frequency)[..., None, None]
-    return np.asarray(np.linalg.solve(s * np.eye(len(b)) - J, b[:, None])[..., own, 0], dtype=np.complex128)
+    return np.asarray(
+        np.linalg.solve(s * np.eye(len(b)) - J, b[:, None])[..., own, 0], dtype=np.complex128
+    )
 
 
 def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
-    """Change of omega_c at times t >= 0 in s after a small jump of the flow, divided by the jump; same shape.
+    """Change of omega_c at times t >= 0 in s after a small jump of the flow, divided by the jump;
+    same shape.
 
     About the stable motion of the case at p.omega_0, as in `transfer`.
     """
@@ -56,36 +62,44 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
-    """Time in s and height of the top of the `step_response`, relative to its end; inf, 1 without overshoot."""
+    """Time in s and height of the top of the `step_response`, relative to its end; inf, 1 without
+    overshoot."""
     slowest = 1 / np.abs(np.linalg.eigvals(_linearised(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
     y = step_response(p, case, t) / (end := np.real(transfer(p, case, 0.0)))
     if (k := int(y.argmax())) == 0 or y[k] <= 1:
         return np.inf, 1.0
     beside = t[k - 1], t[min(k + 1, len(t) - 1)]
-    top = minimize_scalar(lambda at: -float(step_response(p, case, at) / end), bounds=beside, options={"xatol": 1e-9})
+    top = minimize_scalar(
+        lambda at: -float(step_response(p, case, at) / end), bounds=beside, options={"xatol": 1e-9}
+    )
     return float(top.x), -float(top.fun)
 
 
 def ramp_coefficient(p: Parameters) -> float:
-    """K of the overshoot K rate^(2/3) with which a slow ramp passes the fold, rad s-1 for a rate of 1 rad s-2.
+    """K of the overshoot K rate^(2/3) with which a slow ramp passes the fold, rad s-1 for a rate of
+    1 rad s-2.
 
-    At the fold the slow coordinate obeys q' = a (omega_0 - omega_04) + b q^2, whose eigenvalue on the branch is
-    2 b q = -2 sqrt(-a b (omega_0 - omega_04)). On a ramp q is a ratio of Airy functions, and runs off at the zero of
-    Ai: K = 2.338 (a b)^(-1/3). Raises `InputError` if there is no fold.
-    """
+    At the fold the slow coordinate obeys q' = a (omega_0 - omega_04) + b q^2, whose eigenvalue on
+    the branch is 2 b q = -2 sqrt(-a b (omega_0 - omega_04)). On a ramp q is a ratio of Airy
+    functions, and runs off at the zero of Ai: K = 2.338 (a b)^(-1/3). Raises `InputError` if there
+    is no fold."""
     s = float(slipping_branch.fold(p))
     if np.isnan(s):
         raise InputError(f"there is no fold at eta = {p.eta:g}: the branch of SS doesn't turn back")
     places = s + _BRANCH_STEP * np.array([-1.0, 0.0, 1.0])
     flows, values = slipping_branch.states(places, p)[1], slipping_branch.eigenvalues_at(places, p)
     slow = np.take_along_axis(values, np.abs(values).argmin(axis=-1)[:, None], axis=-1)[:, 0].real
-    slope, curvature = (slow[2] - slow[0]) / (2 * _BRANCH_STEP), (flows[0] - 2 * flows[1] + flows[2]) / _BRANCH_STEP**2
+    slope, curvature = (
+        (slow[2] - slow[0]) / (2 * _BRANCH_STEP),
+        (flows[0] - 2 * flows[1] + flows[2]) / _BRANCH_STEP**2,
+    )
     return float(AIRY_ZERO * (-(slope**2) / (2 * curvature)) ** (-1 / 3))
 
 
 def _linearised(p: Parameters, case: Case) -> tuple[Array, Array, int]:
-    """J (d, d), b (d,) of x' = J x + b (omega_0 - mean) about the stable motion of a case, and the row of omega_c."""
+    """J (d, d), b (d,) of x' = J x + b (omega_0 - mean) about the stable motion of a case, and the
+    row of omega_c."""
     x = stationary.solution(p, case).x
     active = TRAITS[case].active
     rates = dynamics.rates(case, State(*x), p, p.omega_0 + 1j * dynamics.STEP)

@@ -1,35 +1,40 @@
 """Coulomb's law at floor and wall at once: the contact problem of one instant.
 
-The unknowns are the impulses P of floor and wall and the velocities after them, or as well forces and accelerations. A
-closed contact obeys
+The unknowns are the impulses P of floor and wall and the velocities after them, or as well forces
+and accelerations. A closed contact obeys
 
     0 <= P_n  perpendicular to  v_n - target >= 0,   P_t in the disk of radius friction * P_n,
     P_t = -friction * P_n * v_t/|v_t| where v_t is not zero.
 
-No case is named: which contact sticks, slips or opens is part of the answer. At one contact of a sphere normal and
-tangential impulses do not influence each other, so that a contact alone is solved exactly, by a projection. Of two, the
-impulse (n, s, t) of one per mass changes what the other one needs by C (n, s, t) = (s, j k n - k s, j k t) with
-k = 1/(1+j), the same both ways, and Coulomb's law is
+No case is named: which contact sticks, slips or opens is part of the answer. At one contact of a
+sphere normal and tangential impulses do not influence each other, so that a contact alone is solved
+exactly, by a projection. Of two, the impulse (n, s, t) of one per mass changes what the other one
+needs by C (n, s, t) = (s, j k n - k s, j k t) with k = 1/(1+j), the same both ways, and Coulomb's
+law is
 
     A = project(a - C B, mu),  B = project(b - C A, eta),
 
-where a and b are what A and B need to meet their targets and to rest if the other one gives nothing.
+where a and b are what A and B need to meet their targets and to rest if the other one gives
+nothing.
 
-A sweep computes A from B and B from that (projected Gauss-Seidel); what is sought is an impulse at B that a sweep f
-reproduces. Newton's method on the change of a sweep settles most problems in one or two steps. While the ball rolls at
-both points B is undetermined along one direction, and a little damping keeps it from drifting there. Where a contact
-begins to stick, slide or open, Newton's method may end in another solution than sweeps do: then, and where sweeps may
-lead away from a solution (mu eta > 1), plain sweeps are taken. If these are slow or oscillate, B = f(B) is taken
-for the equilibrium of dB/dt = f(B) - B (pseudo-transient continuation, Kelley & Keyes, SIAM J. Numer. Anal. 35 (1998)
-508). Its linearly implicit Euler steps, (1/span + 1 - f') dB = f(B) - B, are damped sweeps for small spans and those of
-the generalised Newton method for large ones: a success lengthens the span, a setback shortens it and reduces its growth
-from then on. Where that fails, it starts again from zero and from damped sweeps.
+A sweep computes A from B and B from that (projected Gauss-Seidel); what is sought is an impulse at
+B that a sweep f reproduces. Newton's method on the change of a sweep settles most problems in one
+or two steps. While the ball rolls at both points B is undetermined along one direction, and a
+little damping keeps it from drifting there. Where a contact begins to stick, slide or open,
+Newton's method may end in another solution than sweeps do: then, and where sweeps may lead away
+from a solution (mu eta > 1), plain sweeps are taken. If these are slow or oscillate, B = f(B) is
+taken for the equilibrium of dB/dt = f(B) - B (pseudo-transient continuation, Kelley & Keyes, SIAM
+J. Numer. Anal. 35 (1998) 508). Its linearly implicit Euler steps, (1/span + 1 - f') dB = f(B) - B,
+are damped sweeps for small spans and those of the generalised Newton method for large ones: a
+success lengthens the span, a setback shortens it and reduces its growth from then on. Where that
+fails, it starts again from zero and from damped sweeps.
 
-A solution exists where mu < 1 or eta < 1 (Acary, Cadoux, Lemarechal & Malick, ZAMM 91 (2011) 155: the ball can move so
-that v_n - target > friction * |v_t| at both contacts). Where both are greater, floor and wall can lock the ball in the
-corner, so that no impulses meet a target > 0, but some a target of 0. Where mu > 1, sticking and slipping may both
-obey the law. The solution found is then the one near the first guess: with the impulses of the last step the ball goes
-on rolling until no impulses near the present ones hold it.
+A solution exists where mu < 1 or eta < 1 (Acary, Cadoux, Lemarechal & Malick, ZAMM 91 (2011) 155:
+the ball can move so that v_n - target > friction * |v_t| at both contacts). Where both are greater,
+floor and wall can lock the ball in the corner, so that no impulses meet a target > 0, but some a
+target of 0. Where mu > 1, sticking and slipping may both obey the law. The solution found is then
+the one near the first guess: with the impulses of the last step the ball goes on rolling until no
+impulses near the present ones hold it.
 
 All on plain floats, and compiled where numba is installed.
 """
@@ -47,17 +52,20 @@ EAGER, WHOLE = 5, 1e4
 PLAIN_SWEEPS = 6
 """Sweeps before the continuation takes over."""
 ATTEMPT = 100
-"""Sweeps after which the continuation starts again: from zero the first time, then from where it is."""
+"""Sweeps after which the continuation starts again: from zero the first time, then from where it
+is."""
 DAMPED = 0.5
 """Share of a sweep that is taken in all attempts but the first, before the continuation."""
 WARY, BOLD = 1.0, 1.3
-"""Factor by which the change may rise from one sweep to the next before it counts as a setback, in even and in odd
-attempts: the first suits sweeps that oscillate, the second impulses that build up in the corner until one of them
-reaches the limit of friction."""
+"""Factor by which the change may rise from one sweep to the next before it counts as a setback, in
+even and in odd attempts: the first suits sweeps that oscillate, the second impulses that build up
+in the corner until one of them reaches the limit of friction."""
 SPAN, GROWTH, LONGEST_SPAN = 1.0, 8.0, 1e8
-"""First step of the continuation, in sweeps; factor by which steps grow; and the longest, which is one of Newton's."""
+"""First step of the continuation, in sweeps; factor by which steps grow; and the longest, which is
+one of Newton's."""
 SHORTER, CALMER, LEAST_GROWTH = 20.0, 0.7, 1.1
-"""A setback divides the length by the first and raises the growth to the power of the second, down to the third."""
+"""A setback divides the length by the first and raises the growth to the power of the second, down
+to the third."""
 MAX_SWEEPS = 1000
 EXACT = 4e-15
 """Tolerance for impulses as exact as they can be."""
@@ -69,7 +77,8 @@ class Closed(NamedTuple):
     target: float = 0.0
     """Least normal velocity (or acceleration) afterwards."""
     s: float = 0.0
-    """Unit vector along which the contact slips (x, z at A; y, z at B) if that is known beforehand."""
+    """Unit vector along which the contact slips (x, z at A; y, z at B) if that is known
+    beforehand."""
     t: float = 0.0
     closed: bool = True
     """False for one that is open, and takes no part."""
@@ -79,7 +88,8 @@ RESTS, ABSENT = Closed(), Closed(closed=False)
 
 
 class Friction(NamedTuple):
-    """Friction of one contact; its direction of slip is that of (s, t) if that isn't (0, 0), else to be found."""
+    """Friction of one contact; its direction of slip is that of (s, t) if that isn't (0, 0), else
+    to be found."""
 
     coefficient: float
     s: float
@@ -104,15 +114,17 @@ class NotConvergedError(ArithmeticError):
 def solve(
     free: Velocities, A: Closed, B: Closed, p: Any, start: Forces, tolerance: float
 ) -> tuple[Velocities, Forces, bool]:
-    """Velocities and impulses that obey Coulomb's law at both contacts, and whether the sweeps settled.
+    """Velocities and impulses that obey Coulomb's law at both contacts, and whether the sweeps
+    settled.
 
     Parameters
     ----------
     free : velocities (m s-1 and rad s-1) that the ball would have without any impulse
     p : anything with the names of `model.Parameters`
     start : first guess of the impulses in N s; only those of B matter
-    tolerance : the largest change in a sweep at which to stop, relative to the velocities of the problem, those that
-        the impulses cause among them; a sweep rounds a dozen times, so that less than `EXACT` may never be reached
+    tolerance : the largest change in a sweep at which to stop, relative to the velocities of the
+        problem, those that the impulses cause among them; a sweep rounds a dozen times, so that
+        less than `EXACT` may never be reached
     """
     share = p.j / (1 + p.j)  # of the mass, that a tangential impulse feels at the contact point
     v_h, v_y, v_k, o_x, o_y, o_z = free
@@ -136,7 +148,8 @@ def solve(
 
 
 def project(need: Impulse, friction: Friction) -> Impulse:
-    """The impulse nearest to the needed one that Coulomb's law allows: friction in its disk, or against known slip."""
+    """The impulse nearest to the needed one that Coulomb's law allows: friction in its disk, or
+    against known slip."""
     n, s, t = need
     if n <= 0:
         return Impulse(0.0, 0.0, 0.0)
@@ -150,13 +163,18 @@ def project(need: Impulse, friction: Friction) -> Impulse:
 
 
 def _share_met(need: Impulse, friction: Friction) -> Impulse:
-    """Share of the needed friction that `project` grants: 1 sticking, 0 open, else less, with its direction (s, t)."""
+    """Share of the needed friction that `project` grants: 1 sticking, 0 open, else less, with its
+    direction (s, t)."""
     if need.n <= 0:
         return Impulse(0.0, 0.0, 0.0)
     if friction.s != 0 or friction.t != 0:
         return Impulse(0.0, -friction.s, -friction.t)
     size, limit = math.sqrt(need.s * need.s + need.t * need.t), friction.coefficient * need.n
-    return Impulse(limit / size, need.s / size, need.t / size) if size > limit else Impulse(1.0, 0.0, 0.0)
+    return (
+        Impulse(limit / size, need.s / size, need.t / size)
+        if size > limit
+        else Impulse(1.0, 0.0, 0.0)
+    )
 
 
 def _project_rate(held: Impulse, friction: Friction, by: Impulse) -> Impulse:
@@ -173,8 +191,11 @@ def _need(a: Impulse, other: Impulse, k: float) -> Impulse:
     return Impulse(a.n - other.s, a.s - (1 - k) * other.n + k * other.s, a.t - (1 - k) * other.t)
 
 
-def _sweep_rate(at_A: Impulse, at_B: Impulse, by: Impulse, A: Friction, B: Friction, k: float) -> Impulse:
-    """How the impulse at B after a sweep changes if that before it changes in the direction `by`."""
+def _sweep_rate(
+    at_A: Impulse, at_B: Impulse, by: Impulse, A: Friction, B: Friction, k: float
+) -> Impulse:
+    """How the impulse at B after a sweep changes if that before it changes in the direction
+    `by`."""
     still = Impulse(0.0, 0.0, 0.0)
     return _project_rate(at_B, B, _need(still, _project_rate(at_A, A, _need(still, by, k)), k))
 
@@ -190,20 +211,28 @@ def _dot(a: Impulse, b: Impulse) -> float:
 def _implicit_step(
     need_A: Impulse, need_B: Impulse, step: Impulse, span: float, A: Friction, B: Friction, k: float
 ) -> Impulse:
-    """An implicit Euler step of length `span` of dB/dt = f(B) - B, where a sweep f takes B on by `step`."""
+    """An implicit Euler step of length `span` of dB/dt = f(B) - B, where a sweep f takes B on by
+    `step`."""
     at_A, at_B = _share_met(need_A, A), _share_met(need_B, B)
     x = _sweep_rate(at_A, at_B, Impulse(1.0, 0.0, 0.0), A, B, k)
     y = _sweep_rate(at_A, at_B, Impulse(0.0, 1.0, 0.0), A, B, k)
     z = _sweep_rate(at_A, at_B, Impulse(0.0, 0.0, 1.0), A, B, k)
     d = 1 + 1 / span
-    x, y, z = Impulse(d - x.n, -x.s, -x.t), Impulse(-y.n, d - y.s, -y.t), Impulse(-z.n, -z.s, d - z.t)
+    x, y, z = (
+        Impulse(d - x.n, -x.s, -x.t),
+        Impulse(-y.n, d - y.s, -y.t),
+        Impulse(-z.n, -z.s, d - z.t),
+    )
     yz = _cross(y, z)
     size = _dot(x, yz)
-    return Impulse(_dot(step, yz) / size, _dot(x, _cross(step, z)) / size, _dot(x, _cross(y, step)) / size)
+    return Impulse(
+        _dot(step, yz) / size, _dot(x, _cross(step, z)) / size, _dot(x, _cross(y, step)) / size
+    )
 
 
 def _contact_state(need: Impulse, given: Impulse) -> int:
-    """State of a contact from the impulse it needs and the one it gets: 0 open, 1 sticking, 2 sliding."""
+    """State of a contact from the impulse it needs and the one it gets: 0 open, 1 sticking, 2
+    sliding."""
     if given.n == 0:
         return 0
     return 1 if given.s == need.s and given.t == need.t else 2
@@ -212,11 +241,11 @@ def _contact_state(need: Impulse, given: Impulse) -> int:
 def solve_pair(
     a: Impulse, b: Impulse, start: Impulse, A: Friction, B: Friction, j: float, enough: float
 ) -> tuple[Impulse, Impulse, float]:
-    """Impulses of two closed contacts that obey Coulomb's law, from a guess of that at B; how much they still changed.
+    """Impulses of two closed contacts that obey Coulomb's law, from a guess of that at B; how much
+    they still changed.
 
-    That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough. Sweeps with Newton's method count from
-    -`EAGER` up to 0, those after it from 0 on.
-    """
+    That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough. Sweeps with Newton's
+    method count from -`EAGER` up to 0, those after it from 0 on."""
     k, rough, zero, before = 1 / (1 + j), A.coefficient * B.coefficient, Impulse(0.0, 0.0, 0.0), -1
     at_A, at_B, count = start, start, -EAGER if rough < 1 else 0
     change, last, span, growth = math.inf, math.inf, SPAN, GROWTH
@@ -246,7 +275,10 @@ def solve_pair(
             if change <= last * (BOLD if attempt % 2 else WARY):
                 span = min(span * growth, LONGEST_SPAN)
             else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
-                span, growth = max(span / SHORTER, 1 / (10 + rough)), max(growth**CALMER, LEAST_GROWTH)
+                span, growth = (
+                    max(span / SHORTER, 1 / (10 + rough)),
+                    max(growth**CALMER, LEAST_GROWTH),
+                )
             step, pace = _implicit_step(need_A, need_B, step, span, A, B, k), 1.0
         last = change
         at_B = Impulse(at_B.n + pace * step.n, at_B.s + pace * step.s, at_B.t + pace * step.t)

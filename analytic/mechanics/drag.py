@@ -1,11 +1,12 @@
-"""The drag -m c(|w|) w of each law of `model.drag`, |w| the speed relative to the fluid, and fall under it alone.
+"""The drag -m c(|w|) w of each law of `model.drag`, |w| the speed relative to the fluid, and fall
+under it alone.
 
-With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|): Stokes' has the first
-term alone, the quadratic one the last. So c never decreases with |w|, and a drag force determines the speed.
+With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|):
+Stokes' has the first term alone, the quadratic one the last. So c never decreases with |w|, and a
+drag force determines the speed.
 
-The laws take floats or arrays, and complex ones for derivatives by complex steps. `simulation` compiles `rate` and
-the fall.
-"""
+The laws take floats or arrays, and complex ones for derivatives by complex steps. `simulation`
+compiles `rate` and the fall."""
 
 from __future__ import annotations
 
@@ -20,9 +21,11 @@ from model.arrays import Array, Real
 from model.drag import QUADRATIC, REYNOLDS, SCHILLER_NAUMANN, STOKES
 
 EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
-"""Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
+"""Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds
+numbers."""
 SPEED_STEPS = 8
-"""Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner of `Law`."""
+"""Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner
+of `Law`."""
 FALL_STEPS = 100
 """Most steps of it to the end of a fall, far more than it takes."""
 
@@ -36,7 +39,8 @@ class Law(NamedTuple):
 
 
 def law(p: Parameters) -> Law:
-    """The law of a parameter set. Raises KeyError for a law of `model.drag` that has no formula here."""
+    """The law of a parameter set. Raises KeyError for a law of `model.drag` that has no formula
+    here."""
     per_speed = 2 * p.r / (p.nu_f or math.inf)
     laws = {
         STOKES: Law(p.c, 0.0, 0.0),
@@ -53,41 +57,51 @@ def rate(speed: Real, law: Law) -> Real:
 
 
 def coefficient(speed: Real, p: Parameters) -> Real:
-    """c(|w|) at a speed |w| >= 0 (m s-1) relative to the fluid, s-1: the drag on the ball is -m c(|w|) w, N."""
+    """c(|w|) at a speed |w| >= 0 (m s-1) relative to the fluid, s-1: the drag on the ball is -m
+    c(|w|) w, N."""
     return p.c if p.drag == STOKES else rate(speed, law(p))
 
 
 def of_velocity(w_h: Real, w_y: Real, w_k: Real, p: Parameters) -> Real:
-    """c(|w|) of a velocity relative to the fluid, inward, upward and along the orbit, rho (omega_c - omega_0); s-1."""
+    """c(|w|) of a velocity relative to the fluid, inward, upward and along the orbit, rho (omega_c
+    - omega_0); s-1."""
     return p.c if p.drag == STOKES else rate(speed(w_h, w_y, w_k), law(p))
 
 
 def speed(w_h: Real, w_y: Real, w_k: Real) -> Real:
-    """The speed |w| of a velocity relative to the fluid, its components as in `of_velocity`, m s-1."""
+    """The speed |w| of a velocity relative to the fluid, its components as in `of_velocity`, m
+    s-1."""
     square = w_h * w_h + w_y * w_y + w_k * w_k
     return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
 
 
 def slope(speed: Real, p: Parameters) -> Real:
-    """d(c(|w|) |w|)/d|w|, s-1: how the drag per mass answers a change along w; across w it is `coefficient`."""
+    """d(c(|w|) |w|)/d|w|, s-1: how the drag per mass answers a change along w; across w it is
+    `coefficient`."""
     if p.drag == STOKES:
         return p.c
     linear, wake, blunt = law(p)
     slow, fast = wake * speed**EXPONENT, blunt * speed
-    return (linear + (1 + EXPONENT) * slow) * (linear + slow >= fast) + 2 * fast * (linear + slow < fast)
+    return (linear + (1 + EXPONENT) * slow) * (linear + slow >= fast) + 2 * fast * (
+        linear + slow < fast
+    )
 
 
 def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
-    """The speed |w| (m s-1) at which the drag per mass c(|w|) |w| is a given one >= 0 (m s-2); inf where c = 0."""
+    """The speed |w| (m s-1) at which the drag per mass c(|w|) |w| is a given one >= 0 (m s-2); inf
+    where c = 0."""
     given, terms, powers = np.asarray(acceleration, dtype=float), law(p), (1.0, 1.0 + EXPONENT, 2.0)
-    alone = [(given / term) ** (1 / power) for term, power in zip(terms, powers, strict=True) if term > 0]
+    alone = [
+        (given / term) ** (1 / power) for term, power in zip(terms, powers, strict=True) if term > 0
+    ]
     if not alone:
         return np.where(given > 0, np.inf, given)
     speed: Array = np.minimum.reduce(alone)
     if len(alone) == 1:
         return speed
-    # One term alone makes the drag of this speed too great, but that of half of it is too small. The drag is convex, so
-    # that Newton's method comes down to the root from there, with twice as many digits each time.
+    # One term alone makes the drag of this speed too great, but that of half of it is too small.
+    # The drag is convex, so that Newton's method comes down to the root from there, with twice as
+    # many digits each time.
     for _ in range(SPEED_STEPS):
         speed = speed - (rate(speed, terms) * speed - given) / slope(speed, p)
     return speed
@@ -99,20 +113,24 @@ def reynolds(speed: Real, p: Parameters) -> Real:
 
 
 def reynolds_of(x: State, p: Parameters) -> float:
-    """Reynolds number of a ball in a state x in the flow p.omega_0; nan if the viscosity isn't known."""
+    """Reynolds number of a ball in a state x in the flow p.omega_0; nan if the viscosity isn't
+    known."""
     return float(reynolds(speed(x.v_h, x.v_y, (p.R - x.h) * (x.omega_c - p.omega_0)), p))
 
 
 def covers(Re: float, law: str) -> bool:
-    """Whether a Reynolds number is within the range of a law; 0, at which there is no drag, always is."""
+    """Whether a Reynolds number is within the range of a law; 0, at which there is no drag, always
+    is."""
     low, high = REYNOLDS[law]
     return Re == 0 or low <= Re <= high
 
 
 def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity: float) -> float:
-    """Terminal speed v in m/s of a sphere in a fluid at rest: weight less buoyancy is 6 pi rho_f nu_f r v.
+    """Terminal speed v in m/s of a sphere in a fluid at rest: weight less buoyancy is 6 pi rho_f
+    nu_f r v.
 
-    nu_f : kinematic viscosity of the fluid, m2 s-1; rho_f, rho_b : densities of fluid and sphere, kg m-3;
+    nu_f : kinematic viscosity of the fluid, m2 s-1; rho_f, rho_b : densities of fluid and sphere,
+    kg m-3;
     r : radius, m; gravity : m s-2, in vacuum
     """
     heavier = 4 / 3 * math.pi * r**3 * (rho_b - rho_f) * gravity
@@ -120,7 +138,8 @@ def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity:
 
 
 def fall(t: Any, y: float, v_y: float, p: Any) -> tuple[Any, Any]:
-    """Height (m) and vertical velocity (m s-1) after a time t (s, float or array) of flight with Stokes' drag.
+    """Height (m) and vertical velocity (m s-1) after a time t (s, float or array) of flight with
+    Stokes' drag.
 
     p : anything with c and g
     """
@@ -129,16 +148,19 @@ def fall(t: Any, y: float, v_y: float, p: Any) -> tuple[Any, Any]:
 
 def fall_speed(t: Any, v_y: float, p: Any) -> Any:
     """The vertical velocity of `fall` alone."""
-    decay = (math.expm1(-p.c * t) if isinstance(t, float) else np.expm1(-p.c * t)) / -p.c if p.c > 0 else t
+    decay = (
+        (math.expm1(-p.c * t) if isinstance(t, float) else np.expm1(-p.c * t)) / -p.c
+        if p.c > 0
+        else t
+    )
     return v_y - (p.c * v_y + p.g) * decay
 
 
 def fall_time(y: float, v_y: float, p: Any) -> float:
     """Time until a flight with Stokes' drag ends on the floor, s; y >= 0, and v_y > 0 if y = 0.
 
-    By Newton's method, which comes from where the path bends to: from below the floor, or from the start of a ball that
-    falls faster than it sinks.
-    """
+    By Newton's method, which comes from where the path bends to: from below the floor, or from the
+    start of a ball that falls faster than it sinks."""
     time: float = (v_y + math.sqrt(v_y**2 + 2 * p.g * y)) / p.g
     bends_down: bool = p.c * v_y + p.g > 0
     if time == 0:
@@ -157,7 +179,8 @@ def fall_time(y: float, v_y: float, p: Any) -> float:
 
 
 def ramp_lag(s: Any) -> Any:
-    """(s - 1 + exp(-s))/s^2, by its series where that cancels: how a ball with linear drag lags behind a ramp."""
+    """(s - 1 + exp(-s))/s^2, by its series where that cancels: how a ball with linear drag lags
+    behind a ramp."""
     series = 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
     if isinstance(s, float):
         return series if abs(s) < 1e-2 else (s + math.expm1(-s)) / s**2

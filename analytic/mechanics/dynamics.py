@@ -1,13 +1,14 @@
-"""Contact forces, vector fields and Jacobians of the nine kinematic cases: (20)-(29), and RN, SN, NN.
+"""Contact forces, vector fields and Jacobians of the nine kinematic cases: (20)-(29), and RN, SN,
+NN.
 
-The forces follow from the state, case by case (`forces`); the rates follow from the forces by Newton and Euler (20),
-the same way in every case (`rates`). Both take floats or arrays and check nothing, since an integrator calls them in
-its innermost loop. `contact_forces` and `vector_field` are the public functions: they take arrays of states and check
-them against the case. Jacobians come from complex steps through the vector fields.
+The forces follow from the state, case by case (`forces`); the rates follow from the forces by
+Newton and Euler (20), the same way in every case (`rates`). Both take floats or arrays and check
+nothing, since an integrator calls them in its innermost loop. `contact_forces` and `vector_field`
+are the public functions: they take arrays of states and check them against the case. Jacobians come
+from complex steps through the vector fields.
 
-Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one rigid body. c is
-c(|w|), see `analytic.mechanics.drag`.
-"""
+Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one
+rigid body. c is c(|w|), see `analytic.mechanics.drag`."""
 
 from __future__ import annotations
 
@@ -26,23 +27,27 @@ from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES
 
 STEP = 1e-100
-"""Complex step: its square vanishes beside any state, so that the derivative is exact to round-off."""
+"""Complex step: its square vanishes beside any state, so that the derivative is exact to
+round-off."""
 Direction = tuple[Real, Real]
 """Sine and cosine of a slip direction (8)."""
 
 
-def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+def vector_field(
+    case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
+) -> Array:
     """Rate of change of states x in a case: (23)-(28), and the same for RN, SN, NN.
 
     Parameters
     ----------
     x : states, shape (..., 6) or (..., 8), see `model.kinematics`
-    omega_0 : angular velocity of the fluid in rad s-1 if it isn't ``p.omega_0``; broadcast against (...)
+    omega_0 : angular velocity of the fluid in rad s-1 if it isn't ``p.omega_0``; broadcast against
+    (...)
 
     Returns
     -------
-    Array
-        dx/dt, shape of x. Whether the contact forces are admissible is not checked, see `contact_forces`.
+    Array dx/dt, shape of x. Whether the contact forces are admissible is not checked, see
+        `contact_forces`.
 
     Raises `InputError` if x isn't a state of the case (`check_state`).
     """
@@ -54,20 +59,23 @@ def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.Array
 def contact_forces(
     case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """Contact forces F_A, F_B on the ball in N, each (..., 3), as the case demands them: (16), (17), (21), (29).
+    """Contact forces F_A, F_B on the ball in N, each (..., 3), as the case demands them: (16),
+    (17), (21), (29).
 
-    A negative normal force, or friction beyond Coulomb's, means that the case can't go on. In RR the forces are a
-    one-parameter family; this is the member of least friction utilisation (`rolling_forces.least_utilisation`).
+    A negative normal force, or friction beyond Coulomb's, means that the case can't go on. In RR
+    the forces are a one-parameter family; this is the member of least friction utilisation
+    (`rolling_forces.least_utilisation`).
 
-    Parameters and errors are those of `vector_field`; also `InputError` for a state of RR that no forces can hold.
-    """
+    Parameters and errors are those of `vector_field`; also `InputError` for a state of RR that no
+    forces can hold."""
     case = Case(case)
     state, fluid = _checked(case, x, p, omega_0)
     if case is Case.RR:
         best = rolling_forces.least_utilisation(state.omega_c, p, fluid)
         if np.any(stuck := (best.utilisation > 1) | np.isnan(best.B_y)):
             value, need = (
-                np.extract(stuck, np.broadcast_to(a, stuck.shape))[0] for a in (state.omega_c, best.utilisation)
+                np.extract(stuck, np.broadcast_to(a, stuck.shape))[0]
+                for a in (state.omega_c, best.utilisation)
             )
             raise InputError(
                 f"omega_c = {value:g} rad s-1 cannot be rolled at both points: "
@@ -79,11 +87,11 @@ def contact_forces(
 
 
 def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
-    """Return states x (..., 6 or 8) as columns; `InputError` if one of them violates the case (Tables 3 and 4).
+    """Return states x (..., 6 or 8) as columns; `InputError` if one of them violates the case
+    (Tables 3 and 4).
 
-    The constraints must hold exactly (v_h + r slip_z to round-off), a slipping contact must slip, and an open
-    contact needs a gap of zero or more, less than R at the wall.
-    """
+    The constraints must hold exactly (v_h + r slip_z to round-off), a slipping contact must slip,
+    and an open contact needs a gap of zero or more, less than R at the wall."""
     state = State.of(x)
     columns = state._asdict()
     for name in TRAITS[case].constraints:
@@ -98,7 +106,9 @@ def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
     if case.B is Contact.N:
         _refuse(state.h < 0, state.h, "h", f"must be >= 0 in case {case.name}")
         _refuse(state.h >= p.R, state.h, "h", f"must be < R = {p.R:g} m")
-    for point, contact, slide in zip("AB", (case.A, case.B), sliding_velocities(state, p), strict=True):
+    for point, contact, slide in zip(
+        "AB", (case.A, case.B), sliding_velocities(state, p), strict=True
+    ):
         if contact is Contact.S:
             speed = np.hypot(*slide)
             _refuse(speed == 0, speed, f"slip speed at {point}", f"must be > 0 in case {case.name}")
@@ -108,17 +118,22 @@ def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
 def rates(case: Case, x: Sequence[Real], p: Parameters, omega_0: Real) -> State:
     """Rates of the eight state variables by (20) under the forces of the case; x is not checked."""
     _, _, omega_c, *_ = x
-    forces_now = rolling_family(omega_c, p, omega_0, 0.0) if case is Case.RR else forces(case, x, p, omega_0)
+    forces_now = (
+        rolling_family(omega_c, p, omega_0, 0.0) if case is Case.RR else forces(case, x, p, omega_0)
+    )
     return newton_euler(case, x, forces_now, p, omega_0)
 
 
-def newton_euler(case: Case, x: Sequence[Real], f: Sequence[Real], p: Parameters, omega_0: Real) -> State:
-    """Rates of the eight state variables under forces f by (20); what the case holds at zero is exactly zero.
+def newton_euler(
+    case: Case, x: Sequence[Real], f: Sequence[Real], p: Parameters, omega_0: Real
+) -> State:
+    """Rates of the eight state variables under forces f by (20); what the case holds at zero is
+    exactly zero.
 
-    For h = 0 this is (21). Off the wall, with rho = R - h and the spin o of the ball in the co-rotating frame:
-    m(v_h' + rho omega_c^2) = A_x + B_x - m c v_h, m(rho omega_c' - 2 v_h omega_c) = A_z + B_z - m c rho D,
-    j m r(o_x' + omega_c o_z) = -A_z, j m r o_y' = B_z, j m r(o_z' - omega_c o_x) = A_x - B_y.
-    """
+    For h = 0 this is (21). Off the wall, with rho = R - h and the spin o of the ball in the
+    co-rotating frame: m(v_h' + rho omega_c^2) = A_x + B_x - m c v_h, m(rho omega_c' - 2 v_h
+    omega_c) = A_z + B_z - m c rho D, j m r(o_x' + omega_c o_z) = -A_z, j m r o_y' = B_z, j m r(o_z'
+    - omega_c o_x) = A_x - B_y."""
     _, v_y, omega_c, w_x, _, w_z, h, v_h = x
     A_x, A_y, A_z, B_x, B_y, B_z = f
     rho, jmr, c = p.R - h, p.j * p.m * p.r, _drag_rate(x, p, omega_0)
@@ -146,10 +161,9 @@ def forces(
 ) -> Forces:
     """The forces in a case; x is eight variables, not checked.
 
-    In RR those of least friction utilisation, or with B_y = 0 where none can hold it. Sine and cosine of the slip
-    directions alpha, beta (8) are taken from x; give `slip_A`, `slip_B` for the limit
-    of vanishing slip in a direction (53).
-    """
+    In RR those of least friction utilisation, or with B_y = 0 where none can hold it. Sine and
+    cosine of the slip directions alpha, beta (8) are taken from x; give `slip_A`, `slip_B` for the
+    limit of vanishing slip in a direction (53)."""
     if case is Case.RR:
         _, _, omega_c, *_ = x
         B_y = rolling_forces.least_utilisation(omega_c, p, omega_0).B_y
@@ -174,7 +188,8 @@ def _drag_rate(x: Sequence[Real], p: Parameters, omega_0: Real) -> Real:
 
 
 def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> Forces:
-    """Forces of RS (24): w_z stays 0 without B_y, so that A_x alone keeps the spin axis turning with the orbit."""
+    """Forces of RS (24): w_z stays 0 without B_y, so that A_x alone keeps the spin axis turning
+    with the orbit."""
     (_, _, omega_c, *_), (sine, _) = x, slip_B
     u = p.m * p.R * omega_c**2
     B_x = (1 + p.j) * u
@@ -193,7 +208,9 @@ def _sr(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> F
     return Forces(0.0, A_y, A_z, p.m * p.R * omega_c**2, B_y, B_z)
 
 
-def _ss(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction, slip_B: Direction) -> Forces:
+def _ss(
+    x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction, slip_B: Direction
+) -> Forces:
     """Forces of SS: (26), (29)."""
     _, _, omega_c, *_ = x
     u, G = p.m * p.R * omega_c**2, p.m * p.g
@@ -220,7 +237,8 @@ def _ns(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> F
 
 
 def _rn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
-    """Forces of a ball that rolls on the floor away from the wall: drag alone drives the friction."""
+    """Forces of a ball that rolls on the floor away from the wall: drag alone drives the
+    friction."""
     _, _, omega_c, _, _, _, h, v_h = x
     share = p.j * p.m * _drag_rate(x, p, omega_0) / (1 + p.j)
     return Forces(share * v_h, p.m * p.g, share * (p.R - h) * (omega_c - omega_0))
@@ -242,16 +260,19 @@ FORCES: dict[Case, Callable[..., Forces]] = {
     Case.SN: _sn,
     Case.NN: lambda x, p, omega_0: Forces(),
 }
-"""The forces of each case but RR, as `forces`, from x, p, omega_0 and the directions of its slips, A before B."""
+"""The forces of each case but RR, as `forces`, from x, p, omega_0 and the directions of its slips,
+A before B."""
 
 _HELD = {
-    case: [VARIABLES.index(name) for name in traits.constraints if name in VARIABLES] for case, traits in TRAITS.items()
+    case: [VARIABLES.index(name) for name in traits.constraints if name in VARIABLES]
+    for case, traits in TRAITS.items()
 }
 """Indices of the variables that a case holds at zero."""
 
 
 def sliding_velocities(x: Sequence[Real], p: Parameters) -> tuple[Direction, Direction]:
-    """Sliding speeds in m s-1 at A and B along the directions of sine and cosine of alpha and beta: (6), (8)."""
+    """Sliding speeds in m s-1 at A and B along the directions of sine and cosine of alpha and beta:
+    (6), (8)."""
     _, v_y, _, w_x, w_y, w_z, _, v_h = x
     return (p.r * w_x, v_h + v_y + p.r * w_z), (p.r * w_y, p.r * w_z)
 
@@ -262,11 +283,15 @@ def direction(along_sine: Real, along_cosine: Real) -> Direction:
         size = np.maximum(np.abs(along_sine), np.abs(along_cosine))
         speed = size * np.sqrt((along_sine / size) ** 2 + (along_cosine / size) ** 2)
     else:
-        speed = (math.hypot if isinstance(along_sine, float) else np.hypot)(along_sine, along_cosine)
+        speed = (math.hypot if isinstance(along_sine, float) else np.hypot)(
+            along_sine, along_cosine
+        )
     return along_sine / speed, along_cosine / speed
 
 
-def _checked(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[State, Array]:
+def _checked(
+    case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None
+) -> tuple[State, Array]:
     """States, as columns, and the flow, rad s-1; `InputError` if one of them violates the case."""
     check_type("p", p, Parameters)
     state = check_state(case, x, p)
@@ -286,8 +311,8 @@ def _refuse(wrong: Real, values: Real, name: str, rule: str, unit: str | None = 
 def jacobian(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
     """Exact Jacobians of the vector field at states x (..., 6 or 8), shape (..., d, d), rad s-1.
 
-    Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z moves with v_h.
-    """
+    Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z
+    moves with v_h."""
     state = check_state(case, x, p)
     active = TRAITS[case].active
     columns = []

@@ -1,11 +1,12 @@
-"""Contact forces of two-point rolling (RR): a one-parameter family, and whether any member is admissible.
+"""Contact forces of two-point rolling (RR): a one-parameter family, and whether any member is
+admissible.
 
-Rolling at A and B leaves one force free, say B_y: A_x = B_y - j u, A_y = G - B_y, B_x = (1+j) u - B_y, with
-u = m R omega_c^2, G = m g, and A_z = B_z = z given by (23). RR can go on only if some B_y puts both forces into
-their Coulomb cones (12), (13). With s the normal force of one contact, either cone reads
-(d - s)^2 + z^2 <= f^2 s^2, s >= 0, where d = G - j u, f = mu at A and d = (1+j) u, f = eta at B: a convex problem in
-one unknown. Loads are kept in units of G inside; all functions take floats or arrays and broadcast them.
-"""
+Rolling at A and B leaves one force free, say B_y: A_x = B_y - j u, A_y = G - B_y, B_x = (1+j) u -
+B_y, with u = m R omega_c^2, G = m g, and A_z = B_z = z given by (23). RR can go on only if some B_y
+puts both forces into their Coulomb cones (12), (13). With s the normal force of one contact, either
+cone reads (d - s)^2 + z^2 <= f^2 s^2, s >= 0, where d = G - j u, f = mu at A and d = (1+j) u, f =
+eta at B: a convex problem in one unknown. Loads are kept in units of G inside; all functions take
+floats or arrays and broadcast them."""
 
 from __future__ import annotations
 
@@ -21,30 +22,33 @@ from model.arrays import Array
 
 @dataclass(frozen=True)
 class LeastUtilisation:
-    """The member of the family whose larger friction utilisation is the least; arrays of one shape."""
+    """The member of the family whose larger friction utilisation is the least; arrays of one
+    shape."""
 
     B_y: Array
-    """Its free component, N; where the least is only approached as the forces grow without bound, since the ball can
-    jam, the greatest that is admissible, and nan if none is."""
+    """Its free component, N; where the least is only approached as the forces grow without bound,
+    since the ball can jam, the greatest that is admissible, and nan if none is."""
     utilisation: Array
-    """max(|friction at A|/(mu A_y), |friction at B|/(eta B_x)); RR can go on where it is <= 1 with finite forces."""
+    """max(|friction at A|/(mu A_y), |friction at B|/(eta B_x)); RR can go on where it is <= 1 with
+    finite forces."""
 
 
 def admissible_interval(
     omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """Least and greatest admissible B_y in N; nan where there is none, -inf where the ball can jam (mu, eta > 1)."""
+    """Least and greatest admissible B_y in N; nan where there is none, -inf where the ball can jam
+    (mu, eta > 1)."""
     least, greatest = _interval(*_loads(omega_c, p, omega_0), p)
     exists = (least <= greatest) & (greatest > -np.inf) & (margin(omega_c, p, omega_0) >= 0)
     return tuple(np.where(exists, p.m * p.g * end, np.nan) for end in (least, greatest))  # type: ignore[return-value]
 
 
 def margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
-    """How far RR is from its end, in closed form: >= 0 exactly where both cones can hold, continuous through 0.
+    """How far RR is from its end, in closed form: >= 0 exactly where both cones can hold,
+    continuous through 0.
 
-    The smallest of three lengths in units of m g: the slack of either cone alone, and the overlap of the two
-    intervals of B_y.
-    """
+    The smallest of three lengths in units of m g: the slack of either cone alone, and the overlap
+    of the two intervals of B_y."""
     u, z = _loads(omega_c, p, omega_0)
     least, greatest = _interval(u, z, p)
     unbounded = np.isneginf(greatest)
@@ -56,19 +60,24 @@ def margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None 
     return np.asarray(np.minimum(np.minimum(*slacks), overlap))
 
 
-def slip_margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+def slip_margin(
+    omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
+) -> Array:
     """How far RR is from the onset of a slip that lasts, in units of m g: >= 0 where slip dies out.
 
-    Two slacks: of the wall's friction that must drive the spin (66), and of the floor's cone once the wall carries
-    `_last_share` of the weight. Continuous; never beyond the zero of `margin`. docs/theory.md derives it.
-    """
+    Two slacks: of the wall's friction that must drive the spin (66), and of the floor's cone once
+    the wall carries `_last_share` of the weight. Continuous; never beyond the zero of `margin`.
+    docs/theory.md derives it."""
     u, z = _loads(omega_c, p, omega_0)
     share = _last_share(u, z, p)
-    return np.asarray(np.minimum(p.eta * (1 + p.j) * u - z, p.mu * (1 - share) - np.hypot(p.j * u - share, z)))
+    return np.asarray(
+        np.minimum(p.eta * (1 + p.j) * u - z, p.mu * (1 - share) - np.hypot(p.j * u - share, z))
+    )
 
 
 def _last_share(u: Array, z: Array, p: Parameters) -> Array:
-    """B_y in units of m g at which RR ends: the most that the wall's cone allows, up to j u, which turns the spin axis.
+    """B_y in units of m g at which RR ends: the most that the wall's cone allows, up to j u, which
+    turns the spin axis.
 
     0 where the cone has nothing left, beyond (66).
     """
@@ -76,12 +85,15 @@ def _last_share(u: Array, z: Array, p: Parameters) -> Array:
     return np.asarray(np.minimum(np.maximum(k - _normal_forces(k, z, p.eta)[0], 0.0), p.j * u))
 
 
-def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> LeastUtilisation:
-    """The forces of RR whose larger friction utilisation, of floor or wall, is the least over the family.
+def least_utilisation(
+    omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
+) -> LeastUtilisation:
+    """The forces of RR whose larger friction utilisation, of floor or wall, is the least over the
+    family.
 
-    Each utilisation falls and then rises along B_y, so that the least maximum is at the lowest point of one of them
-    or at their only crossing in between. The search runs in q = 1/(1 + A_y/G), which is finite for all A_y >= 0.
-    """
+    Each utilisation falls and then rises along B_y, so that the least maximum is at the lowest
+    point of one of them or at their only crossing in between. The search runs in q = 1/(1 + A_y/G),
+    which is finite for all A_y >= 0."""
     u, z = np.broadcast_arrays(*_loads(omega_c, p, omega_0))
     a, k = 1 - p.j * u, (1 + p.j) * u
     hyp2, rise, narrow = a**2 + z**2, a + 1, k - 2
@@ -90,7 +102,8 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
     q_B = np.where(k + z > 0, _ratio(k, 2 * k + z**2), 0.5)
 
     def friction(q: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Friction at A and its limit, the same at B, in one unit; positive where the utilisation of A is larger."""
+        """Friction at A and its limit, the same at B, in one unit; positive where the utilisation
+        of A is larger."""
         sideways = (z * q) ** 2
         at_A, at_B = np.sqrt((rise * q - 1) ** 2 + sideways), np.sqrt((2 * q - 1) ** 2 + sideways)
         limit_A, limit_B = p.mu * (1 - q), p.eta * np.maximum(narrow * q + 1, 0.0)
@@ -101,7 +114,12 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
         at_A, limit_A, at_B, limit_B, excess = friction(q)
         turn_A = (steep_A * q - rise) / np.where(at_A > 0, at_A, np.inf)
         turn_B = (steep_B * q - 2) / np.where(at_B > 0, at_B, np.inf)
-        slope = turn_A * limit_B + at_A * p.eta * narrow * (limit_B > 0) - turn_B * limit_A + at_B * p.mu
+        slope = (
+            turn_A * limit_B
+            + at_A * p.eta * narrow * (limit_B > 0)
+            - turn_B * limit_A
+            + at_B * p.mu
+        )
         return excess, slope
 
     first, last = friction(q_A)[-1], friction(q_B)[-1]
@@ -123,11 +141,18 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
     return LeastUtilisation(B_y, np.maximum(use_A, use_B))
 
 
-def _loads(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[Array, Array]:
+def _loads(
+    omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None
+) -> tuple[Array, Array]:
     """Centrifugal load u and common friction |z| of (23), in units of G."""
-    omega_c, fluid = np.asarray(omega_c, dtype=float), np.asarray(p.omega_0 if omega_0 is None else omega_0)
+    omega_c, fluid = (
+        np.asarray(omega_c, dtype=float),
+        np.asarray(p.omega_0 if omega_0 is None else omega_0),
+    )
     u, lag = p.R / p.g * omega_c**2, np.abs(omega_c - fluid)
-    return np.asarray(u), np.asarray(p.j * drag.coefficient(p.R * lag, p) * p.R / p.g * lag / (1 + 2 * p.j))
+    return np.asarray(u), np.asarray(
+        p.j * drag.coefficient(p.R * lag, p) * p.R / p.g * lag / (1 + 2 * p.j)
+    )
 
 
 def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:
@@ -139,10 +164,11 @@ def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:
 
 
 def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
-    """Roots s of (d - s)^2 + z^2 = friction^2 s^2 that bound the admissible normal forces of one contact.
+    """Roots s of (d - s)^2 + z^2 = friction^2 s^2 that bound the admissible normal forces of one
+    contact.
 
-    Where no s is admissible the discriminant is taken as 0, or both ends are inf: there `margin` is negative.
-    """
+    Where no s is admissible the discriminant is taken as 0, or both ends are inf: there `margin` is
+    negative."""
     hyp2 = d**2 + z**2
     top = d + np.sqrt(np.maximum((friction - 1) * (friction + 1) * z**2 + (friction * d) ** 2, 0.0))
     low = np.where(hyp2 == 0, 0.0, np.where(top > 0, hyp2 / np.where(top > 0, top, 1.0), np.inf))
@@ -151,9 +177,12 @@ def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
 
 
 def _least_utilisation_alone(d: Array, z: Array, friction: float) -> Array:
-    """Least utilisation of friction that one contact has over the family of forces, whatever the other's."""
+    """Least utilisation of friction that one contact has over the family of forces, whatever the
+    other's."""
     hyp = np.hypot(d, z)
-    return _ratio(np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0)), np.asarray(friction))
+    return _ratio(
+        np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0)), np.asarray(friction)
+    )
 
 
 def _ratio(load: Array, limit: Array) -> Array:

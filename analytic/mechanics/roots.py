@@ -12,11 +12,12 @@ from model.arrays import Array, Real
 
 
 def sign_change(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
-    """Where f changes sign between start and end, element by element of arrays of any shape, to the last digit.
+    """Where f changes sign between start and end, element by element of arrays of any shape, to the
+    last digit.
 
-    nan where it has one sign at both. By inverse quadratic interpolation where that can be trusted, else by halving
-    (Chandrupatla, Adv. Eng. Software 28 (1997) 145); the root finders of scipy take half a second to load.
-    """
+    nan where it has one sign at both. By inverse quadratic interpolation where that can be trusted,
+    else by halving (Chandrupatla, Adv. Eng. Software 28 (1997) 145); the root finders of scipy take
+    half a second to load."""
     a, b = (x.astype(float) for x in np.broadcast_arrays(start, end))
     f_a, f_b = np.asarray(f(a)), np.asarray(f(b))
     changes, share = (f_a < 0) != (f_b < 0), np.full(a.shape, 0.5)
@@ -32,23 +33,29 @@ def sign_change(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.Array
             if np.all((least >= 0.5) | (f_a == 0) | (a == b) | ~changes):
                 break
             xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)
-            guess = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+            guess = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (
+                f_c - f_a
+            ) * f_b / (f_c - f_b)
             trusted = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(guess)
-            share = np.clip(np.where(trusted, guess, 0.5), np.minimum(least, 0.5), np.maximum(1 - least, 0.5))
+            share = np.clip(
+                np.where(trusted, guess, 0.5), np.minimum(least, 0.5), np.maximum(1 - least, 0.5)
+            )
     return np.where(changes, np.where(f_a == 0, a, best), np.nan)
 
 
 _MOST, _SHORT = 200, 1e-10
-"""Steps: more than enough for roots whose size is above 1e-44 of the interval, by halving alone; and the length of one
-of Newton's, relative to the root, after which nothing is left."""
+"""Steps: more than enough for roots whose size is above 1e-44 of the interval, by halving alone;
+and the length of one of Newton's, relative to the root, after which nothing is left."""
 
 
-def zero_of_rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, guess: Array) -> Array:
-    """Where f, given with its derivative, rises through zero on the way from start to end, to the last digits.
+def zero_of_rising(
+    f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, guess: Array
+) -> Array:
+    """Where f, given with its derivative, rises through zero on the way from start to end, to the
+    last digits.
 
-    By Newton's method from a guess, or halving where that leaves what is known to hold the root. A step of Newton's
-    leaves about the square of its length.
-    """
+    By Newton's method from a guess, or halving where that leaves what is known to hold the root. A
+    step of Newton's leaves about the square of its length."""
     below, above, root = start, end, guess
     for _ in range(_MOST):
         before, (value, slope) = root, f(root)
@@ -57,6 +64,8 @@ def zero_of_rising(f: Callable[[Array], tuple[Array, Array]], start: Array, end:
         root = root - value / np.where(slope == 0, np.inf, slope)
         inside = (root - below) * (root - above) <= 0
         root = np.where(inside, root, (below + above) / 2)
-        if np.all(np.abs(root - before) <= np.where(inside, _SHORT, 2 * math.ulp(1.0)) * np.abs(before)):
+        if np.all(
+            np.abs(root - before) <= np.where(inside, _SHORT, 2 * math.ulp(1.0)) * np.abs(before)
+        ):
             break
     return np.asarray(root)

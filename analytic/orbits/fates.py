@@ -1,9 +1,9 @@
 """Attractors: whether motions from one start or many become stationary, periodic, or neither.
 
-A run is followed window by window until it repeats what it did; any simulator may carry it out. A recurrent motion is
-closed to an orbit by theory (`orbits`). One for which no stable orbit is found is chaotic if neighbours of it part
-exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with its last window.
-"""
+A run is followed window by window until it repeats what it did; any simulator may carry it out. A
+recurrent motion is closed to an orbit by theory (`orbits`). One for which no stable orbit is found
+is chaotic if neighbours of it part exponentially, else quasi-periodic. A run whose time is over
+before that stays undecided, with its last window."""
 
 from __future__ import annotations
 
@@ -35,11 +35,13 @@ WINDOW, WINDOW_SAMPLES = 100.0, 4000
 LASTING = 60.0
 """How long a run is followed, in units of 1/c."""
 STATIONARY_RANGE = 1e-3
-"""Range of the variables over a window, in natural units, below which a motion that still shrinks is stationary."""
+"""Range of the variables over a window, in natural units, below which a motion that still shrinks
+is stationary."""
 NEAR = 1e-2
 """Distance in natural units up to which it is that of a stationary solution."""
 ALIKE = 0.05
-"""Distance divided by the range of the motion up to which states, means and extremes are the same."""
+"""Distance divided by the range of the motion up to which states, means and extremes are the
+same."""
 GROWING = 400.0
 """Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
 APART = 1e-6
@@ -48,8 +50,8 @@ SIDE_BY_SIDE = 16
 """Runs that are followed at once: their windows take some 20 MB."""
 
 Runs = Callable[[Parameters, Array, float, float], Sequence[Trajectory]]
-"""A simulator: parameters, starts (n, 8), duration in s, sample interval in s; of a run that breaks down what there is,
-with the reason in its header."""
+"""A simulator: parameters, starts (n, 8), duration in s, sample interval in s; of a run that breaks
+down what there is, with the reason in its header."""
 
 
 class Kind(StrEnum):
@@ -111,14 +113,16 @@ class Attractor:
 
     @property
     def run(self) -> Trajectory:
-        """The motion on it: a period by theory where there is an orbit, else the last window of a run."""
+        """The motion on it: a period by theory where there is an orbit, else the last window of a
+        run."""
         return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
 
 
 def event_driven(
     p: Parameters, x0s: Array, duration: float, interval: float, threads: int | None = None
 ) -> list[Trajectory]:
-    """Event-driven simulations from states x0s (n, 8), in as many threads as are asked for, or cores; see `Runs`."""
+    """Event-driven simulations from states x0s (n, 8), in as many threads as are asked for, or
+    cores; see `Runs`."""
 
     def motion(x0: Array) -> Trajectory:
         try:
@@ -147,10 +151,14 @@ def attractors(
     lasting : how long a run is followed at most, s; `LASTING`/c if None
     run : the simulator that carries out the runs
 
-    Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
-    """
+    Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without
+    `lasting`."""
     check_type("p", p, Parameters)
-    states = random_starts(p, starts, seed) if isinstance(starts, int) else np.atleast_2d(full_state(starts))
+    states = (
+        random_starts(p, starts, seed)
+        if isinstance(starts, int)
+        else np.atleast_2d(full_state(starts))
+    )
     if lasting is None and p.c == 0:
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
@@ -169,7 +177,9 @@ def attractors(
                 if group is None:
                     groups.append(group := [])
                 group.append(fate)
-        following = goes_on + [(each, next(each)) for each in islice(todo, SIDE_BY_SIDE - len(goes_on))]
+        following = goes_on + [
+            (each, next(each)) for each in islice(todo, SIDE_BY_SIDE - len(goes_on))
+        ]
     groups.sort(key=len, reverse=True)
     return [Attractor(group[0], len(group), len(states)) for group in groups]
 
@@ -179,11 +189,12 @@ def _follow_to_attractor(
 ) -> Generator[Array, Trajectory, Fate]:
     """Decide which attractor the motion from x approaches within `lasting` seconds.
 
-    A generator: it yields the state from which it needs the next window of the run, is sent that, and returns the fate.
+    A generator: it yields the state from which it needs the next window of the run, is sent that,
+    and returns the fate.
 
-    Stationary is what hardly moves, and less than before. Where two windows are alike the motion is recurrent: it has
-    the fate of one of the `known` groups, or closes; if it does neither, its largest Lyapunov exponent decides.
-    """
+    Stationary is what hardly moves, and less than before. Where two windows are alike the motion is
+    recurrent: it has the fate of one of the `known` groups, or closes; if it does neither, its
+    largest Lyapunov exponent decides."""
     solutions, unit = stable_solutions(p), math.sqrt(p.R / p.g)
     seen, recurrent = list[Trajectory](), False
     for _ in range(math.ceil(lasting / (WINDOW * unit))):
@@ -197,7 +208,11 @@ def _follow_to_attractor(
         if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
             return Fate(Kind.STATIONARY, now, solution=_nearest_solution(now, solutions))
         if recurrent := _windows_agree(before, now):
-            same = (fate for fate, *_ in known if fate.kind is not Kind.UNDECIDED and _windows_agree(fate.last, now))
+            same = (
+                fate
+                for fate, *_ in known
+                if fate.kind is not Kind.UNDECIDED and _windows_agree(fate.last, now)
+            )
             if fate := next(same, None) or periodic_fate(now):
                 return fate
     if not recurrent:
@@ -206,19 +221,27 @@ def _follow_to_attractor(
         exponent, deviation = lyapunov(p, *_highest_state(seen[-1]), GROWING * unit, unit, run)
     except (SimulationError, InputError) as reason:
         return Fate(Kind.UNDECIDED, seen[-1], failure=str(reason))
-    return Fate(Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC, seen[-1], exponent=exponent)
+    return Fate(
+        Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC,
+        seen[-1],
+        exponent=exponent,
+    )
 
 
 def _windows_agree(a: Trajectory, b: Trajectory) -> bool:
     """Whether means and extremes of two windows agree, relative to the range of the motion."""
     size = state_units(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
     return all(
-        bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size)) for of in (np.mean, np.min, np.max)
+        bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size))
+        for of in (np.mean, np.min, np.max)
     )
 
 
-def _nearest_solution(last: Trajectory, solutions: Sequence[StationarySolution]) -> StationarySolution | None:
-    """The stationary solution nearest to the last state, free variables aside; of two in one state that of its case."""
+def _nearest_solution(
+    last: Trajectory, solutions: Sequence[StationarySolution]
+) -> StationarySolution | None:
+    """The stationary solution nearest to the last state, free variables aside; of two in one state
+    that of its case."""
     x, case = last.x[-1], last.cases[-1]
     size = state_units(last.header.parameters)
 
@@ -231,16 +254,22 @@ def _nearest_solution(last: Trajectory, solutions: Sequence[StationarySolution])
 
 
 def periodic_fate(last: Trajectory) -> Fate | None:
-    """The periodic motion that a window of a run shows, with the stable orbit that theory has near it.
+    """The periodic motion that a window of a run shows, with the stable orbit that theory has near
+    it.
 
-    None if it doesn't close. Candidates for the period are the first three good minima of the distance between the last
-    quarter of the window and what was a lag of up to half the window earlier.
-    """
+    None if it doesn't close. Candidates for the period are the first three good minima of the
+    distance between the last quarter of the window and what was a lag of up to half the window
+    earlier."""
     p, size = last.header.parameters, extent(last)
     z, n, interval = last.x / state_units(p), len(last.x) // 2, float(last.time[1] - last.time[0])
-    away = np.array([np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)])
+    away = np.array(
+        [np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)]
+    )
     left = int(np.argmax(away > size / 2))
-    dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
+    dips = np.array(
+        [k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]],
+        dtype=int,
+    )
     good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
     seen = [(float(k * interval), float(away[k])) for k in good[:3]]
     for period, _ in seen:
@@ -255,7 +284,8 @@ def periodic_fate(last: Trajectory) -> Fate | None:
 
 
 def _highest_state(last: Trajectory) -> tuple[Array, Case]:
-    """Where in a window the ball is highest: the state, with exact zeros where the case has them, and the case."""
+    """Where in a window the ball is highest: the state, with exact zeros where the case has them,
+    and the case."""
     k = int(np.argmax(last.y))
     case = Case(last.case[k])
     return np.where([name in TRAITS[case].constraints for name in VARIABLES], 0.0, last.x[k]), case
@@ -264,13 +294,13 @@ def _highest_state(last: Trajectory) -> tuple[Array, Case]:
 def lyapunov(
     p: Parameters, x: npt.ArrayLike, case: Case, duration: float, renewed: float, run: Runs
 ) -> tuple[float, float]:
-    """Largest Lyapunov exponent of the motion from x, in a case, over a duration, and its standard error, s-1.
+    """Largest Lyapunov exponent of the motion from x, in a case, over a duration, and its standard
+    error, s-1.
 
-    A second motion starts beside the first, a distance `APART` away in natural units, and is brought back to that
-    distance every `renewed` seconds, as soon as both are in one case; the mean growth between is the exponent
-    (Benettin's method). The error is that of the mean of ten parts of the duration. Raises `SimulationError` if a
-    motion breaks down.
-    """
+    A second motion starts beside the first, a distance `APART` away in natural units, and is
+    brought back to that distance every `renewed` seconds, as soon as both are in one case; the mean
+    growth between is the exponent (Benettin's method). The error is that of the mean of ten parts
+    of the duration. Raises `SimulationError` if a motion breaks down."""
     first = full_state(x)
     active, push = active_variables(case), np.zeros(8)
     push[active] = np.random.default_rng(0).normal(size=len(active))

@@ -1,9 +1,9 @@
-"""Branches of periodic motions: an orbit followed in one parameter to where it is born and where it dies.
+"""Branches of periodic motions: an orbit followed in one parameter to where it is born and where it
+dies.
 
-The branch is followed by its length (in natural units of the state, and the logarithm of the parameter), so that it may
-turn back: a step along the tangent, then Newton's method across it. Where stability or the sequence of cases changes
-between two orbits, the place is located.
-"""
+The branch is followed by its length (in natural units of the state, and the logarithm of the
+parameter), so that it may turn back: a step along the tangent, then Newton's method across it.
+Where stability or the sequence of cases changes between two orbits, the place is located."""
 
 from __future__ import annotations
 
@@ -33,16 +33,20 @@ from model.arrays import Array
 from model.parameters import check_names, check_number
 
 FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.2, 1e-5, 0.5
-"""Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
+"""Steps along the branch, in natural units: the first, those at which it is given up, and the
+longest."""
 GRAZING = 0.01
-"""Longest step in which the number of landings may change: other branches, as of balls that ride the wall, are near."""
+"""Longest step in which the number of landings may change: other branches, as of balls that ride
+the wall, are near."""
 EASY = 5
 """Steps of Newton's method up to which the next step along the branch is longer."""
 SHARP = 1e-6
-"""How sharply a change of stability is located along the branch; a change of the sequence of cases by `HALVINGS`."""
+"""How sharply a change of stability is located along the branch; a change of the sequence of cases
+by `HALVINGS`."""
 HALVINGS = 10
 SMALL = 0.05
-"""Extent divided by the largest of the branch, below which the branch is extrapolated to extent zero."""
+"""Extent divided by the largest of the branch, below which the branch is extrapolated to extent
+zero."""
 
 
 class Bifurcation(StrEnum):
@@ -61,7 +65,8 @@ class Bifurcation(StrEnum):
     HOPF = "Hopf"
     """It shrinks to a stationary motion within one case."""
     BIRTH = "nonsmooth birth"
-    """It shrinks to a stationary motion at which cases meet: its extent falls linearly, not like a root."""
+    """It shrinks to a stationary motion at which cases meet: its extent falls linearly, not like a
+    root."""
     LOST = "lost"
     """It isn't followed any further, for a reason that is given."""
     RANGE = "end of the range"
@@ -105,14 +110,23 @@ class OrbitBranch:
 
 
 def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
-    """Follow an orbit both ways in a parameter until it leaves [low, high], ends, or `most` orbits are known each way.
+    """Follow an orbit both ways in a parameter until it leaves [low, high], ends, or `most` orbits
+    are known each way.
 
     Raises `InputError` if there is no such parameter, or the orbit isn't within the range.
     """
-    check_names([name], [*(field.name for field in Parameters.quantities()), RESTITUTION], "parameter")
-    low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
+    check_names(
+        [name], [*(field.name for field in Parameters.quantities()), RESTITUTION], "parameter"
+    )
+    low, high = (
+        check_number(f"lowest {name}", low, "SI"),
+        check_number(f"highest {name}", high, "SI"),
+    )
     if not low <= (value := start.loop.value(name)) <= high or value == 0:
-        raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")
+        raise InputError(
+            f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, "
+            f"not 0"
+        )
     down, up = ([*_one_way(start, name, (low, high), sign, most)] for sign in (-1.0, 1.0))
     every: list[Orbit | Place] = [*down[::-1], start, *up]
     return OrbitBranch(
@@ -122,8 +136,11 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     )
 
 
-def _one_way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: int) -> Iterator[Orbit | Place]:
-    """Follow the branch from an orbit towards larger (sign 1) or smaller values: orbits and places, to its end."""
+def _one_way(
+    start: Orbit, name: str, span: tuple[float, float], sign: float, most: int
+) -> Iterator[Orbit | Place]:
+    """Follow the branch from an orbit towards larger (sign 1) or smaller values: orbits and places,
+    to its end."""
     here, step, before, reason = start, FIRST_STEP, [start], ""
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
@@ -146,11 +163,15 @@ def _one_way(start: Orbit, name: str, span: tuple[float, float], sign: float, mo
         met = _places_between(here, there, step * along, name, matrix)
         yield from (place for place in met if span[0] <= place.value <= span[1])
         if not span[0] <= there.loop.value(name) <= span[1]:
-            # The orbit where the branch leaves the range, between the last within it and the first outside.
+            # The orbit where the branch leaves the range, between the last within it and the first
+            # outside.
             inside, outside = here.loop.value(name), there.loop.value(name)
             value = min(max(outside, span[0]), span[1])
             share = (value - inside) / (outside - inside)
-            x, period = here.loop.x + share * (there.loop.x - here.loop.x), (1 - share) * here.period
+            x, period = (
+                here.loop.x + share * (there.loop.x - here.loop.x),
+                (1 - share) * here.period,
+            )
             try:
                 loop = here.loop.with_value(name, value)
                 orbit = closed_orbit(replace(loop, x=x, period=period + share * there.period))
@@ -172,7 +193,10 @@ def _one_way(start: Orbit, name: str, span: tuple[float, float], sign: float, mo
         before.append(here)
         if here.loop.extent < SMALL * max(each.loop.extent for each in before):
             # The extent will be zero where a parabola through the last three orbits says.
-            last, (kind, power) = before[-3:], (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
+            last, (kind, power) = (
+                before[-3:],
+                (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2),
+            )
             sizes = np.array([each.loop.extent for each in last]) ** power
             values = np.array([each.loop.value(name) for each in last])
             yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)
@@ -181,26 +205,36 @@ def _one_way(start: Orbit, name: str, span: tuple[float, float], sign: float, mo
 
 
 def _next_orbit(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
-    """The next orbit on the branch, a step `by` away; `NoOrbitError` also if it is one of another branch."""
+    """The next orbit on the branch, a step `by` away; `NoOrbitError` also if it is one of another
+    branch."""
     orbit = closed_orbit(here.loop.moved(by, name), name, matrix)
     if _on_other_branch(here, by, orbit.changes):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return orbit
 
 
-def _places_between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
+def _places_between(
+    here: Orbit, there: Orbit, step: Array, name: str, matrix: Array
+) -> Iterator[Place]:
     """Bifurcations between an orbit and the next one on the branch, each located."""
     for kind, sign in _TESTS.items():
         outside = [np.sum(np.abs(each.multipliers) > 1) for each in (here, there)]
-        if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
+        if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (
+            sign(there.multipliers) > 0
+        ):
             continue
 
         def sign_at(share: float, sign: Callable[[Any], float] = sign) -> float:
             return sign(_next_orbit(here, share * step, name, matrix).multipliers)
 
         try:
-            orbit = _next_orbit(here, brentq(sign_at, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
-        except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
+            orbit = _next_orbit(
+                here, brentq(sign_at, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix
+            )
+        except (
+            NoOrbitError,
+            ValueError,
+        ):  # where the sequence of cases changes, too, the test may jump
             orbit = there
         yield Place(kind, orbit.loop.value(name), orbit)
     before = _rotated_to_least(here.changes)
@@ -234,8 +268,11 @@ def _rotated_to_least(changes: Changes) -> Changes:
 
 
 def _on_other_branch(here: Orbit, by: Array, changes: Changes) -> bool:
-    """Whether a long step from an orbit led to one with another number of landings, so to another branch."""
-    return bool(np.linalg.norm(by) > GRAZING) and sum(landings(changes)) != sum(landings(here.changes))
+    """Whether a long step from an orbit led to one with another number of landings, so to another
+    branch."""
+    return bool(np.linalg.norm(by) > GRAZING) and sum(landings(changes)) != sum(
+        landings(here.changes)
+    )
 
 
 _TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
@@ -243,4 +280,5 @@ _TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
     Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + m[np.isreal(m)].real)),
     Bifurcation.TORUS: lambda m: float(np.abs(m[np.imag(m) != 0]).max(initial=0.0)) - 1,
 }
-"""Functions of the multipliers: positive if an odd number is real and beyond 1 (-1), or a pair outside the circle."""
+"""Functions of the multipliers: positive if an odd number is real and beyond 1 (-1), or a pair
+outside the circle."""

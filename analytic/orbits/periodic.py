@@ -1,12 +1,13 @@
-"""Periodic motions: orbits that close, by Newton's method on the return map, and how disturbances of them grow.
+"""Periodic motions: orbits that close, by Newton's method on the return map, and how disturbances
+of them grow.
 
-The return map leads from a plane through a point of the orbit, across the motion there, back to it: through every event
-and impact in between, by the event-driven simulation. The point lies within one case, and its coordinates are the
-active variables of that case (Table 4) in natural units, so that the map is smooth as long as the sequence of events
-stays the same; the azimuth plays no part. Derivatives are central differences of the simulation, at a tolerance at
-which they keep six digits. Floquet multipliers are the eigenvalues of the derivative of the return map: the factors by
-which disturbances of the orbit change in a period.
-"""
+The return map leads from a plane through a point of the orbit, across the motion there, back to it:
+through every event and impact in between, by the event-driven simulation. The point lies within one
+case, and its coordinates are the active variables of that case (Table 4) in natural units, so that
+the map is smooth as long as the sequence of events stays the same; the azimuth plays no part.
+Derivatives are central differences of the simulation, at a tolerance at which they keep six digits.
+Floquet multipliers are the eigenvalues of the derivative of the return map: the factors by which
+disturbances of the orbit change in a period."""
 
 from __future__ import annotations
 
@@ -31,17 +32,20 @@ from model.kinematics import VARIABLES, state_units
 RETURN_RTOL = 1e-12
 """Relative tolerance of the simulation under the return map."""
 SHIFT = 3e-5
-"""Half width of the differences divided by the extent of the orbit: truncation and RETURN_RTOL leave less than 1e-6."""
+"""Half width of the differences divided by the extent of the orbit: truncation and RETURN_RTOL
+leave less than 1e-6."""
 CLOSED = 1e-10
 """Defect in natural units at which an orbit is closed."""
 ITERATIONS = 8
 """Steps of Newton's method after which an orbit is given up."""
 FAST = 10.0
-"""Factor by which a step must reduce the defect for the derivatives of a neighbour to be used once more."""
+"""Factor by which a step must reduce the defect for the derivatives of a neighbour to be used once
+more."""
 RESTITUTION = "restitution"
 """What an orbit may be followed in beside parameters."""
 ORBIT_SAMPLES = 4000
-"""Samples of a period from which means and extremes are taken: a parabola's top is then good to 1e-6 of its height."""
+"""Samples of a period from which means and extremes are taken: a parabola's top is then good to
+1e-6 of its height."""
 
 Changes = tuple[tuple[Case, Case], ...]
 """Changes of case in order, (before, after)."""
@@ -49,7 +53,9 @@ Changes = tuple[tuple[Case, Case], ...]
 
 def landings(changes: Iterable[tuple[int, int]]) -> npt.NDArray[np.bool_]:
     """Which changes of case, given by the cases or their codes, are landings on the floor."""
-    return np.array([Case(before).A is Contact.N is not Case(after).A for before, after in changes], dtype=bool)
+    return np.array(
+        [Case(before).A is Contact.N is not Case(after).A for before, after in changes], dtype=bool
+    )
 
 
 class NoOrbitError(ArithmeticError):
@@ -58,7 +64,8 @@ class NoOrbitError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Loop:
-    """A state within a case and the section through it: the plane on which one of its active variables has its value.
+    """A state within a case and the section through it: the plane on which one of its active
+    variables has its value.
 
     The other active variables, in natural units, are the d - 1 coordinates of the section.
     """
@@ -78,24 +85,35 @@ class Loop:
 
     @classmethod
     def of(cls, p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 0.0) -> Loop:
-        """A good section of a motion that passes a state (6 or 8 entries) and has about this period, s.
+        """A good section of a motion that passes a state (6 or 8 entries) and has about this
+        period, s.
 
-        Of a ball that hops the top of its highest hop, v_y = 0. On the floor, within the middle half of the longest
-        stretch in one case other than RR, where the case's fastest variable is fastest, in natural units.
-        """
+        Of a ball that hops the top of its highest hop, v_y = 0. On the floor, within the middle
+        half of the longest stretch in one case other than RR, where the case's fastest variable is
+        fastest, in natural units."""
         run = _simulated(p, x, 2 * period, ORBIT_SAMPLES, restitution)
         size, y = extent(run), run.y
         tops = 1 + np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))
         if len(tops):
             top = int(tops[np.argmax(y[tops])])
             state = State.of(run.x[top])._replace(v_y=0.0)
-            return cls(p, run.cases[top], state.stacked(), period, VARIABLES.index("v_y"), size, restitution)
+            return cls(
+                p,
+                run.cases[top],
+                state.stacked(),
+                period,
+                VARIABLES.index("v_y"),
+                size,
+                restitution,
+            )
         stretches = [each for each in run.phases() if each[0] is not Case.RR]
         if not stretches:
             raise NoOrbitError(f"the ball rolls at both points all the time (period {period:g} s)")
         case, start, end = max(stretches, key=lambda each: each[2] - each[1])
         inner = np.abs(run.time - (start + end) / 2) <= (end - start) / 4
-        rates = np.abs([dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]) / state_units(p)
+        rates = np.abs(
+            [dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]
+        ) / state_units(p)
         active = active_variables(case)
         at, fixed = np.unravel_index(np.argmax(rates[:, active]), (len(rates), len(active)))
         return cls(p, case, run.x[inner][at], period, active[int(fixed)], size, restitution)
@@ -106,7 +124,9 @@ class Loop:
 
     def with_value(self, name: str, value: float) -> Loop:
         """The loop with another value of a parameter, or of the coefficient of restitution."""
-        changed = {RESTITUTION: value} if name == RESTITUTION else {"p": self.p.replace(**{name: value})}
+        changed = (
+            {RESTITUTION: value} if name == RESTITUTION else {"p": self.p.replace(**{name: value})}
+        )
         return replace(self, **changed)
 
     @property
@@ -115,11 +135,13 @@ class Loop:
         return [k for k in active_variables(self.case) if k != self.fixed]
 
     def coordinates(self, x: Array) -> Array:
-        """Coordinates in the section (..., d - 1), in natural units, of states (..., 8) or differences of states."""
+        """Coordinates in the section (..., d - 1), in natural units, of states (..., 8) or
+        differences of states."""
         return np.asarray(x[..., self.free] / state_units(self.p)[self.free])
 
     def moved(self, by: Array, varied: str | None = None) -> Loop:
-        """The loop moved by coordinates (d - 1,) and, if a parameter is `varied`, by its logarithm, (d,).
+        """The loop moved by coordinates (d - 1,) and, if a parameter is `varied`, by its logarithm,
+        (d,).
 
         Raises `NoOrbitError` where that leads out of the range of the parameter.
         """
@@ -129,16 +151,17 @@ class Loop:
             x = State.of(x)._replace(slip_z=-State.of(x).v_h / self.p.r).stacked()
         moved = replace(self, x=x)
         try:
-            return moved.with_value(varied, self.value(varied) * math.exp(by[-1])) if varied else moved
+            return (
+                moved.with_value(varied, self.value(varied) * math.exp(by[-1])) if varied else moved
+            )
         except InputError as error:
             raise NoOrbitError(str(error)) from error
 
     def back(self) -> Return:
         """Where the motion returns to the section; `NoOrbitError` if it doesn't come back.
 
-        It is simulated for the period, and then followed to the section nearby, forwards or backwards, by the
-        equations of the case.
-        """
+        It is simulated for the period, and then followed to the section nearby, forwards or
+        backwards, by the equations of the case."""
 
         def rates(t: float, z: Array) -> list[float]:
             return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
@@ -146,7 +169,10 @@ class Loop:
         run = _simulated(self.p, self.x, self.period, 1, self.restitution)
         tolerance = RETURN_RTOL * state_units(self.p)
         if run.cases[-1] is not self.case:
-            raise NoOrbitError(f"after {self.period:g} s the ball is in {run.cases[-1].name}, not in {self.case.name}")
+            raise NoOrbitError(
+                f"after {self.period:g} s the ball is in {run.cases[-1].name}, not in "
+                f"{self.case.name}"
+            )
         x, late = run.x[-1], 0.0
         for _ in range(ITERATIONS):
             short = (self.x - x)[self.fixed] / rates(0.0, x)[self.fixed]
@@ -155,8 +181,15 @@ class Loop:
             late += short
             if not abs(late) < self.period / 4:
                 raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
-            x = np.asarray(solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RETURN_RTOL, atol=tolerance).y[:, -1])
-        changes = tuple((Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True))
+            x = np.asarray(
+                solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RETURN_RTOL, atol=tolerance).y[
+                    :, -1
+                ]
+            )
+        changes = tuple(
+            (Case(a), Case(b))
+            for a, b in zip(run.events.from_case, run.events.to_case, strict=True)
+        )
         turn = run.theta[-1] - run.theta[0] + late * (State.of(x).omega_c + run.omega_c[-1]) / 2
         return Return(x, float(self.period + late), changes, float(turn))
 
@@ -208,7 +241,8 @@ class Orbit:
 
     @cached_property
     def multipliers(self) -> npt.NDArray[np.complex128]:
-        """Floquet multipliers (d - 1,), largest modulus first, d the dimension of the case of `loop`."""
+        """Floquet multipliers (d - 1,), largest modulus first, d the dimension of the case of
+        `loop`."""
         values = np.linalg.eigvals(self.derivative).astype(complex)
         return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
 
@@ -236,28 +270,31 @@ class Orbit:
 
 
 def refine(p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 0.0) -> Orbit:
-    """The closed orbit near a state x (6 or 8 entries) with about this period, s, by Newton's method.
+    """The closed orbit near a state x (6 or 8 entries) with about this period, s, by Newton's
+    method.
 
     `restitution` as in `Settings`. The guess may be off by some percent of the orbit.
 
-    Raises `NoOrbitError` if Newton's method does not converge to `CLOSED` within `ITERATIONS` steps, or the ball
-    doesn't come back from beside the orbit, so that the return map has no derivative.
-    """
+    Raises `NoOrbitError` if Newton's method does not converge to `CLOSED` within `ITERATIONS`
+    steps, or the ball doesn't come back from beside the orbit, so that the return map has no
+    derivative."""
     return closed_orbit(Loop.of(p, x, period, restitution))
 
 
 def closed_orbit(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> Orbit:
-    """The closed orbit near a loop, by Newton's method; a parameter that is `varied` is one more unknown.
+    """The closed orbit near a loop, by Newton's method; a parameter that is `varied` is one more
+    unknown.
 
-    There is then one unknown more than equations: the place on a branch. Newton's step is the shortest one (Moore and
-    Penrose), across the branch. The `defect_jacobian` of a neighbour, if given, does until the defect falls slowly.
-    """
+    There is then one unknown more than equations: the place on a branch. Newton's step is the
+    shortest one (Moore and Penrose), across the branch. The `defect_jacobian` of a neighbour, if
+    given, does until the defect falls slowly."""
     loop, back, steps = close_loop(loop, varied, neighbour)
     return Orbit(loop, back.changes, back.turn, steps, loop.derivative())
 
 
 def close_loop(loop: Loop, varied: str | None, neighbour: Array | None) -> tuple[Loop, Return, int]:
-    """The closed loop near a loop, its return, and how many steps Newton's method took; arguments of `closed_orbit`."""
+    """The closed loop near a loop, its return, and how many steps Newton's method took; arguments
+    of `closed_orbit`."""
     before = math.inf
     for step in range(ITERATIONS + 1):
         back = loop.back()
@@ -269,17 +306,25 @@ def close_loop(loop: Loop, varied: str | None, neighbour: Array | None) -> tuple
         if size > before / FAST:
             neighbour = None
         before = size
-        matrix = defect_jacobian(loop, loop.derivative(), varied) if neighbour is None else neighbour
+        matrix = (
+            defect_jacobian(loop, loop.derivative(), varied) if neighbour is None else neighbour
+        )
         loop = loop.moved(np.asarray(-np.linalg.lstsq(matrix, defect)[0], dtype=float), varied)
     raise NoOrbitError(
-        f"after {ITERATIONS} steps an orbit of period {loop.period:g} s is open by {size:.1e} in natural units"
+        f"after {ITERATIONS} steps an orbit of period {loop.period:g} s is open by {size:.1e} in "
+        f"natural units"
     )
 
 
 def defect_jacobian(loop: Loop, derivative: Array, varied: str | None) -> Array:
-    """Derivative (d - 1, d - 1) of the gap by which a loop isn't closed; one more column if a parameter is varied."""
+    """Derivative (d - 1, d - 1) of the gap by which a loop isn't closed; one more column if a
+    parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
-    return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state
+    return (
+        np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)])
+        if varied
+        else by_state
+    )
 
 
 def extent(run: Trajectory) -> float:
@@ -287,7 +332,9 @@ def extent(run: Trajectory) -> float:
     return float((np.ptp(run.x, axis=0) / state_units(run.header.parameters)).max())
 
 
-def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int, restitution: float) -> Trajectory:
+def _simulated(
+    p: Parameters, x: npt.ArrayLike, duration: float, samples: int, restitution: float
+) -> Trajectory:
     """The motion from a state; `NoOrbitError` if it breaks down or can't begin."""
     try:
         settings = Settings(rtol=RETURN_RTOL, restitution=restitution)

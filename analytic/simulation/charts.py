@@ -1,18 +1,19 @@
-"""Coordinates in which the motion of each case is regular, and what can end it; `equations` has their rates.
+"""Coordinates in which the motion of each case is regular, and what can end it; `equations` has
+their rates.
 
-At the wall these are the active variables of the case (Table 4), except that each slip is given by its speed q and its
-direction (alpha at A, beta at B): friction depends on the direction alone, so that the rates have limits as the slip
-vanishes and q simply crosses zero. The slip of RS or SR keeps to one line, and needs no direction. In SS both pairs are
-kept, although they share slip_z = q_A cos alpha = q_B cos beta; deviations from that relation by integration errors are
-damped.
+At the wall these are the active variables of the case (Table 4), except that each slip is given by
+its speed q and its direction (alpha at A, beta at B): friction depends on the direction alone, so
+that the rates have limits as the slip vanishes and q simply crosses zero. The slip of RS or SR
+keeps to one line, and needs no direction. In SS both pairs are kept, although they share slip_z =
+q_A cos alpha = q_B cos beta; deviations from that relation by integration errors are damped.
 
-Away from the wall (RN, SN, NN) the frame rests, so that the vessel's axis is no singular point. The horizontal motion
-is kept in complex numbers: position Z = rho e^(i theta), and (a, b) along the paper's i, k becomes
-e^(i theta)(-a + i b); coordinates are their real and imaginary parts. The spin about the vertical never changes.
+Away from the wall (RN, SN, NN) the frame rests, so that the vessel's axis is no singular point. The
+horizontal motion is kept in complex numbers: position Z = rho e^(i theta), and (a, b) along the
+paper's i, k becomes e^(i theta)(-a + i b); coordinates are their real and imaginary parts. The spin
+about the vertical never changes.
 
-The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J. Compiled where numba is
-installed, like `equations`.
-"""
+The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J. Compiled
+where numba is installed, like `equations`."""
 
 from __future__ import annotations
 
@@ -65,9 +66,11 @@ ENDS = (
     (A_LANDS, B_STICKS, NONE, NONE),
     (B_LANDS, A_LANDS, NONE, NONE),
 )
-"""What can end each case, by its number; at the wall what the coordinates show first, then what forces do."""
+"""What can end each case, by its number; at the wall what the coordinates show first, then what
+forces do."""
 TURNING = ((0, 0), (0, 0), (0, 0), (0, 0), (2, 6), (4, 6), (0, 0), (5, 7), (0, 0))
-"""Of each case where among the coordinates slips begin and end that turn; each is followed by its direction."""
+"""Of each case where among the coordinates slips begin and end that turn; each is followed by its
+direction."""
 
 
 def count_guards(k: Motion) -> int:
@@ -82,14 +85,16 @@ def count_guards(k: Motion) -> int:
 
 
 def begin(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
-    """Begin a case at a moment: write coordinates z and their natural sizes; return its constants and their number."""
+    """Begin a case at a moment: write coordinates z and their natural sizes; return its constants
+    and their number."""
     if case % 3 == AWAY:
         return _begin_off_wall(case, at, k, z, scale)
     return _begin_on_wall(case, at, k, z, scale)
 
 
 def _begin_on_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
-    """As `begin`: z = (theta; omega_c, off the floor y, v_y, omega_c, slip_x; size and direction of slips; work)."""
+    """As `begin`: z = (theta; omega_c, off the floor y, v_y, omega_c, slip_x; size and direction of
+    slips; work)."""
     x, turns, side, n = at.x, case in (SS, NS), 0.0, 2
     z[0], scale[0] = at.theta, 1.0
     if case // 3 == AWAY:
@@ -98,13 +103,21 @@ def _begin_on_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tupl
     else:
         z[1], scale[1] = x.omega_c, 1 / k.unit
     if case // 3 == SLIPS:
-        z[n], scale[n], side = math.hypot(x.slip_x, x.slip_z), k.spin, math.copysign(1.0, math.sin(at.alpha))
+        z[n], scale[n], side = (
+            math.hypot(x.slip_x, x.slip_z),
+            k.spin,
+            math.copysign(1.0, math.sin(at.alpha)),
+        )
         n += 1
         if turns:
             z[n], scale[n] = at.alpha, 1.0
             n += 1
     if case % 3 == SLIPS:
-        z[n], scale[n], side = math.hypot(x.slip_y, x.slip_z), k.spin, math.copysign(1.0, math.sin(at.beta))
+        z[n], scale[n], side = (
+            math.hypot(x.slip_y, x.slip_z),
+            k.spin,
+            math.copysign(1.0, math.sin(at.beta)),
+        )
         n += 1
         if turns:
             z[n], scale[n] = at.beta, 1.0
@@ -114,12 +127,18 @@ def _begin_on_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tupl
 
 
 def _begin_off_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
-    """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point at rest; in NN y, v_y; work).
+    """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point at rest; in NN y,
+    v_y; work).
 
-    In RN the spin follows; in NN all of it rests, and with Stokes' drag the fall is known (`drag.fall`). With another
-    law c depends on all components of the velocity.
-    """
-    turn, u, speed, n, fall = cmath.exp(1j * at.theta), rigid_body.velocities(at.x, k), k.R / k.unit, 4, NO_FALL
+    In RN the spin follows; in NN all of it rests, and with Stokes' drag the fall is known
+    (`drag.fall`). With another law c depends on all components of the velocity."""
+    turn, u, speed, n, fall = (
+        cmath.exp(1j * at.theta),
+        rigid_body.velocities(at.x, k),
+        k.R / k.unit,
+        4,
+        NO_FALL,
+    )
     place, moves = (k.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k)
     z[0], z[1], z[2], z[3] = place.real, place.imag, moves.real, moves.imag
     scale[0], scale[1], scale[2], scale[3] = k.R, k.R, speed, speed
@@ -136,7 +155,8 @@ def _begin_off_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tup
 
 
 def moment(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
-    """The state with azimuth and work at a time t, from coordinates z of a case that began at the moment `at`.
+    """The state with azimuth and work at a time t, from coordinates z of a case that began at the
+    moment `at`.
 
     Or those at times (m,) from z (n, m). An azimuth off the wall is given up to whole turns.
     """
@@ -195,7 +215,8 @@ def least_slip(z: Any, scale: Any, case: int) -> float:
 
 
 def rebound_time(at: Moment, z: Any, k: Motion, rate: Any) -> float:
-    """How long a rebound that begins at a moment will last by the accelerations then, s; inf if none begins."""
+    """How long a rebound that begins at a moment will last by the accelerations then, s; inf if
+    none begins."""
     x, lasts = at.x, math.inf
     equations.rates(at.time, z, k, rate)
     if x.y == 0 < x.v_y and k.fall.landing == math.inf:
@@ -208,11 +229,11 @@ def rebound_time(at: Moment, z: Any, k: Motion, rate: Any) -> float:
 
 
 def arm_guards(values: Any, k: Motion, arm: Any, level: Any) -> bool:
-    """Set the values above which guards are armed, and those at which they fire; whether a gap is zero at first.
+    """Set the values above which guards are armed, and those at which they fire; whether a gap is
+    zero at first.
 
-    A guard that starts at zero, where round-off mustn't end the case, has to rise above the absolute tolerance first,
-    or to fall below -`rtol`; a gap is armed by any height.
-    """
+    A guard that starts at zero, where round-off mustn't end the case, has to rise above the
+    absolute tolerance first, or to fall below -`rtol`; a gap is armed by any height."""
     opens = False
     for guard in range(len(level)):
         gap = ENDS[k.case][guard] == A_LANDS or ENDS[k.case][guard] == B_LANDS

@@ -22,15 +22,17 @@ _registered = set[Callable[..., Any]]()
 """Functions that compiled ones may call."""
 
 
-def compiled(function: F, replaced: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({})) -> F:
-    """Compile a function at its first call, for threads to run it at once; without numba it stays as it is.
+def compiled(
+    function: F, replaced: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({})
+) -> F:
+    """Compile a function at its first call, for threads to run it at once; without numba it stays
+    as it is.
 
     So are the functions of `analytic` that it calls, or those by which some of them are `replaced`.
 
-    Numba keeps what it compiles on disk by name and compiles it again when its own file has changed, but not when that
-    of a function has which it calls: the name contains the digest of those. Of processes that need it at once one
-    compiles, the others take what it keeps.
-    """
+    Numba keeps what it compiles on disk by name and compiles it again when its own file has
+    changed, but not when that of a function has which it calls: the name contains the digest of
+    those. Of processes that need it at once one compiles, the others take what it keeps."""
     if numba is None or numba.config.DISABLE_JIT:
         return function
     for each, other in replaced.items():
@@ -40,7 +42,9 @@ def compiled(function: F, replaced: Mapping[Callable[..., Any], Callable[..., An
         _registered.add(register_jitable(**_CALLED)(each))
     files = sorted({each.__code__.co_filename for each in called})
     digest = hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()
-    own: Any = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
+    own: Any = FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__
+    )
     own.__qualname__, own.__doc__ = f"{function.__qualname__}_{digest[:16]}", function.__doc__
     try:
         dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(own)
@@ -53,9 +57,13 @@ def compiled(function: F, replaced: Mapping[Callable[..., Any], Callable[..., An
             with suppress(ImportError, OSError):  # no such locks here
                 import fcntl
 
-                file = stack.enter_context((Path(dispatcher.stats.cache_path) / "compiling").open("w"))
+                file = stack.enter_context(
+                    (Path(dispatcher.stats.cache_path) / "compiling").open("w")
+                )
                 fcntl.flock(file, fcntl.LOCK_EX)
-            if gc.isenabled():  # looking for garbage among all that compiling makes takes a tenth of it
+            if (
+                gc.isenabled()
+            ):  # looking for garbage among all that compiling makes takes a tenth of it
                 gc.disable()
                 stack.callback(gc.enable)
             return compile_(*given, **named)
@@ -67,11 +75,19 @@ def compiled(function: F, replaced: Mapping[Callable[..., Any], Callable[..., An
 def _called(
     function: Callable[..., Any], replaced: Mapping[Callable[..., Any], Callable[..., Any]]
 ) -> set[Callable[..., Any]]:
-    """The functions of `analytic` that a function calls, by their names or as those of a module; and so on."""
+    """The functions of `analytic` that a function calls, by their names or as those of a module;
+    and so on."""
     found, todo = set[Callable[..., Any]](), [function]
     while todo:
         code, known = (one := todo.pop()).__code__, one.__globals__
-        places = [known, *(vars(known[name]) for name in code.co_names if isinstance(known.get(name), ModuleType))]
+        places = [
+            known,
+            *(
+                vars(known[name])
+                for name in code.co_names
+                if isinstance(known.get(name), ModuleType)
+            ),
+        ]
         for each in (place.get(name) for place in places for name in code.co_names):
             each = replaced.get(each, each) if isinstance(each, FunctionType) else None
             if each and each.__module__.startswith("analytic.") and each not in found:

@@ -13,7 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.simulation.motion import Moment
-from analytic.simulation.settings import ENDLESS, LANDED, Settings, check_duration, sample_times, start_state
+from analytic.simulation.settings import (
+    ENDLESS,
+    LANDED,
+    Settings,
+    check_duration,
+    sample_times,
+    start_state,
+)
 from model import Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.errors import check_type
@@ -34,8 +41,8 @@ class Ensemble:
     case: npt.NDArray[np.int8]
     """Codes of the cases, shape (runs, samples)."""
     landings: npt.NDArray[np.int64]
-    """Landings on floor or wall since the sample before, faster than sqrt(g R)/1000, shape (runs, samples); in
-    event-driven runs by the normal impulse that it takes."""
+    """Landings on floor or wall since the sample before, faster than sqrt(g R)/1000, shape (runs,
+    samples); in event-driven runs by the normal impulse that it takes."""
     end: Array
     """When each run ended, shape (runs,), s: it was quiet, failed, or reached the last time."""
     failure: tuple[str, ...]
@@ -61,11 +68,12 @@ def simulate_many(
     x0s : starts, shape (runs, 6 or 8), or one for all
     t_end, sample_interval : s; a thousandth of t_end if None
     settings : `Settings` if None; one timestep for all where it is given
-    quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
+    quiet : end a run in which nothing has landed for that long, s; its last state stands for the
+    rest
     threads : number of threads, that of the cores if None
 
-    Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't start.
-    """
+    Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't
+    start."""
     settings = settings or Settings()
     sets = list(parameters) if isinstance(parameters, Sequence) else [parameters]
     starts = np.atleast_2d(full_state(x0s))
@@ -78,12 +86,14 @@ def simulate_many(
     count = max(len(sets), len(starts), len(flows))
     if {len(sets), len(starts), len(flows)} - {1, count}:
         raise InputError(
-            f"every run needs parameters, a start and a flow: there are {len(sets)} parameter sets, {len(starts)} "
+            f"every run needs parameters, a start and a flow: there are {len(sets)} parameter "
+            f"sets, {len(starts)} "
             f"starts and {len(flows)} flows; each must be one, or as many as the others"
         )
     sets, flows = sets * (count // len(sets)), flows * (count // len(flows))
     states = [
-        start_state(x, p, settings) for x, p in zip(np.resize(starts, (count, starts.shape[1])), sets, strict=True)
+        start_state(x, p, settings)
+        for x, p in zip(np.resize(starts, (count, starts.shape[1])), sets, strict=True)
     ]
     times = sample_times(t_end, sample_interval)
     still = np.inf if quiet is None else check_number("quiet", quiet, "s", POSITIVE)
@@ -92,7 +102,11 @@ def simulate_many(
     workers = int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True)))
 
     over, shape, t_end = np.zeros(1, bool), (count, len(times)), float(times[-1])
-    x, case, landings = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
+    x, case, landings = (
+        np.full((*shape, 8), np.nan),
+        np.full(shape, -1, np.int8),
+        np.zeros(shape, np.int64),
+    )
     x[:, 0], end, failure = states, np.zeros(count), [""] * count
     carry_out = _run_time_stepping if settings.method == "time-stepping" else _run_event_driven
 
@@ -108,7 +122,18 @@ def simulate_many(
             for n in todo:
                 if over[0]:
                     return
-                run = _Run(sets[n], states[n], fluids[n], settings, times, still, x[n], case[n], landings[n], over)
+                run = _Run(
+                    sets[n],
+                    states[n],
+                    fluids[n],
+                    settings,
+                    times,
+                    still,
+                    x[n],
+                    case[n],
+                    landings[n],
+                    over,
+                )
                 end[n], failure[n] = carry_out(run)
         except BaseException:
             over[0] = True  # nobody wants the others any more
@@ -142,9 +167,14 @@ class _Run:
 
 def _run_time_stepping(run: _Run) -> tuple[float, str]:
     """A run by time stepping, into its rows; when it ended, and why it failed, if it did."""
-    from analytic.simulation import stepping, time_stepping  # here, since numba takes a while to load
+    from analytic.simulation import (
+        stepping,
+        time_stepping,
+    )  # here, since numba takes a while to load
 
-    ball, stretches, given = time_stepping.prepared(run.x0, 0.0, run.p, run.flow, run.settings, run.times)
+    ball, stretches, given = time_stepping.prepared(
+        run.x0, 0.0, run.p, run.flow, run.settings, run.times
+    )
     none, taken = np.empty((0, 9)), np.array([1, 0])
     rows = stepping.Rows(run.x, run.case, run.landings, none, none, taken, run.quiet, run.over)
     parts, (_, _, now, _) = stepping.follow(ball, (0, 0, 0.0, 0.0), stretches, given, rows, ENDLESS)
@@ -154,13 +184,16 @@ def _run_time_stepping(run: _Run) -> tuple[float, str]:
 
 
 def _run_event_driven(run: _Run) -> tuple[float, str]:
-    """A run by event-driven simulation, into its rows; when it ended, and why it failed, if it did."""
+    """A run by event-driven simulation, into its rows; when it ended, and why it failed, if it
+    did."""
     from analytic.simulation import hybrid  # here, since scipy and numba take a while to load
 
     blow = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
     each = run.times, run.x, run.case, run.landings, hybrid.Stop(blow, run.quiet, run.over)
     given = hybrid.prepare(run.p, run.flow, run.settings, float(run.times[-1]))
-    rows, failure = hybrid.carry_out(Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Record.of, *each, whole=False))
+    rows, failure = hybrid.carry_out(
+        Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Record.of, *each, whole=False)
+    )
     last = int(rows.taken[0]) - 1
     if failure:
         return float(run.times[max(last, 0)]), f"stopped at t = {rows.reached[0]:g} s: {failure}"
@@ -169,10 +202,11 @@ def _run_event_driven(run: _Run) -> tuple[float, str]:
 
 
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
-    """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds up to sqrt(g R).
+    """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds
+    up to sqrt(g R).
 
-    omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all evenly spread.
-    """
+    omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all
+    evenly spread."""
     check_number("starts", count, "runs", Range(1, whole=True))
     rng = np.random.default_rng(seed)
     size = 2 * abs(p.omega_0) * np.array([1.0, *[p.R / p.r] * 3])
@@ -185,7 +219,8 @@ def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:
-    """Confidence interval of 95 % of a share (Clopper-Pearson); all of [0, 1] if nothing was tried."""
+    """Confidence interval of 95 % of a share (Clopper-Pearson); all of [0, 1] if nothing was
+    tried."""
     from scipy.stats import binomtest  # slow to import
 
     if of == 0:

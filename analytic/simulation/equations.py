@@ -1,9 +1,10 @@
-"""Rates of the coordinates of `charts`, and what ends a case: one text of plain floats, which numba compiles.
+"""Rates of the coordinates of `charts`, and what ends a case: one text of plain floats, which numba
+compiles.
 
-At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with h = 0; away from it
-both are written in the resting frame. `dynamics` has them for arrays of states, and test_charts holds these against it.
-A function writes what it finds into a list or an array that it is given.
-"""
+At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with
+h = 0; away from it both are written in the resting frame. `dynamics` has them for arrays of states,
+and test_charts holds these against it. A function writes what it finds into a list or an array that
+it is given."""
 
 from __future__ import annotations
 
@@ -19,18 +20,21 @@ RR, RS, RN, SR, SS, SN, NR, NS, NN = (int(case) for case in Case)
 A_STICKS, B_STICKS, A_SLIPS, B_SLIPS, A_LIFTS, B_OPENS, A_LANDS, B_LANDS, RR_ENDS = range(9)
 """What ends a case."""
 ROLLS, SLIPS, AWAY = range(3)
-"""Contacts: that with the floor is a case's number divided by three, that with the wall the remainder."""
+"""Contacts: that with the floor is a case's number divided by three, that with the wall the
+remainder."""
 FINER = 1e3
 """Relative tolerance of an integrator divided by the absolute one in natural units."""
 LOCAL = 0.25
 """Tolerance of a step relative to that asked for: errors of many steps add up."""
 ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
-"""Slip that has just set in, and below which its direction may be stiff, relative to the spin of rolling at sqrt(g R).
-"""
+"""Slip that has just set in, and below which its direction may be stiff, relative to the spin of
+rolling at sqrt(g R). """
 PATIENCE = 300
-"""Steps with a small slip after which a stiff method takes over; a slip that dies out takes fewer."""
+"""Steps with a small slip after which a stiff method takes over; a slip that dies out takes
+fewer."""
 STABILITY, FEASIBILITY = range(2)
-"""What `leave_rolling` of `Settings` asks of RR: that slip dies out, or only that forces hold it."""
+"""What `leave_rolling` of `Settings` asks of RR: that slip dies out, or only that forces hold
+it."""
 
 
 class Line(NamedTuple):
@@ -73,8 +77,9 @@ class Motion(NamedTuple):
     stokes: bool
     """Whether that is Stokes'."""
     rtol: float
-    """Tolerance of the integrator; the slip in natural units, too, below which the turning rate of its direction is
-    capped: the rate is inverse to the slip, and directions settle before the slip vanishes."""
+    """Tolerance of the integrator; the slip in natural units, too, below which the turning rate of
+    its direction is capped: the rate is inverse to the slip, and directions settle before the slip
+    vanishes."""
     restitution: float
     leaves: int
     """`STABILITY` or `FEASIBILITY`."""
@@ -92,7 +97,8 @@ class Motion(NamedTuple):
 
 
 def in_case(k: Motion, case: int, side: float, line: Line, fall: Fall) -> Motion:
-    """The constants of the motion, changed to another case, side, line of the flow or known fall."""
+    """The constants of the motion, changed to another case, side, line of the flow or known
+    fall."""
     return Motion(
         k.m, k.r, k.R, k.j, k.mu, k.eta, k.g, k.c, k.law, k.stokes, k.rtol, k.restitution, k.leaves, k.unit, k.spin,
         k.waves, line, case, side, fall,
@@ -149,7 +155,8 @@ def forces(case: int, omega_c: float, v_y: float, w_x: float, c: float, lag: flo
 
 
 def _wall_state(z: Any, k: Motion) -> tuple[float, ...]:
-    """Of a ball at the wall: omega_c, v_y, slip_x, slip_z, q_A, sin and cos of alpha, q_B, those of beta, slip_y."""
+    """Of a ball at the wall: omega_c, v_y, slip_x, slip_z, q_A, sin and cos of alpha, q_B, those of
+    beta, slip_y."""
     v_y = w_x = w_z = q_A = s_A = c_A = q_B = s_B = c_B = 0.0
     omega_c = z[1]
     if k.case == SR:
@@ -227,11 +234,17 @@ def guards(t: float, z: Any, k: Motion, out: Any) -> None:
     if k.case == RS:
         out[0], out[1] = q_B / k.spin, (k.mu * A_y - math.sqrt(A_x * A_x + A_z * A_z)) / G
     elif k.case == SR:
-        out[0], out[1], out[2] = q_A / k.spin, (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G, A_y / G
+        out[0], out[1], out[2] = (
+            q_A / k.spin,
+            (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G,
+            A_y / G,
+        )
     elif k.case == SS:
         out[0], out[1], out[2], out[3] = q_A / k.spin, q_B / k.spin, A_y / G, B_x / G
     else:
-        slips = q_B / k.spin if k.case == NS else (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
+        slips = (
+            q_B / k.spin if k.case == NS else (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
+        )
         out[0], out[1] = z[1] / k.R, slips
 
 
@@ -243,19 +256,24 @@ def loads(omega_c: float, t: float, k: Motion) -> tuple[float, float]:
 
 
 def last_share(u: float, z: float, k: Motion) -> float:
-    """B_y in units of the weight at which RR ends, from its loads, as `rolling_forces._last_share`."""
+    """B_y in units of the weight at which RR ends, from its loads, as
+    `rolling_forces._last_share`."""
     at_B = (1 + k.j) * u
     return min(max(at_B - _normal_forces(at_B, z, k.eta)[0], 0.0), k.j * u)
 
 
 def slip_margin(u: float, z: float, k: Motion) -> float:
-    """How far RR is from a slip that lasts, in units of the weight, from its loads, as `rolling_forces.slip_margin`."""
+    """How far RR is from a slip that lasts, in units of the weight, from its loads, as
+    `rolling_forces.slip_margin`."""
     share = last_share(u, z, k)
-    return min(k.eta * (1 + k.j) * u - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z))
+    return min(
+        k.eta * (1 + k.j) * u - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z)
+    )
 
 
 def rolls_on(omega_c: float, t: float, k: Motion) -> float:
-    """How far RR is from where it is left, >= 0 while it lasts: `slip_margin`, or `rolling_forces.margin`."""
+    """How far RR is from where it is left, >= 0 while it lasts: `slip_margin`, or
+    `rolling_forces.margin`."""
     u, z = loads(omega_c, t, k)
     if k.leaves == STABILITY:
         return slip_margin(u, z, k)
@@ -277,7 +295,8 @@ def _normal_forces(d: float, z: float, friction: float) -> tuple[float, float]:
 
 
 def _horizontal_drag(t: float, z: Any, rise: float, k: Motion) -> tuple[complex, complex, float]:
-    """Off the wall: complex horizontal velocity, that relative to the fluid, m s-1, and the drag rate c(|w|), s-1."""
+    """Off the wall: complex horizontal velocity, that relative to the fluid, m s-1, and the drag
+    rate c(|w|), s-1."""
     V = complex(z[2], z[3])
     lag = V - 1j * fluid(t, k) * complex(z[0], z[1])
     return V, lag, drag_rate(lag.real, rise, lag.imag, k)
@@ -298,7 +317,11 @@ def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
         friction = -k.mu * k.g * along
         turning = (push + (1 + 1 / k.j) * friction) / along
         push += friction
-        out[4], out[5], last = turning.real, turning.imag / max(z[4], k.rtol * math.sqrt(k.R * k.g)), 6
+        out[4], out[5], last = (
+            turning.real,
+            turning.imag / max(z[4], k.rtol * math.sqrt(k.R * k.g)),
+            6,
+        )
     elif k.fall.landing == math.inf:
         out[4], out[5], last = rise, -k.g - c * rise, 6
     out[0], out[1], out[2], out[3], out[last] = V.real, V.imag, push.real, push.imag, power
@@ -321,13 +344,21 @@ def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
 def fall_speed(t: float, k: Motion) -> float:
     """v_y of a free flight with Stokes' drag at a time, m s-1, as `drag.fall_speed`."""
     since, v_y, _ = k.fall
-    return v_y - (k.c * v_y + k.g) * (math.expm1(-k.c * (t - since)) / -k.c if k.c > 0 else t - since)
+    return v_y - (k.c * v_y + k.g) * (
+        math.expm1(-k.c * (t - since)) / -k.c if k.c > 0 else t - since
+    )
 
 
 def smooth_rates(u: Velocities, h: float, t: float, k: Motion) -> Velocities:
-    """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the gap at B."""
+    """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the
+    gap at B."""
     turn, w_k = u.v_k / (k.R - h), u.v_k - fluid(t, k) * (k.R - h)
     c = drag_rate(u.v_h, u.v_y, w_k, k)
     return Velocities(
-        -turn * u.v_k - c * u.v_h, -k.g - c * u.v_y, turn * u.v_h - c * w_k, -turn * u.o_z, 0.0, turn * u.o_x
+        -turn * u.v_k - c * u.v_h,
+        -k.g - c * u.v_y,
+        turn * u.v_h - c * w_k,
+        -turn * u.o_z,
+        0.0,
+        turn * u.o_x,
     )

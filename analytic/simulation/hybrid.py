@@ -1,10 +1,9 @@
 """Event-driven simulation: each case by its own equations, from one change of case to the next.
 
-`follow` goes along the coordinates of `charts` up to the guard that turns negative first, and `transitions` says how to
-go on. One text: where numba is installed it is compiled with the steps of `solvers`, so that a run is one call, which
-threads can make at once; else, and where those steps become too short, it is plain Python with the steps of
-`integrator`.
-"""
+`follow` goes along the coordinates of `charts` up to the guard that turns negative first, and
+`transitions` says how to go on. One text: where numba is installed it is compiled with the steps of
+`solvers`, so that a run is one call, which threads can make at once; else, and where those steps
+become too short, it is plain Python with the steps of `integrator`."""
 
 from __future__ import annotations
 
@@ -22,7 +21,15 @@ from analytic.mechanics.rigid_body import Forces
 from analytic.simulation import charts, compiling, equations, motion, solvers, transitions
 from analytic.simulation.charts import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
-from analytic.simulation.integrator import DONE, FIRED, STUCK, StalledError, Stretch, first_pace, stretch
+from analytic.simulation.integrator import (
+    DONE,
+    FIRED,
+    STUCK,
+    StalledError,
+    Stretch,
+    first_pace,
+    stretch,
+)
 from analytic.simulation.motion import Moment, Recorder
 from analytic.simulation.settings import ENDLESS, Settings
 from model import Case, Contact, Flow, Parameters, State
@@ -73,29 +80,37 @@ class Record(NamedTuple):
     z: Array
     """For coordinates of samples that are not kept yet (n * MOST,)."""
     events: Array
-    """Times, cases before and after, impulses (m, 9), from the last look on; none where nobody wants them."""
+    """Times, cases before and after, impulses (m, 9), from the last look on; none where nobody
+    wants them."""
     taken: npt.NDArray[np.int64]
     """How many samples are kept, and how many events, shape (2,)."""
     reached: Array
-    """How far the run is, and the sample at which it is stopped if nothing more lands, shape (2,), s."""
+    """How far the run is, and the sample at which it is stopped if nothing more lands, shape (2,),
+    s."""
     stop: Stop
 
     @classmethod
     def of(cls, times: Array, x: Array, case: Any, landings: Any, stop: Stop, whole: bool) -> Self:
-        """A new record that fills the arrays given; paths and events are kept only if the `whole` run is wanted."""
+        """A new record that fills the arrays given; paths and events are kept only if the `whole`
+        run is wanted."""
         n, events = (len(times), 3 * STRIDES) if whole else (0, 0)
         path, z = np.empty((n, 5)), np.empty(len(times) * charts.MOST)
         reached = [0.0, _quiet_from(0.0, times, stop.quiet)]
         landings[:] = 0
         taken = np.zeros(2, np.int64)
-        return cls(times, x, case, landings, path, z, np.empty((events, 9)), taken, np.array(reached), stop)
+        return cls(
+            times, x, case, landings, path, z, np.empty((events, 9)), taken, np.array(reached), stop
+        )
 
 
-def run_through_flow(stage: Stage, k: Motion, pieces: Any, run: Record, strides: int, steps: int) -> tuple[Any, ...]:
-    """Follow a run to its last sample, to where it is stopped, or for some strides: whether it is over, and its stage.
+def run_through_flow(
+    stage: Stage, k: Motion, pieces: Any, run: Record, strides: int, steps: int
+) -> tuple[Any, ...]:
+    """Follow a run to its last sample, to where it is stopped, or for some strides: whether it is
+    over, and its stage.
 
-    The stage is in parts, plain tuples: a signal would be answered while numba makes named ones, which doesn't look
-    whether it has got them.
+    The stage is in parts, plain tuples: a signal would be answered while numba makes named ones,
+    which doesn't look whether it has got them.
 
     pieces : rows of start, end, the `equations.Line` of the flow, and whether it jumps at the start
     steps : in a stride, at most
@@ -104,7 +119,9 @@ def run_through_flow(stage: Stage, k: Motion, pieces: Any, run: Record, strides:
     for n in range(max(begun - 1, 0), len(pieces)):
         piece = pieces[n]
         end = piece[1]
-        k = equations.in_case(k, k.case, k.side, equations.Line(piece[2], piece[3], piece[4]), k.fall)
+        k = equations.in_case(
+            k, k.case, k.side, equations.Line(piece[2], piece[3], piece[4]), k.fall
+        )
         if begun <= n:
             begun = n + 1
             if case == NONE or piece[5] != 0:
@@ -135,8 +152,11 @@ def _moment_parts(at: Moment) -> tuple[Any, ...]:
     return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
 
 
-def follow(case: int, at: Moment, until: float, k: Motion, run: Record, steps: int) -> tuple[int, Moment]:
-    """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and the moment then."""
+def follow(
+    case: int, at: Moment, until: float, k: Motion, run: Record, steps: int
+) -> tuple[int, Moment]:
+    """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and
+    the moment then."""
     room = np.empty((6, charts.MOST))
     k, n = charts.begin(case, at, k, room[0], room[1])
     z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], charts.count_guards(k)
@@ -144,10 +164,14 @@ def follow(case: int, at: Moment, until: float, k: Motion, run: Record, steps: i
     lands, until = k.fall.landing <= until, min(until, k.fall.landing)
     equations.guards(at.time, z, k, values)
     opens, lasts = charts.arm_guards(values, k, arm, level), charts.rebound_time(at, z, k, rate)
-    pace = first_pace(at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0)
+    pace = first_pace(
+        at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0
+    )
     if run.taken[0] == 0:
         _keep_sample(at, k, run)
-    of = Stretch(k, until, z, scale, run.times, run.z[: n * len(run.times)].reshape(-1, n), arm, level)
+    of = Stretch(
+        k, until, z, scale, run.times, run.z[: n * len(run.times)].reshape(-1, n), arm, level
+    )
     why, pace, guard, taken = stretch(of, pace, run.taken[0], steps)
     near = keep_samples(of, at, taken, run)
     now = until if why == DONE else max(pace[0] + pace[1], run.times[taken - 1])
@@ -161,7 +185,8 @@ def follow(case: int, at: Moment, until: float, k: Motion, run: Record, steps: i
 
 
 def _with_nearest_azimuth(at: Moment, k: Motion, near: float) -> Moment:
-    """The same moment; of the azimuths that it may have off the wall that which is nearest to another."""
+    """The same moment; of the azimuths that it may have off the wall that which is nearest to
+    another."""
     if k.case % 3 != AWAY:
         return at
     theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
@@ -169,7 +194,8 @@ def _with_nearest_azimuth(at: Moment, k: Motion, near: float) -> Moment:
 
 
 def keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
-    """Store samples up to number `taken` of a stretch that began at `at`; return the azimuth at the last, or `at`'s."""
+    """Store samples up to number `taken` of a stretch that began at `at`; return the azimuth at the
+    last, or `at`'s."""
     k, these, near = of.k, slice(int(run.taken[0]), taken), at.theta
     if taken > these.start:
         t = run.times[these]
@@ -177,7 +203,13 @@ def keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
         run.x[these], run.case[these], run.taken[0] = m.x.stacked(), k.case, taken
         if len(run.path):
             theta = np.unwrap(np.append(near, m.theta))[1:] if k.case % 3 == AWAY else m.theta
-            columns = theta, m.alpha, m.beta, m.work, [equations.fluid(time, k) for time in t.tolist()]
+            columns = (
+                theta,
+                m.alpha,
+                m.beta,
+                m.work,
+                [equations.fluid(time, k) for time in t.tolist()],
+            )
             run.path[these] = np.stack(np.broadcast_arrays(*columns), axis=-1)
             near = float(run.path[taken - 1, 0])
     return near
@@ -187,7 +219,9 @@ def _keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
     """`keep_samples` in a form that numba compiles."""
     near = at.theta
     for row in range(run.taken[0], taken):
-        m = _with_nearest_azimuth(charts.moment(run.times[row], of.samples[row], at, of.k), of.k, near)
+        m = _with_nearest_azimuth(
+            charts.moment(run.times[row], of.samples[row], at, of.k), of.k, near
+        )
         near = m.theta
         _keep_sample(m, of.k, run)
     return near
@@ -220,34 +254,52 @@ def _keep_event(run: Record, at: Moment, case: int, after: int, impulse: Forces)
 
 
 def _quiet_from(landed: float, times: Array, quiet: float) -> float:
-    """Time of the first sample at which nothing has landed for `quiet` seconds, if nothing does from now on; or inf."""
+    """Time of the first sample at which nothing has landed for `quiet` seconds, if nothing does
+    from now on; or inf."""
     row = np.searchsorted(times, landed + quiet, side="right")
     return float(times[row]) if row < len(times) else math.inf
 
 
-run_compiled = compiling.compiled(run_through_flow, {stretch: solvers.stretch, keep_samples: _keep_samples})
+run_compiled = compiling.compiled(
+    run_through_flow, {stretch: solvers.stretch, keep_samples: _keep_samples}
+)
 
 
 @lru_cache
 def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[Motion, Array]:
-    """What runs of one ball in one flow share: constants of the motion, and pieces of the flow as rows of an array."""
+    """What runs of one ball in one flow share: constants of the motion, and pieces of the flow as
+    rows of an array."""
     k, rows = motion.of_ball(p, flow, settings), []
     for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
         jump = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
-        rows.append([start, end, *motion.line_of(flow, start), float(jump > _LEAST_JUMP * np.abs(flow.value).max())])
+        rows.append(
+            [
+                start,
+                end,
+                *motion.line_of(flow, start),
+                float(jump > _LEAST_JUMP * np.abs(flow.value).max()),
+            ]
+        )
     return k, np.array(rows)
 
 
 def carry_out(
-    start: Moment, k: Motion, pieces: Array, rows: Callable[[], Record], look: Callable[[Record], None] | None = None
+    start: Moment,
+    k: Motion,
+    pieces: Array,
+    rows: Callable[[], Record],
+    look: Callable[[Record], None] | None = None,
 ) -> tuple[Record, Exception | None]:
-    """Simulate a run into new arrays; return these and the error it broke down with, or None; `look` sees progress.
+    """Simulate a run into new arrays; return these and the error it broke down with, or None;
+    `look` sees progress.
 
     In plain Python where the compiled text isn't there or can't go on.
     """
     failure: Exception | None = None
     for way in dict.fromkeys((run_compiled, run_through_flow)):
-        waves = k.waves if way is run_through_flow else np.array(k.waves, dtype=float).reshape(-1, 3)
+        waves = (
+            k.waves if way is run_through_flow else np.array(k.waves, dtype=float).reshape(-1, 3)
+        )
         run, stage, done = rows(), Stage(start), False
         try:
             while not done:
@@ -265,12 +317,14 @@ def carry_out(
     return run, failure
 
 
-def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
-    """Simulate a run, event-driven, from state x0 and azimuth theta_0, and write it to the recorder.
+def run(
+    x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder
+) -> None:
+    """Simulate a run, event-driven, from state x0 and azimuth theta_0, and write it to the
+    recorder.
 
-    Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the sequence of cases gets
-    stuck.
-    """
+    Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the
+    sequence of cases gets stuck."""
     times, events = recorder.times, recorder.events
 
     def rows() -> Record:
@@ -283,7 +337,9 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
         count, run.taken[1] = int(run.taken[1]), 0
         recorder.note(run.events[:count], float(run.reached[0]))
 
-    done, failure = carry_out(Moment(0.0, theta_0, x0), *prepare(p, flow, settings, float(times[-1])), rows, look)
+    done, failure = carry_out(
+        Moment(0.0, theta_0, x0), *prepare(p, flow, settings, float(times[-1])), rows, look
+    )
     events += done.events[: done.taken[1]].tolist()
     recorder.time = max(recorder.time, float(done.reached[0]))
     if count := int(done.taken[0]):

@@ -1,9 +1,9 @@
-"""Steps through one case, up to the first guard that fires, where they aren't compiled: those of scipy.
+"""Steps through one case, up to the first guard that fires, where they aren't compiled: those of
+scipy.
 
-By LSODA, except while a slip is small: its direction is stiff then, which LSODA doesn't detect where hardly anything
-else moves, and BDF takes over. Where both need tiny steps because only round-off is left, the motion is continued along
-a straight line.
-"""
+By LSODA, except while a slip is small: its direction is stiff then, which LSODA doesn't detect
+where hardly anything else moves, and BDF takes over. Where both need tiny steps because only
+round-off is left, the motion is continued along a straight line."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ MAX_RESTARTS = 20
 """How often in one stretch a solver may fail; the other one then takes over."""
 EPS = math.ulp(1.0)
 Pace = tuple[float, float, float, bool, int]
-"""How the steps of a stretch go on: a time, s, from which tau counts, since directions settle in less than the
-round-off of the time of the run; tau; length of the next step, 0 if one is to be found; whether a slip is small;
-strides since it was not."""
+"""How the steps of a stretch go on: a time, s, from which tau counts, since directions settle in
+less than the round-off of the time of the run; tau; length of the next step, 0 if one is to be
+found; whether a slip is small; strides since it was not."""
 
 
 class Stretch(NamedTuple):
@@ -46,7 +46,8 @@ class Stretch(NamedTuple):
     samples: Array
     """Coordinates then (m, n)."""
     arm: Array
-    """Above which values guards are armed, and at which they fire (guards,), as `charts.arm_guards` says."""
+    """Above which values guards are armed, and at which they fire (guards,), as `charts.arm_guards`
+    says."""
     level: Array
 
 
@@ -54,14 +55,18 @@ class StalledError(ArithmeticError):
     """A solver can't go on, or the run makes no progress."""
 
 
-def first_pace(start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float) -> Pace:
-    """How steps begin in a stretch (a `Pace`); if a contact `opens`, a straight line is tried at once."""
+def first_pace(
+    start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float
+) -> Pace:
+    """How steps begin in a stretch (a `Pace`); if a contact `opens`, a straight line is tried at
+    once."""
     small = least_slip(z, scale, case) < ONSET_SLIP
     return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 
 
 def finish_straight(t: float, of: Stretch, taken: int) -> int:
-    """Fill in the rest of a stretch if a straight line solves its equations and no guard fires: samples taken, else -1.
+    """Fill in the rest of a stretch if a straight line solves its equations and no guard fires:
+    samples taken, else -1.
 
     What moves by less than the tolerance is taken to rest.
     """
@@ -95,11 +100,11 @@ def finish_straight(t: float, of: Stretch, taken: int) -> int:
 
 
 def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
-    """Integrate a case for at most so many steps: why that ended, the pace, the guard, and how many samples are taken.
+    """Integrate a case for at most so many steps: why that ended, the pace, the guard, and how many
+    samples are taken.
 
-    Where a solver's steps become shorter than its time can resolve, the other one goes on with a time that starts from
-    zero again; after `MAX_RESTARTS` it is stuck.
-    """
+    Where a solver's steps become shorter than its time can resolve, the other one goes on with a
+    time that starts from zero again; after `MAX_RESTARTS` it is stuck."""
     start, tau, first, small, slow = pace
     t, steps, failures = start + tau, 0, 0
     if slow and (end := finish_straight(t, of, taken)) >= 0:
@@ -127,8 +132,11 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
     return DONE, pace, -1, taken
 
 
-def _steps(method: Any, start: float, of: Stretch, taken: int, first: float) -> Iterator[tuple[float, int, int]]:
-    """Steps of one of scipy's solvers: time, guard that fired or -1, samples taken. Its own time begins at 0."""
+def _steps(
+    method: Any, start: float, of: Stretch, taken: int, first: float
+) -> Iterator[tuple[float, int, int]]:
+    """Steps of one of scipy's solvers: time, guard that fired or -1, samples taken. Its own time
+    begins at 0."""
     k, until, z, scale, times, samples, arm, level = of
     least, armed, levels = np.array(scale), arm.tolist(), level.tolist()
     least[slice(*TURNING[k.case], 2)] *= k.rtol
@@ -146,9 +154,9 @@ def _steps(method: Any, start: float, of: Stretch, taken: int, first: float) -> 
     def jacobian(t: float, z: Array) -> Array:
         """By forward differences, small relative to each coordinate or its natural size.
 
-        Relative to a slip itself down to a floor, for its direction may be a steep function of it. (The differences
-        of scipy grow with each call for a coordinate that the rates don't depend on, until they overflow.)
-        """
+        Relative to a slip itself down to a floor, for its direction may be a steep function of it.
+        (The differences of scipy grow with each call for a coordinate that the rates don't depend
+        on, until they overflow.)"""
         shift = math.sqrt(EPS) * np.maximum(np.abs(z), least)
         beside = np.array([rates(t, shifted) for shifted in z + np.diag(shift)])
         return np.asarray((beside - np.array(rates(t, z))).T / shift)
@@ -190,8 +198,16 @@ def _steps(method: Any, start: float, of: Stretch, taken: int, first: float) -> 
             return
 
 
-def _root(guard: int, guards: Any, between: Callable[[float], Array], level: float, start: float, end: float) -> float:
-    """When within (start, end) a guard fell through its level; the interpolant may miss the ends by round-off."""
+def _root(
+    guard: int,
+    guards: Any,
+    between: Callable[[float], Array],
+    level: float,
+    start: float,
+    end: float,
+) -> float:
+    """When within (start, end) a guard fell through its level; the interpolant may miss the ends by
+    round-off."""
 
     def value(t: float) -> float:
         return float(guards(t, between(t))[guard]) - level

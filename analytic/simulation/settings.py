@@ -21,7 +21,8 @@ ENDLESS = 2**62
 LANDED = 1e-3
 """Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
 HUGE, MAX_RADIANS = 1e3, 1e5
-"""Speed of a flow in units of sqrt(g/R), beyond which so many radians of it are simulated at most."""
+"""Speed of a flow in units of sqrt(g/R), beyond which so many radians of it are simulated at
+most."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,23 +33,28 @@ class Settings:
     """
 
     method: str = "event"
-    """``event``: integrate case by case and locate every change of case. ``time-stepping``: Moreau-Jean, see there."""
+    """``event``: integrate case by case and locate every change of case. ``time-stepping``:
+    Moreau-Jean, see there."""
     rtol: float = 1e-9
-    """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in natural units: lengths in
-    R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at sqrt(g R)."""
+    """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in
+    natural units: lengths in R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at
+    sqrt(g R)."""
     timestep: float | None = None
-    """Longest time step, s, at most half of `model.time_scales.shortest_time`; sqrt(R/g)/500, or that half if it is
-    shorter, if None (time-stepping)."""
+    """Longest time step, s, at most half of `model.time_scales.shortest_time`; sqrt(R/g)/500, or
+    that half if it is shorter, if None (time-stepping)."""
     restitution: float = 0.0
-    """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1. A ball that hops in the corner is slow
-    (event): a series of hops on the floor takes about ln(rtol)/ln(e) impacts, of which each takes about a millisecond,
-    and each hit of the wall, itself one of a series, starts another. At e = 0.9 there may be 1e4."""
+    """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1. A ball that hops in the
+    corner is slow (event): a series of hops on the floor takes about ln(rtol)/ln(e) impacts, of
+    which each takes about a millisecond, and each hit of the wall, itself one of a series, starts
+    another. At e = 0.9 there may be 1e4."""
     leave_rolling: str = "slip-stability"
-    """When RR ends, whose forces are not determined (event). ``slip-stability``: as soon as a slight slip would last,
-    Definitions 1-3 (docs/theory.md, section 7). ``infeasible``: when no forces within both Coulomb cones hold it. On
-    the stationary orbit both are the same for mu <= 1; on rougher floors, and off it, the second is later."""
+    """When RR ends, whose forces are not determined (event). ``slip-stability``: as soon as a
+    slight slip would last, Definitions 1-3 (docs/theory.md, section 7). ``infeasible``: when no
+    forces within both Coulomb cones hold it. On the stationary orbit both are the same for mu <= 1;
+    on rougher floors, and off it, the second is later."""
     initial_impact: bool = False
-    """Let a ball that starts with a speed into a closed contact collide at once, instead of refusing it."""
+    """Let a ball that starts with a speed into a closed contact collide at once, instead of
+    refusing it."""
 
     def __post_init__(self) -> None:
         check_choice("method", self.method, ("event", "time-stepping"))
@@ -64,8 +70,8 @@ class Settings:
 def check_duration(p: Parameters, flow: Flow, t_end: float) -> None:
     """Raise `InputError` if a run in a huge flow is too long to be computed.
 
-    That is `MAX_RADIANS`, of the orbit or of waves, where they are more than `HUGE` times as fast as sqrt(g/R).
-    """
+    That is `MAX_RADIANS`, of the orbit or of waves, where they are more than `HUGE` times as fast
+    as sqrt(g/R)."""
     shortest, name = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
     if "omega_0" in name or "pi f" in name:
         meaning = f"with {name} = {shortest:.3g} s, so much shorter than sqrt(R/g), it"
@@ -77,7 +83,8 @@ def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
     """The state at the start, or `InputError` if the ball can't be in it."""
     if settings.method == "event" and p.fluid_torque:
         raise InputError(
-            f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque out; "
+            f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque "
+            f"out; "
             "method = 'time-stepping' takes it"
         )
     x = State.one(x0)
@@ -85,7 +92,9 @@ def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
     if not settings.initial_impact:
         for place, gap, name, speed in (("floor", x.y, "v_y", x.v_y), ("wall", x.h, "v_h", x.v_h)):
             if gap == 0:
-                meaning = f"to begin on the {place} without an impact (initial_impact of Settings) it"
+                meaning = (
+                    f"to begin on the {place} without an impact (initial_impact of Settings) it"
+                )
                 check_number(name, speed, "m s-1", NOT_NEGATIVE, meaning)
     return x
 

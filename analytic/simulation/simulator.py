@@ -39,22 +39,22 @@ def simulate(
     x0 : state at the start, a `State` or 6 or 8 numbers in its order; its case follows from it
     t_end : duration, s
     settings : `Settings` if None
-    sample_interval : time between samples, s; a thousandth of t_end if None. The end is always a sample.
+    sample_interval : time between samples, s; a thousandth of t_end if None. The end is always a
+    sample.
     theta_0 : azimuth at the start, rad
-    progress : called with the fraction done, from time to time; ends the run where it raises `InterruptedError`
+    progress : called with the fraction done, from time to time; ends the run where it raises
+    `InterruptedError`
     changes : any field of `Settings` by name, in place of that in `settings`
 
     Returns
     -------
-    Trajectory
-        Its header has the largest error of the energy balance (``energy_residual`` in J, beside ``energy_scale``,
-        the largest energy in play).
+    Trajectory Its header has the largest error of the energy balance (``energy_residual`` in J,
+        beside ``energy_scale``, the largest energy in play).
 
     Raises
     ------
-    InputError
-        If an argument is of another type or out of range, or the ball starts inside floor or wall, or with a speed into
-        one it touches (unless ``initial_impact``).
+    InputError If an argument is of another type or out of range, or the ball starts inside floor or
+        wall, or with a speed into one it touches (unless ``initial_impact``).
     SimulationError
         If the run can't go on, or `progress` ends it; it carries the samples so far.
     """
@@ -64,7 +64,9 @@ def simulate(
     check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     settings = dataclasses.replace(settings or Settings(), **changes)
     if settings.method == "event":
-        from analytic.simulation.hybrid import run  # here, because the integrators of scipy take half a second to load
+        from analytic.simulation.hybrid import (
+            run,
+        )  # here, because the integrators of scipy take half a second to load
     else:
         from analytic.simulation.time_stepping import run
     flow = Flow.steady(p.omega_0) if flow is None else flow
@@ -73,22 +75,29 @@ def simulate(
     check_duration(p, flow, float(times[-1]))
     theta_0 = check_number("theta_0", theta_0, "rad")
     start, (first, second, *_) = {"x0": list(x), "theta_0": theta_0}, times.tolist()
-    shown = dataclasses.asdict(settings) | start | {"t_end": float(times[-1]), "sample_interval": second - first}
+    shown = (
+        dataclasses.asdict(settings)
+        | start
+        | {"t_end": float(times[-1]), "sample_interval": second - first}
+    )
     recorder = Recorder(p, times, progress)
     header = Header(settings.method, p, flow, shown)
     try:
         run(x, theta_0, p, flow, settings, recorder)
     except (ArithmeticError, InterruptedError) as error:
         failure = f"stopped at t = {recorder.time:g} s: {error}"
-        raise SimulationError(failure, recorder.trajectory(dataclasses.replace(header, failure=failure))) from error
+        raise SimulationError(
+            failure, recorder.trajectory(dataclasses.replace(header, failure=failure))
+        ) from error
     return recorder.trajectory(header)
 
 
 def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> Trajectory:
-    """The stationary orbit of NR, pushed into NS by a slip of `slip` rad/s along beta: Figs. 4 and 5.
+    """The stationary orbit of NR, pushed into NS by a slip of `slip` rad/s along beta: Figs. 4 and
+    5.
 
-    For omega_0 > sqrt(g/(eta R)) (61) slip dies out and the ball returns to NR (Fig. 4), else it grows (Fig. 5).
-    """
+    For omega_0 > sqrt(g/(eta R)) (61) slip dies out and the ball returns to NR (Fig. 4), else it
+    grows (Fig. 5)."""
     orbit = stationary.solution(p, Case.NR, formal=True).state
     clear = 1.0  # height in m: Figs. 4 and 5 leave the floor out
     x = orbit._replace(y=clear, slip_y=slip * math.sin(beta), slip_z=slip * math.cos(beta))
@@ -96,10 +105,11 @@ def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> 
 
 
 def unloading(p: Parameters, hold: float) -> Trajectory:
-    """omega_0 lowered in steps through omega_02 with the ball riding the wall: the black dot of Fig. 13 (eta > j).
+    """omega_0 lowered in steps through omega_02 with the ball riding the wall: the black dot of
+    Fig. 13 (eta > j).
 
-    NR is left for NS, the ball falls, hits the floor, and ends in RR: the transients and impacts of section 5.3.
-    """
+    NR is left for NS, the ball falls, hits the floor, and ends in RR: the transients and impacts of
+    section 5.3."""
     limit = bifurcation.thresholds(p).omega_02
     levels = limit * np.array([1.2, 1.1, 1.02, 0.98])
     start = stationary.solution(p.replace(omega_0=float(levels[0])), Case.NR).state._replace(y=0.02)

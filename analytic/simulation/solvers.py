@@ -1,10 +1,10 @@
 """Steps through one case, compiled by numba, and the moments at which it ends.
 
-`_explicit_steps` is Dormand and Prince's method of order 8, with the coefficients and the dense output of
-`scipy.integrate.DOP853`; guards are looked at four times in each step. `_implicit_steps` is for a slip that has just
-set in, whose direction is stiff: linearly implicit Euler steps, extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505;
-Hairer & Wanner, Solving ODEs II, IV.9). Its steps end at samples, and are taken anew to end at a guard.
-"""
+`_explicit_steps` is Dormand and Prince's method of order 8, with the coefficients and the dense
+output of `scipy.integrate.DOP853`; guards are looked at four times in each step. `_implicit_steps`
+is for a slip that has just set in, whose direction is stiff: linearly implicit Euler steps,
+extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer & Wanner, Solving ODEs II, IV.9). Its steps
+end at samples, and are taken anew to end at a guard."""
 
 from __future__ import annotations
 
@@ -16,16 +16,28 @@ from scipy.integrate import DOP853
 
 from analytic.simulation import charts, equations
 from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, Motion
-from analytic.simulation.integrator import DONE, EPS, FIRED, PAUSED, STUCK, Pace, Stretch, finish_straight
+from analytic.simulation.integrator import (
+    DONE,
+    EPS,
+    FIRED,
+    PAUSED,
+    STUCK,
+    Pace,
+    Stretch,
+    finish_straight,
+)
 from model.arrays import Array
 
-A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D"))
+A, B, C, E3, E5, D = (
+    np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D")
+)
 A_MORE, C_MORE = np.ascontiguousarray(DOP853.A_EXTRA), np.ascontiguousarray(DOP853.C_EXTRA)
 STAGES, ALL = len(B), len(B) + 1 + len(C_MORE)
 GROWN_SLIP = 1e-4
 """Slip from which on steps that are short cost less than stiff ones."""
 FINEST, FINEST_STIFF = 1e-13, 1e-11
-"""Least relative tolerances: what round-off leaves of explicit steps, and of those of a small slip."""
+"""Least relative tolerances: what round-off leaves of explicit steps, and of those of a small
+slip."""
 OTHER = 4
 """Why steps return beside what `integrator.stretch` says: as the other method should go on."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
@@ -33,10 +45,11 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 LOOKS_A_STEP = 4
 """How often in a step guards are looked at."""
 INSIDE, CLEAR = 8, 2.0
-"""The stage, .65 of the step on, at which guards are looked at, too; and by how many times what they vary by they have
-to be positive for a step not to be looked into."""
+"""The stage, .65 of the step on, at which guards are looked at, too; and by how many times what
+they vary by they have to be positive for a step not to be looked into."""
 DYING = 1e-7
-"""Slip in natural units that goes straight to zero: what is left of it takes no time in which its rate would change."""
+"""Slip in natural units that goes straight to zero: what is left of it takes no time in which its
+rate would change."""
 ROOT_STEPS = 200
 COLUMNS, USUAL = 12, 9
 """Most columns of an extrapolation, and how many steps aim at."""
@@ -48,7 +61,8 @@ def _copy(given: Array, out: Array) -> None:
 
 
 def _interpolate(x: float, z: Array, F: Array, out: Array) -> None:
-    """Coordinates at a share x of a step that began at z, from the coefficients F of its interpolant."""
+    """Coordinates at a share x of a step that began at z, from the coefficients F of its
+    interpolant."""
     for i in range(len(z)):
         value = 0.0
         for n in range(len(F)):
@@ -60,10 +74,11 @@ def _root(
     guard: int, level: float, low: float, high: float, t: float, h: float, k: Motion, z: Array, F: Array, now: Array,
     values: Array,
 ) -> float:  # fmt: skip
-    """Share of a step within (low, high) at which a guard falls through its level, to the last digit of the time.
+    """Share of a step within (low, high) at which a guard falls through its level, to the last
+    digit of the time.
 
-    By the rule of false position, whose end that stays counts half the next time (Illinois); halved where that is slow.
-    """
+    By the rule of false position, whose end that stays counts half the next time (Illinois); halved
+    where that is slow."""
     _interpolate(low, z, F, now)
     equations.guards(t + low * h, now, k, values)
     above = values[guard] - level
@@ -104,8 +119,11 @@ def _weighted_sum(weights: Array, count: int, K: Array, out: Array) -> None:
             out[i] += weights[j] * K[j, i]
 
 
-def _interpolant(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: Array, F: Array) -> None:
-    """Coefficients F of the interpolant of a step from z to `new`, from its stages K; three of these it computes."""
+def _interpolant(
+    t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: Array, F: Array
+) -> None:
+    """Coefficients F of the interpolant of a step from z to `new`, from its stages K; three of
+    these it computes."""
     for s in range(len(C_MORE)):
         _weighted_sum(A_MORE[s], STAGES + 1 + s, K, now)
         for i in range(len(z)):
@@ -122,9 +140,19 @@ def _interpolant(t: float, h: float, k: Motion, z: Array, new: Array, K: Array, 
 
 
 def _first_fall(
-    t: float, h: float, k: Motion, z: Array, F: Array, arm: Array, level: Array, seen: Array, now: Array, values: Array
+    t: float,
+    h: float,
+    k: Motion,
+    z: Array,
+    F: Array,
+    arm: Array,
+    level: Array,
+    seen: Array,
+    now: Array,
+    values: Array,
 ) -> tuple[int, float]:
-    """The guard that falls through its level first in a step, or -1, and the share of the step at which it does.
+    """The guard that falls through its level first in a step, or -1, and the share of the step at
+    which it does.
 
     `seen` (LOOKS_A_STEP + 1, guards) holds their values at both ends, and takes those between.
     """
@@ -159,7 +187,8 @@ def _first_fall(
 
 
 def _first_length(share: float, rate: Array, left: float, of: Stretch) -> float:
-    """Length of a first step, in which rates would change coordinates by a share of their size, s."""
+    """Length of a first step, in which rates would change coordinates by a share of their size,
+    s."""
     fastest = 0.0
     for i in range(len(rate)):
         fastest = max(fastest, abs(rate[i]) / (of.scale[i] / FINER + abs(of.z[i])))
@@ -167,7 +196,8 @@ def _first_length(share: float, rate: Array, left: float, of: Stretch) -> float:
 
 
 def _time_to_stop(rate: Array, rtol: float, of: Stretch) -> float:
-    """The time that a slip which dies has left, along a straight line; inf if a direction turns too much for it."""
+    """The time that a slip which dies has left, along a straight line; inf if a direction turns too
+    much for it."""
     left, (first, end) = math.inf, charts.TURNING[of.k.case]
     for i in range(first, end, 2):
         if of.z[i] < DYING * of.scale[i] and rate[i] < 0:
@@ -188,13 +218,17 @@ def _explicit_steps(
 ) -> tuple[int, float, float, int, int]:
     """Up to `most` explicit steps from start + tau on: why they end, tau, h, guard, samples taken.
 
-    A slip below `SMALL_SLIP` for more than `PATIENCE` steps is for the other method. A step is interpolated where a
-    sample is due, or a guard not `CLEAR`.
-    """
+    A slip below `SMALL_SLIP` for more than `PATIENCE` steps is for the other method. A step is
+    interpolated where a sample is due, or a guard not `CLEAR`."""
     k, until, z, scale, times, samples, arm, level = of
     n, span, rtol, slow, rejected = len(z), until - start, max(LOCAL * k.rtol, FINEST), 0, False
     K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
-    new, now, values, seen = np.empty(n), np.empty(n), np.empty(len(arm)), np.empty((LOOKS_A_STEP + 1, len(arm)))
+    new, now, values, seen = (
+        np.empty(n),
+        np.empty(n),
+        np.empty(len(arm)),
+        np.empty((LOOKS_A_STEP + 1, len(arm))),
+    )
     five, three = np.empty(n), np.empty(n)
     equations.rates(start + tau, z, k, K[0])
     equations.guards(start + tau, z, k, seen[0])
@@ -247,7 +281,9 @@ def _explicit_steps(
             fired, share = _first_fall(start + tau, h, k, z, F, arm, level, seen, now, values)
             until = tau + share * h if fired >= 0 else after
             while taken < len(times) and _is_past(times[taken], start, until):
-                _interpolate(min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken])
+                _interpolate(
+                    min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken]
+                )
                 taken += 1
             if fired >= 0:
                 _interpolate(share, z, F, now)
@@ -263,7 +299,9 @@ def _explicit_steps(
         least = charts.least_slip(z, scale, k.case)
         slow = slow + 1 if least <= SMALL_SLIP else 0
         left = _time_to_stop(K[0], rtol, of) if least < DYING else math.inf
-        if tau + left <= span and (taken == len(times) or not _is_past(times[taken], start, tau + left)):
+        if tau + left <= span and (
+            taken == len(times) or not _is_past(times[taken], start, tau + left)
+        ):
             for i in range(n):
                 z[i] += left * K[0, i]
             equations.guards(start + tau + left, z, k, values)
@@ -304,8 +342,11 @@ def _lu_solve(M: Array, order: npt.NDArray[np.int64], b: Array) -> None:
         b[i] /= M[i, i]
 
 
-def _extrapolation_step(of: Stretch, t: float, h: float, J: Array, table: Array) -> tuple[float, int]:
-    """A step extrapolated from 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error, and columns taken."""
+def _extrapolation_step(
+    of: Stretch, t: float, h: float, J: Array, table: Array
+) -> tuple[float, int]:
+    """A step extrapolated from 1, 2, 3 … linearly implicit Euler steps, into table[0]; its error,
+    and columns taken."""
     k, z, n, error, rtol = of.k, of.z, len(J), math.inf, max(LOCAL * of.k.rtol, FINEST_STIFF)
     M, order, rate = np.empty((n, n)), np.empty(n, np.int64), np.empty(n)
     for column in range(COLUMNS):
@@ -329,18 +370,23 @@ def _extrapolation_step(of: Stretch, t: float, h: float, J: Array, table: Array)
             for i in range(n):
                 more = (table[q + 1, i] - table[q, i]) / (steps / (q + 1) - 1)
                 table[q, i] = table[q + 1, i] + more
-                square += (more / (rtol * (of.scale[i] / FINER + max(abs(z[i]), abs(table[q, i]))))) ** 2
+                square += (
+                    more / (rtol * (of.scale[i] / FINER + max(abs(z[i]), abs(table[q, i]))))
+                ) ** 2
         error = math.sqrt(square / n) if column > 0 else math.inf
         if error <= 1 or (not error < 1e10 and column > 0):
             return error, steps
     return error, COLUMNS
 
 
-def _implicit_steps(of: Stretch, start: float, tau: float, h: float, taken: int) -> tuple[int, float, float, int, int]:
-    """As `_explicit_steps`, by implicit ones: for `PATIENCE` steps, or until all slips are `GROWN_SLIP`.
+def _implicit_steps(
+    of: Stretch, start: float, tau: float, h: float, taken: int
+) -> tuple[int, float, float, int, int]:
+    """As `_explicit_steps`, by implicit ones: for `PATIENCE` steps, or until all slips are
+    `GROWN_SLIP`.
 
-    A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times that for a slip.
-    """
+    A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times
+    that for a slip."""
     k, until, z, scale, times, samples, arm, level = of
     n, span, (first, end) = len(z), until - start, charts.TURNING[k.case]
     table, J, here, rate = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty(n), np.empty(n)
@@ -351,7 +397,9 @@ def _implicit_steps(of: Stretch, start: float, tau: float, h: float, taken: int)
         equations.rates(start + tau, z, k, here)
         for c in range(n):
             _copy(z, now)
-            now[c] += math.sqrt(EPS) * max(abs(z[c]), scale[c] * (k.rtol if c in range(first, end, 2) else 1.0))
+            now[c] += math.sqrt(EPS) * max(
+                abs(z[c]), scale[c] * (k.rtol if c in range(first, end, 2) else 1.0)
+            )
             equations.rates(start + tau, now, k, rate)
             for i in range(n):
                 J[i, c] = (rate[i] - here[i]) / (now[c] - z[c])
@@ -397,7 +445,9 @@ def _implicit_steps(of: Stretch, start: float, tau: float, h: float, taken: int)
             _copy(z, samples[taken])
             taken += 1
         if length == h or error < 0.01:
-            h = length * min(4.0, 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns))
+            h = length * min(
+                4.0, 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns)
+            )
         if charts.least_slip(z, scale, k.case) > GROWN_SLIP:
             return OTHER, tau, 0.0, -1, taken
     return PAUSED, tau, h, -1, taken

@@ -1,4 +1,5 @@
-"""Moreau-Jean steps and the loops over them, compiled where numba is installed: plain floats in named tuples."""
+"""Moreau-Jean steps and the loops over them, compiled where numba is installed: plain floats in
+named tuples."""
 
 from __future__ import annotations
 
@@ -17,8 +18,9 @@ from analytic.simulation.settings import LANDED
 from model.arrays import Array
 
 TOLERANCE, BARELY = 1e-14, 1e-11
-"""Change of an impulse per mass at which sweeps stop, relative to sqrt(g R) or the fastest velocity; and where friction
-only just holds a rolling ball: two solutions meet there, which can be found to the root of round-off only."""
+"""Change of an impulse per mass at which sweeps stop, relative to sqrt(g R) or the fastest
+velocity; and where friction only just holds a rolling ball: two solutions meet there, which can be
+found to the root of round-off only."""
 MAX_ITERATIONS = 100
 ROUGH = 1e-4
 """How well an iteration solves the contacts, relative to the last change of velocities."""
@@ -27,9 +29,11 @@ LOCATING = 10
 LANDINGS = 20
 """Most landings that are located within a step; later ones are put at its end."""
 SLIDES = 4.0
-"""A contact slides on through a step if it takes more than this many times the load of the step to stop it."""
+"""A contact slides on through a step if it takes more than this many times the load of the step to
+stop it."""
 ZERO_SLIP = 1e-9
-"""Sliding speed relative to sqrt(g R) up to which a contact is called rolling: above what iterations leave."""
+"""Sliding speed relative to sqrt(g R) up to which a contact is called rolling: above what
+iterations leave."""
 
 
 class Constants(NamedTuple):
@@ -105,7 +109,8 @@ class Touching(NamedTuple):
 
 
 class Stretches(NamedTuple):
-    """Stretches of equal steps from each sample or knot of the flow to the next, arrays (n,); and the flow."""
+    """Stretches of equal steps from each sample or knot of the flow to the next, arrays (n,); and
+    the flow."""
 
     start: Array
     dt: Array
@@ -147,11 +152,13 @@ class StepSolution(NamedTuple):
     residual: float
 
 
-def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants) -> StepSolution:
+def solve(
+    at: BallState, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants
+) -> StepSolution:
     """Velocities after dt, 0 for an impact, with closed contacts.
 
-    Smooth forces, at the mean of both velocities, and contacts are iterated together; `start` guesses the impulses.
-    """
+    Smooth forces, at the mean of both velocities, and contacts are iterated together; `start`
+    guesses the impulses."""
     v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
     (in_A, in_B, to_A, to_B), m, r, j = touching, p.m, p.r, p.j
     fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
@@ -160,7 +167,9 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
     on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
     for tolerance in (TOLERANCE, BARELY):
         enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
-        still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
+        still = (
+            4 + 8 / j
+        ) * enough  # what such changes of two impulses, in two iterations, add up to
         A, B = _first_guess(touching, start, m)
         new, last, change = old, 0.0, p.g * dt
         for _ in range(MAX_ITERATIONS):
@@ -168,15 +177,27 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
             x_i = at.h - p.R + dt / 2 * u.v_h
             x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
             w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i  # (20) with (9), no contact
-            c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
+            c = (
+                drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law)
+                if p.law.blunt > 0
+                else p.law.linear
+            )
             f_h = v_h - dt * (spin * u.v_k + c * w_h)
             f_y = v_y - dt * (p.g + c * u.v_y)
             f_k = v_k + dt * (spin * u.v_h - c * w_k)
-            f_x = o_x - dt * (spin * u.o_z + p.k * u.o_x)  # f_z takes the new o_x, which saves two iterations of seven
+            f_x = o_x - dt * (
+                spin * u.o_z + p.k * u.o_x
+            )  # f_z takes the new o_x, which saves two iterations of seven
             turn_y = o_y - dt * p.k * (u.o_y - omega_0)
             f_z = o_z + dt * (spin * (o_x + f_x - A.t / (j * r)) / 2 - p.k * u.o_z)
-            a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
-            b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * turn_y + slip_B[1]))
+            a = Impulse(
+                to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1])
+            )
+            b = Impulse(
+                to_B - f_h,
+                -rest * (f_y - r * f_z + slip_B[0]),
+                -rest * (f_k + r * turn_y + slip_B[1]),
+            )
             residual, aim = 0.0, max(enough, ROUGH * change)
             if in_A and in_B:
                 A, B, residual = solve_pair(a, b, B, on_A, on_B, j, aim)
@@ -185,12 +206,27 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
             elif in_B:
                 B = project(b, on_B)
             n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
-            after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), turn_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
-            change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
-            change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
+            after = Velocities(
+                n_h,
+                n_y,
+                n_k,
+                f_x - A.t / (j * r),
+                turn_y + B.t / (j * r),
+                f_z + (A.s - B.s) / (j * r),
+            )
+            change = (
+                abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)
+            )  # a sum, since max overlooks nan
+            change += r * (
+                abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z)
+            )
             new = after
             # Changes shrink at a steady rate: what is left is this one times the rate.
-            settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
+            settled = (
+                dt == 0
+                or change <= still
+                or (change < last / 4 and change * change <= last * still / 50)
+            )
             converged = settled and residual <= enough
             if converged or not residual <= aim:
                 break
@@ -204,17 +240,26 @@ def solve(at: BallState, dt: float, omega_0: float, touching: Touching, start: F
     turned = j * r * r * p.k * (u.o_x * u.o_x + u.o_y * (u.o_y - omega_0) + u.o_z * u.o_z)
     work = m * (at_A + at_B - dt * (c * power + turned))
     # A loaded contact has met its target, and round-off must not open it again.
-    new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
+    new = Velocities(
+        to_B if B.n > 0 else new.v_h,
+        to_A if A.n > 0 else new.v_y,
+        new.v_k,
+        new.o_x,
+        new.o_y,
+        new.o_z,
+    )
     P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
     return StepSolution(new, P, work, spin, 0.0 if converged else _larger_or_nan(change, residual))
 
 
-def _old_slip(at: BallState, dt: float, p: Constants) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Slip velocities of A and B before the step, m s-1; set to zero where slip may stop within the step.
+def _old_slip(
+    at: BallState, dt: float, p: Constants
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Slip velocities of A and B before the step, m s-1; set to zero where slip may stop within the
+    step.
 
-    It is added to the new one, since friction opposes the mean of both where a contact slides on; where it may stop,
-    friction opposes the final slip, so that it can't reverse.
-    """
+    It is added to the new one, since friction opposes the mean of both where a contact slides on;
+    where it may stop, friction opposes the final slip, so that it can't reverse."""
     v_h, v_y, v_k, o_x, o_y, o_z = at.u
     r, rest = p.r, p.j / (1 + p.j)
     slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
@@ -241,7 +286,9 @@ def _length(x: float, y: float) -> float:
 
 
 def _sum(a: Forces, b: Forces) -> Forces:
-    return Forces(a.A_x + b.A_x, a.A_y + b.A_y, a.A_z + b.A_z, a.B_x + b.B_x, a.B_y + b.B_y, a.B_z + b.B_z)
+    return Forces(
+        a.A_x + b.A_x, a.A_y + b.A_y, a.A_z + b.A_z, a.B_x + b.B_x, a.B_y + b.B_y, a.B_z + b.B_z
+    )
 
 
 def _moved(at: BallState, dt: float, s: StepSolution, touching: Touching, R: float) -> BallState:
@@ -260,7 +307,8 @@ def _moved(at: BallState, dt: float, s: StepSolution, touching: Touching, R: flo
 
 
 def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
-    """When within dt a gap passes zero, by the parabola with its value and rate at first and its value `end` then."""
+    """When within dt a gap passes zero, by the parabola with its value and rate at first and its
+    value `end` then."""
     bend = 2 * (end - gap - rate * dt) / (dt * dt)
     root = math.sqrt(max(0.0, rate * rate - 2 * bend * gap))
     time = 2 * gap / (root - rate) if rate < 0 else (rate + root) / -bend
@@ -274,7 +322,9 @@ def _step_to_landing(
     time = dt
     s = solve(at, dt, omega_0, touching, start, p)
     after = _moved(at, dt, s, touching, p.R)
-    to_floor = _crossing(at.y, at.u.v_y, after.y, dt) if not touching.A and after.y < 0 else math.inf
+    to_floor = (
+        _crossing(at.y, at.u.v_y, after.y, dt) if not touching.A and after.y < 0 else math.inf
+    )
     to_wall = _crossing(at.h, at.u.v_h, after.h, dt) if not touching.B and after.h < 0 else math.inf
     floor, better = to_floor <= to_wall, min(to_floor, to_wall)
     if better == math.inf or s.residual != 0:
@@ -285,24 +335,46 @@ def _step_to_landing(
         after = _moved(at, time, s, touching, p.R)
         if time == 0:
             break
-        better = _crossing(at.y, at.u.v_y, after.y, time) if floor else _crossing(at.h, at.u.v_h, after.h, time)
+        better = (
+            _crossing(at.y, at.u.v_y, after.y, time)
+            if floor
+            else _crossing(at.h, at.u.v_h, after.h, time)
+        )
         if abs(better - time) <= 1e-12 * dt:
             break
-    return BallState(after.theta, 0.0 if floor else after.y, after.h if floor else 0.0, after.u), s, time
+    return (
+        BallState(after.theta, 0.0 if floor else after.y, after.h if floor else 0.0, after.u),
+        s,
+        time,
+    )
 
 
 def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     """The ball a step of dt later, with omega_0 from the middle of the step."""
-    at, P, impact, case, work, landings, residual = ball.at, NOTHING, NOTHING, ball.case, ball.work, ball.landings, 0.0
+    at, P, impact, case, work, landings, residual = (
+        ball.at,
+        NOTHING,
+        NOTHING,
+        ball.case,
+        ball.work,
+        ball.landings,
+        0.0,
+    )
     q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
-    start = Forces(q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z)
+    start = Forces(
+        q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z
+    )
     left, count = dt, 0
     while left > 0 and residual == 0:
         in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0
         speed = max(-at.u.v_y if in_A else 0.0, -at.u.v_h if in_B else 0.0)
         if speed > 0:
             hit = _impact(at, dt, in_A, in_B, p)
-            at, P, impact = BallState(at.theta, at.y, at.h, hit.new), _sum(P, hit.P), _sum(impact, hit.P)
+            at, P, impact = (
+                BallState(at.theta, at.y, at.h, hit.new),
+                _sum(P, hit.P),
+                _sum(impact, hit.P),
+            )
             work, residual = work + hit.work, _larger_or_nan(hit.residual, residual)
             landings += speed > LANDED * math.sqrt(p.g * p.R)
             in_A, in_B = in_A and at.u.v_y <= 0, in_B and at.u.v_h <= 0
@@ -310,7 +382,10 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
         if count < LANDINGS:
             at, s, time = _step_to_landing(at, left, omega_0, touching, start, p)
         else:
-            after, time = _moved(at, left, solve(at, left, omega_0, touching, start, p), touching, p.R), left
+            after, time = (
+                _moved(at, left, solve(at, left, omega_0, touching, start, p), touching, p.R),
+                left,
+            )
             touching = Touching(in_A or after.y < 0, in_B or after.h < 0, 0.0, 0.0)
             s = solve(at, left, omega_0, touching, start, p)
             after = _moved(at, left, s, touching, p.R)
@@ -321,17 +396,21 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
 
 
 def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> StepSolution:
-    """An impact, with Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
+    """An impact, with Newton's restitution; a rebound that would last less than a hundredth of a
+    step is none."""
     to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
     to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > p.g * dt / 200 else 0.0
     hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, to_A, to_B), NOTHING, p)
-    if hit.residual != 0 and p.mu >= 1 and p.eta >= 1:  # friction may lock the ball in the corner: no rebound
+    if (
+        hit.residual != 0 and p.mu >= 1 and p.eta >= 1
+    ):  # friction may lock the ball in the corner: no rebound
         hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, 0.0, 0.0), NOTHING, p)
     return hit
 
 
 def _case_of(s: StepSolution, touching: Touching, p: Constants) -> int:
-    """The case from velocities and impulses: a contact that leaves is open, one that doesn't slide rolls."""
+    """The case from velocities and impulses: a contact that leaves is open, one that doesn't slide
+    rolls."""
     (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, AWAY, AWAY
     still = ZERO_SLIP * math.sqrt(p.g * p.R)
     if touching.A and (s.P.A_y > 0 or v_y <= 0):
@@ -353,7 +432,9 @@ def _flow_at(flow: FlowArrays, time: float) -> float:
         k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
     omega_0 = flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0)
     for n in range(len(flow.waves)):
-        omega_0 += flow.waves[n, 0] * math.sin(2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2])
+        omega_0 += flow.waves[n, 0] * math.sin(
+            2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2]
+        )
     return float(omega_0)
 
 
@@ -375,29 +456,42 @@ def keep_sample(ball: Ball, P: Forces, dt: float, time: float, p: Constants, run
 def follow(
     ball: Ball, place: Progress, stretches: Stretches, p: Constants, run: Rows, most: int
 ) -> tuple[Any, Progress]:
-    """Follow a run for at most so many steps, or to its end, where it doesn't converge, or is over: ball and place.
+    """Follow a run for at most so many steps, or to its end, where it doesn't converge, or is over:
+    ball and place.
 
-    They are in parts, plain tuples (`ball_from_parts`): a signal would be answered while numba makes named ones, which
-    doesn't look whether it has got them. Samples beyond the end of a run that has been quiet for long repeat its last
-    state; the place is then behind the last stretch, as at any end.
-    """
+    They are in parts, plain tuples (`ball_from_parts`): a signal would be answered while numba
+    makes named ones, which doesn't look whether it has got them. Samples beyond the end of a run
+    that has been quiet for long repeat its last state; the place is then behind the last stretch,
+    as at any end."""
     (starts, dts, counts, sampled, flow), (s, k, now, landed) = stretches, place
     while s < len(starts):
         start, dt = starts[s], dts[s]
         while k < counts[s]:
             if most == 0 or run.over[0]:
-                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (s, k, now, landed)
+                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (
+                    s,
+                    k,
+                    now,
+                    landed,
+                )
             most -= 1
             case, known = ball.case, ball.landings
             ball = step(ball, dt, _flow_at(flow, start + (k + 0.5) * dt), p)
             k += 1
             now = start + k * dt
             if ball.residual != 0:
-                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (s, k, now, landed)
+                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (
+                    s,
+                    k,
+                    now,
+                    landed,
+                )
             if ball.landings > known:
                 run.landings[run.taken[0]] += ball.landings - known
                 landed = now
-            if len(run.events) > 0 and (ball.case != case or ball.impact.A_y > 0 or ball.impact.B_x > 0):
+            if len(run.events) > 0 and (
+                ball.case != case or ball.impact.A_y > 0 or ball.impact.B_x > 0
+            ):
                 event = run.events[run.taken[1]]
                 event[0], event[1], event[2] = now, case, ball.case
                 for i in range(6):

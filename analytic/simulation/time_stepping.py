@@ -1,18 +1,20 @@
 """Moreau-Jean time stepping: the ball as a rigid body under Coulomb's law, without cases.
 
-A step changes the velocities by the smooth forces at the mean of old and new velocity (theta = 1/2) and by the
-impulses of the closed contacts, which obey Coulomb's law with the velocities at its end; friction of a contact that
-slides on opposes the mean of its old and new slip. Smooth forces and both contacts are iterated together until the
-velocities settle. A landing is located within the step: the ball is taken there, collides (Newton's restitution), and
-goes on. Slip that begins, dies out or turns within a step, and lift-off, are not located: the scheme is of second
-order between such changes, of first order through them.
+A step changes the velocities by the smooth forces at the mean of old and new velocity (theta = 1/2)
+and by the impulses of the closed contacts, which obey Coulomb's law with the velocities at its end;
+friction of a contact that slides on opposes the mean of its old and new slip. Smooth forces and
+both contacts are iterated together until the velocities settle. A landing is located within the
+step: the ball is taken there, collides (Newton's restitution), and goes on. Slip that begins, dies
+out or turns within a step, and lift-off, are not located: the scheme is of second order between
+such changes, of first order through them.
 
-While the ball is at the wall, velocities are taken along axes that turn with it, so that the wall's normal is
-constant within the step and a ball that is held at the wall neither drifts off nor into it; a stationary orbit is
-reproduced exactly. Otherwise the axes stand still, so that the vessel's axis is no singular point.
+While the ball is at the wall, velocities are taken along axes that turn with it, so that the wall's
+normal is constant within the step and a ball that is held at the wall neither drifts off nor into
+it; a stationary orbit is reproduced exactly. Otherwise the axes stand still, so that the vessel's
+axis is no singular point.
 
-Steps and the loop over them are in `stepping`, which numba compiles where it is installed (the extra `fast`).
-"""
+Steps and the loop over them are in `stepping`, which numba compiles where it is installed (the
+extra `fast`)."""
 
 from __future__ import annotations
 
@@ -34,8 +36,11 @@ AT_ONCE = 10_000
 """Most steps between two looks at progress and keyboard."""
 
 
-def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
-    """Simulate a run, by time stepping, from state x0 and azimuth theta_0, and write it to the recorder.
+def run(
+    x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder
+) -> None:
+    """Simulate a run, by time stepping, from state x0 and azimuth theta_0, and write it to the
+    recorder.
 
     The first sample, before any step, carries the forces and the case of the first step. Raises
     `NotConvergedError`.
@@ -59,7 +64,8 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
             if ball.residual != 0:
                 dt = stretches.dt[place[0]]
                 raise NotConvergedError(
-                    f"velocities still change by {ball.residual:g} m s-1; a shorter step than {dt:g} s may help"
+                    f"velocities still change by {ball.residual:g} m s-1; a shorter step than "
+                    f"{dt:g} s may help"
                 )
     finally:
         count = int(kept.taken[0])
@@ -70,7 +76,8 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
 def prepared(
     x: State, theta: float, p: Parameters, flow: Flow, settings: Settings, times: Array
 ) -> tuple[stepping.Ball, stepping.Stretches, stepping.Constants]:
-    """What the compiled loop takes: the ball in a state that no step has led to, its steps in the flow, and constants.
+    """What the compiled loop takes: the ball in a state that no step has led to, its steps in the
+    flow, and constants.
 
     Raises `InputError` if the time step is too large for the problem.
     """
@@ -93,5 +100,7 @@ def prepared(
             np.isin(knots[1:], times),
             stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
         ),
-        stepping.Constants(drag.law(p), *map(float, given)),  # an integer would be compiled for itself
+        stepping.Constants(
+            drag.law(p), *map(float, given)
+        ),  # an integer would be compiled for itself
     )

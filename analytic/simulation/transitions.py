@@ -1,9 +1,9 @@
 """Which case comes next where a case ends.
 
-Uniqueness. Where Coulomb's law allows the ball to roll on and to slip or lift away, it rolls on only if every slight
-slip dies out: at two rolling contacts that is `rolling_forces.slip_margin`, at a single one this means that its cone
-holds forces that keep it rolling (docs/theory.md). Case and slip directions are then those of the contact problem of
-the accelerations.
+Uniqueness. Where Coulomb's law allows the ball to roll on and to slip or lift away, it rolls on
+only if every slight slip dies out: at two rolling contacts that is `rolling_forces.slip_margin`, at
+a single one this means that its cone holds forces that keep it rolling (docs/theory.md). Case and
+slip directions are then those of the contact problem of the accelerations.
 
 All on plain floats, cases and guards by number, and compiled where numba is installed.
 """
@@ -40,25 +40,33 @@ from analytic.simulation.motion import Moment
 from model import State
 
 LEAST_ACCELERATION = 1e-9
-"""Acceleration in units of g below which a contact point is at rest, well above what the contact problem leaves."""
+"""Acceleration in units of g below which a contact point is at rest, well above what the contact
+problem leaves."""
 AT_ONSET = 1e-7
-"""Slip margin up to which slip is at its onset: the accelerations are hardly more than `LEAST_ACCELERATION`."""
+"""Slip margin up to which slip is at its onset: the accelerations are hardly more than
+`LEAST_ACCELERATION`."""
 
 EPS = math.ulp(1.0)
 AT_REST = 1e-12
-"""Slip after an impact, relative to the speeds before it, that counts as none: the contact problem leaves less."""
+"""Slip after an impact, relative to the speeds before it, that counts as none: the contact problem
+leaves less."""
 UNSETTLED = "the contact problem doesn't settle"
 
 
 def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
-    """What follows when a guard has fired: the next case, the moment at its start, and impulses of an impact."""
+    """What follows when a guard has fired: the next case, the moment at its start, and impulses of
+    an impact."""
     x, A, B = at.x, case // 3, case % 3
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
     if guard in (A_SLIPS, B_SLIPS):
         # Slip sets in against the friction of the contact that rolls so far.
         lag = x.omega_c - equations.fluid(at.time, k)
         if case == RN:
-            return 3 * SLIPS + B, with_directions(at, x, math.atan2((k.R - x.h) * lag, -x.v_h), at.beta), NOTHING
+            return (
+                3 * SLIPS + B,
+                with_directions(at, x, math.atan2((k.R - x.h) * lag, -x.v_h), at.beta),
+                NOTHING,
+            )
         c = equations.drag_rate(x.v_h, x.v_y, k.R * lag, k)
         A_x, _, A_z, _, B_y, B_z = equations.forces(
             case, x.omega_c, x.v_y, x.slip_x, c, lag, math.sin(at.alpha), math.cos(at.alpha), math.sin(at.beta),
@@ -87,7 +95,12 @@ def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Fo
         y = 0.0
     else:
         h = 0.0
-    return settle(with_directions(at, State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h), at.alpha, at.beta), k)
+    return settle(
+        with_directions(
+            at, State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h), at.alpha, at.beta
+        ),
+        k,
+    )
 
 
 def settle(at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
@@ -111,7 +124,9 @@ def choose(at: Moment, k: Motion) -> tuple[int, Moment]:
     """
     x = at.x
     slip_x = x.v_h + x.v_y + k.r * x.slip_z
-    if abs(slip_x) <= 4 * EPS * abs(x.v_h):  # round-off of a ball that rolls on the floor away from the wall
+    if abs(slip_x) <= 4 * EPS * abs(
+        x.v_h
+    ):  # round-off of a ball that rolls on the floor away from the wall
         slip_x = 0.0
     A = _contact(x.y == 0 and x.v_y == 0, slip_x, -k.r * x.slip_x)
     B = _contact(x.h == 0 and x.v_h == 0, -k.r * x.slip_z, k.r * x.slip_y)
@@ -126,14 +141,15 @@ def choose(at: Moment, k: Motion) -> tuple[int, Moment]:
 def leave(at: Moment, k: Motion) -> tuple[int, Moment]:
     """The case that follows RR where slip or lift lasts, and the moment with its slip directions.
 
-    Friction is full where slip sets in and opposes it: forces and rates pass continuously from rolling to slipping.
-    Beyond the onset the contact problem may have a solution that rolls, too: one that moves is reached from the forces
-    at which rolling gives way.
-    """
+    Friction is full where slip sets in and opposes it: forces and rates pass continuously from
+    rolling to slipping. Beyond the onset the contact problem may have a solution that rolls, too:
+    one that moves is reached from the forces at which rolling gives way."""
     omega_c, lag = at.x.omega_c, at.x.omega_c - equations.fluid(at.time, k)
     u, z = equations.loads(omega_c, at.time, k)
     B_y, c = equations.last_share(u, z, k) * k.m * k.g, equations.drag_rate(0.0, 0.0, k.R * lag, k)
-    A_x, A_y, A_z, B_x, _, B_z = equations.forces(RR, omega_c, 0.0, 0.0, c, lag, 0.0, 0.0, 0.0, 0.0, k)
+    A_x, A_y, A_z, B_x, _, B_z = equations.forces(
+        RR, omega_c, 0.0, 0.0, c, lag, 0.0, 0.0, 0.0, 0.0, k
+    )
     A_x, A_y, B_x = A_x + B_y, A_y - B_y, B_x - B_y
     if equations.slip_margin(u, z, k) <= -AT_ONSET:
         return _by_accelerations(at, RESTS, RESTS, Forces(A_x, A_y, A_z, B_x, B_y, B_z), k)
@@ -154,8 +170,11 @@ def _contact(closed: bool, s: float, t: float) -> Closed:
     return Closed(0.0, s / speed, t / speed, True) if speed > 0 else RESTS
 
 
-def _by_accelerations(at: Moment, A: Closed, B: Closed, start: Forces, k: Motion) -> tuple[int, Moment]:
-    """Case and slip directions by the contact problem of the accelerations, solved from the forces `start`."""
+def _by_accelerations(
+    at: Moment, A: Closed, B: Closed, start: Forces, k: Motion
+) -> tuple[int, Moment]:
+    """Case and slip directions by the contact problem of the accelerations, solved from the forces
+    `start`."""
     free = equations.smooth_rates(rigid_body.velocities(at.x, k), at.x.h, at.time, k)
     rates, force, settled = contact_problem.solve(free, A, B, k, start, LEAST_ACCELERATION / 1e4)
     if not settled:
@@ -171,7 +190,8 @@ def _by_accelerations(at: Moment, A: Closed, B: Closed, start: Forces, k: Motion
 def _contact_after(
     contact: Closed, load: float, rise: float, s: float, t: float, k: Motion
 ) -> tuple[int, float, float]:
-    """State of a contact from its force and accelerations, and the direction in which it slips if it does."""
+    """State of a contact from its force and accelerations, and the direction in which it slips if
+    it does."""
     still = LEAST_ACCELERATION * k.g
     if not contact.closed or (load <= 0 and rise > still):
         return AWAY, 0.0, 0.0
@@ -181,14 +201,15 @@ def _contact_after(
 
 
 def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
-    """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's restitution.
+    """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's
+    restitution.
 
-    Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n| and
-    p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together, without a rebound if
-    friction locks the ball (`contact_problem`). Bounces accumulate: a rebound whose hops would come to rest (by the
-    geometric series 2 v_n/a/(1 - e)) within rtol sqrt(R/g) where they are known, of a ball that touches the floor only,
-    and elsewhere as soon as the tolerance `rtol` of the integrator resolves their height, stays in contact.
-    """
+    Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n|
+    and p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together,
+    without a rebound if friction locks the ball (`contact_problem`). Bounces accumulate: a rebound
+    whose hops would come to rest (by the geometric series 2 v_n/a/(1 - e)) within rtol sqrt(R/g)
+    where they are known, of a ball that touches the floor only, and elsewhere as soon as the
+    tolerance `rtol` of the integrator resolves their height, stays in contact."""
     x, before, e = at.x, rigid_body.velocities(at.x, k), k.restitution
     A = Closed(max(0.0, -e * x.v_y), 0.0, 0.0, x.y == 0)
     B = Closed(max(0.0, -e * x.v_h), 0.0, 0.0, x.h == 0)
@@ -201,10 +222,15 @@ def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
     work = at.work + rigid_body.contact_work(rigid_body.mean(before, u), P, k)
     v_h = B.target if B.closed and P.B_x > 0 else u.v_h
     v_y = A.target if A.closed and P.A_y > 0 else u.v_y
-    # Accelerations that bring it back to floor and wall if it leaves them, each while it stays on the other.
+    # Accelerations that bring it back to floor and wall if it leaves them, each while it stays on
+    # the other.
     free = equations.smooth_rates(u, x.h, at.time, k)
-    on_B, _, _ = contact_problem.solve(free, ABSENT, RESTS if B.closed and u.v_h <= 0 else ABSENT, k, NOTHING, EXACT)
-    on_A, _, _ = contact_problem.solve(free, RESTS if A.closed and u.v_y <= 0 else ABSENT, ABSENT, k, NOTHING, EXACT)
+    on_B, _, _ = contact_problem.solve(
+        free, ABSENT, RESTS if B.closed and u.v_h <= 0 else ABSENT, k, NOTHING, EXACT
+    )
+    on_A, _, _ = contact_problem.solve(
+        free, RESTS if A.closed and u.v_y <= 0 else ABSENT, ABSENT, k, NOTHING, EXACT
+    )
     # A hop that lasts T rises by g T^2/8, well above the tolerance of lengths.
     integrated = math.sqrt(8 * k.rtol / FINER * k.R / k.g)
     known = integrated if B.closed or not k.stokes else k.rtol * k.unit
@@ -215,7 +241,9 @@ def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
     left = Velocities(v_h, v_y, u.v_k, u.o_x, u.o_y, u.o_z)
     y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = rigid_body.state(x.y, x.h, left, k)
     spin = k.r * k.r * (before.o_x * before.o_x + before.o_y * before.o_y + before.o_z * before.o_z)
-    still = AT_REST * math.sqrt(before.v_h * before.v_h + before.v_y * before.v_y + before.v_k * before.v_k + spin)
+    still = AT_REST * math.sqrt(
+        before.v_h * before.v_h + before.v_y * before.v_y + before.v_k * before.v_k + spin
+    )
     (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(u, k), rigid_body.slip_at_B(u, k)
     if A.closed and P.A_y > 0 and math.hypot(s_A, t_A) <= still:
         slip_x, slip_z = 0.0, -(v_h + v_y) / k.r

@@ -1,1 +1,2 @@
-"""Stability with respect to slipping and lifting: growth rates, and the flows at which slip sets in."""
+"""Stability with respect to slipping and lifting: growth rates, and the flows at which slip sets
+in."""

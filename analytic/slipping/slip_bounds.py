@@ -1,10 +1,11 @@
-"""Where slip begins to grow (sections 3.2 and 4): gamma in closed form along each arrow, with its zero and its slope.
+"""Where slip begins to grow (sections 3.2 and 4): gamma in closed form along each arrow, with its
+zero and its slope.
 
-Out of NR gamma is known at every state, (56)-(61). Where the ball goes round with the fluid gamma is a straight line
-in omega_0^2, (61), (67), (74), (82), (83): `SlipBound`. At a fixed omega_c, for a ball that lags behind the fluid or
-leads, it is one in the fluid's push, with Stokes' law in omega_0, (66), (73): `HeldBound`. `slip_stability.gamma`
-gives the same from the vector fields, along any direction.
-"""
+Out of NR gamma is known at every state, (56)-(61). Where the ball goes round with the fluid gamma
+is a straight line in omega_0^2, (61), (67), (74), (82), (83): `SlipBound`. At a fixed omega_c, for
+a ball that lags behind the fluid or leads, it is one in the fluid's push, with Stokes' law in
+omega_0, (66), (73): `HeldBound`. `slip_stability.gamma` gives the same from the vector fields,
+along any direction."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ class SlipBound:
 
     @property
     def zero(self) -> float:
-        """omega_0^2 (rad2 s-2) at which slip neither grows nor dies out; inf where gamma doesn't depend on the flow.
+        """omega_0^2 (rad2 s-2) at which slip neither grows nor dies out; inf where gamma doesn't
+        depend on the flow.
 
         Negative: no flow reaches it.
         """
@@ -58,7 +60,9 @@ class HeldBound:
         if self.p.c == 0:
             return math.inf
         push = self.side * (1 + self.p.j) * self.p.r * self.hold
-        return self.omega_c + math.copysign(float(drag.speed_of(abs(push), self.p)) / self.p.R, push)
+        return self.omega_c + math.copysign(
+            float(drag.speed_of(abs(push), self.p)) / self.p.R, push
+        )
 
     @property
     def slope(self) -> float:
@@ -74,7 +78,8 @@ class HeldBound:
 
 
 def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
-    """gamma (56) in rad s-2 of a slip of the wall contact along beta (rad) out of states x (..., 6 or 8) of NR.
+    """gamma (56) in rad s-2 of a slip of the wall contact along beta (rad) out of states x (..., 6
+    or 8) of NR.
 
     Shapes broadcast; `InputError` if x isn't a state of NR.
     """
@@ -83,22 +88,25 @@ def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
 
 
 def steepest_nr(x: npt.ArrayLike, p: Parameters) -> Array:
-    """beta_1 (58) in rad: the direction along which slip at the wall grows the most out of states x (...) of NR.
+    """beta_1 (58) in rad: the direction along which slip at the wall grows the most out of states x
+    (...) of NR.
 
-    Along beta_2 = beta_1 + pi it dies out the fastest: a state is stable where gamma along beta_1 is negative, (59).
-    """
+    Along beta_2 = beta_1 + pi it dies out the fastest: a state is stable where gamma along beta_1
+    is negative, (59)."""
     pull, lag, _ = _nr_terms(x, p)
     return np.arctan2(lag, pull)
 
 
 def nr_to_ns(p: Parameters) -> SlipBound:
-    """(60), (61): slip of the wall contact out of the stationary NR, along beta = 0, where it grows the most."""
+    """(60), (61): slip of the wall contact out of the stationary NR, along beta = 0, where it grows
+    the most."""
     unit = (1 + p.j) / (p.j * p.r)
     return SlipBound(unit * p.g, -unit * p.eta * p.R)
 
 
 def rr_to_rs(p: Parameters, omega_c: float, side: int) -> HeldBound:
-    """(66) with eta for its mu: slip at B along slip_y > 0 (side 1) or < 0 (side -1) of a ball that rolls at omega_c.
+    """(66) with eta for its mu: slip at B along slip_y > 0 (side 1) or < 0 (side -1) of a ball that
+    rolls at omega_c.
 
     For Stokes' law zero at omega_0 = omega_c + side * eta (1+j)(1+2j) omega_c^2/(j c).
     """
@@ -106,7 +114,8 @@ def rr_to_rs(p: Parameters, omega_c: float, side: int) -> HeldBound:
 
 
 def rr_to_rs_stationary(p: Parameters) -> SlipBound:
-    """(67): slip at B, of either side, where omega_c = omega_0; it dies out at every flow but omega_0 = 0."""
+    """(67): slip at B, of either side, where omega_c = omega_0; it dies out at every flow but
+    omega_0 = 0."""
     return SlipBound(0.0, -p.eta * (1 + 2 * p.j) * p.R / (p.j * p.r))
 
 
@@ -126,24 +135,28 @@ def rr_to_sr_stationary(p: Parameters) -> SlipBound:
 
 
 def rr_to_ss(p: Parameters, side: int) -> SlipBound:
-    """Slip at both points where omega_c = omega_0, along (0, 0), (82), side 1, or along (pi, pi), (83), side -1.
+    """Slip at both points where omega_c = omega_0, along (0, 0), (82), side 1, or along (pi, pi),
+    (83), side -1.
 
-    (83) has a real bound for eta > 1 only, below which slip would grow; but there the wall would have to
-    pull, against (12), as section 4.3 ends. (82) has one where the floor presses for eta < j only.
-    """
+    (83) has a real bound for eta > 1 only, below which slip would grow; but there the wall would
+    have to pull, against (12), as section 4.3 ends. (82) has one where the floor presses for eta <
+    j only."""
     unit = 1 / (p.j * p.r * (1 + p.mu * p.eta))
     drive = side * (p.mu * p.eta * (1 + p.j) + p.j) - p.eta
     return SlipBound(-unit * p.mu * p.g * (1 + side * p.eta), unit * p.R * drive)
 
 
 def filippov_share(outer: Case, omega_c: float, p: Parameters) -> float:
-    """delta of (69): f_RR = delta f^- + (1 - delta) f^+, with f^+- the sides of RR in `outer`, RS or SR.
+    """delta of (69): f_RR = delta f^- + (1 - delta) f^+, with f^+- the sides of RR in `outer`, RS
+    or SR.
 
-    From the growths of slip on the two sides, whose combination must not slip. 0 < delta < 1 where slip dies out on
-    both sides (or grows on both: SR beyond omega_03); inf if neither side has friction, so that there is no edge.
-    """
+    From the growths of slip on the two sides, whose combination must not slip. 0 < delta < 1 where
+    slip dies out on both sides (or grows on both: SR beyond omega_03); inf if neither side has
+    friction, so that there is no edge."""
     if outer not in (Case.RS, Case.SR):
-        raise InputError(f"case {outer.name}: RR divides the states of RS and SR only, where one direction slips")
+        raise InputError(
+            f"case {outer.name}: RR divides the states of RS and SR only, where one direction slips"
+        )
     bound = rr_to_rs if outer is Case.RS else rr_to_sr
     plus, minus = (float(bound(p, omega_c, side).gamma(p.omega_0)) for side in (1, -1))
     return plus / (plus + minus) if plus + minus else math.inf
@@ -155,4 +168,8 @@ def _nr_terms(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array, Array]:
     lag = p.R * (p.omega_0 - omega_c)
     c = drag.coefficient(drag.speed(0.0, v_y, lag), p)
     pull = (p.g + c * v_y + p.R * omega_c**2) / p.r + omega_c * slip_x
-    return np.asarray(pull), np.asarray(c * lag / p.r), p.eta * p.R * (1 + p.j) / (p.j * p.r) * omega_c**2
+    return (
+        np.asarray(pull),
+        np.asarray(c * lag / p.r),
+        p.eta * p.R * (1 + p.j) / (p.j * p.r) * omega_c**2,
+    )

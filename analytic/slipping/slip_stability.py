@@ -1,10 +1,11 @@
-"""Stability with respect to slipping (section 3): does a slight slip, or lift, out of a rolling case die out or grow?
+"""Stability with respect to slipping (section 3): does a slight slip, or lift, out of a rolling
+case die out or grow?
 
-From a state x* of a case Y the ball is pushed along n into a case Z of more freedom (the arrows of Fig. 6, and NR->NS);
-gamma(x*, n) = lim f_Z(x* + eps n) . n (53), in the paper's Euclidean product, says whether it is driven further. Over
-all directions its maximum may be positive though no slip can last, since with two or more directions to slip the slip
-turns while it grows (docs/errata.md); then the work done on the slip or the forces decide, `stability`.
-"""
+From a state x* of a case Y the ball is pushed along n into a case Z of more freedom (the arrows of
+Fig. 6, and NR->NS); gamma(x*, n) = lim f_Z(x* + eps n) . n (53), in the paper's Euclidean product,
+says whether it is driven further. Over all directions its maximum may be positive though no slip
+can last, since with two or more directions to slip the slip turns while it grows (docs/errata.md);
+then the work done on the slip or the forces decide, `stability`."""
 
 from __future__ import annotations
 
@@ -44,19 +45,26 @@ class SlipStability(Enum):
 
 
 def normals(inner: Case, outer: Case) -> tuple[str, ...]:
-    """Names of the components of slip that the case `outer` frees and `inner` holds at zero; they span W (51)."""
-    return tuple(name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active)
+    """Names of the components of slip that the case `outer` frees and `inner` holds at zero; they
+    span W (51)."""
+    return tuple(
+        name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active
+    )
 
 
 def slip_rates(
     inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters
 ) -> tuple[Array, Array, Array]:
-    """Rates (..., d) of the slips that begin along n, (52) by component, and the normal forces A_y, B_x in N (...).
+    """Rates (..., d) of the slips that begin along n, (52) by component, and the normal forces A_y,
+    B_x in N (...).
 
-    x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative normal force means that
-    the contact opens instead of slipping that way.
-    """
-    state, names, n = dynamics.check_state(inner, x, p), normals(inner, outer), np.asarray(n, dtype=float)
+    x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative
+    normal force means that the contact opens instead of slipping that way."""
+    state, names, n = (
+        dynamics.check_state(inner, x, p),
+        normals(inner, outer),
+        np.asarray(n, dtype=float),
+    )
     push = State(**dict(zip(names, np.moveaxis(n, -1, 0), strict=True)))
     old_slips, new_slips = (dynamics.sliding_velocities(each, p) for each in (state, push))
     contacts = zip((inner.A, inner.B), (outer.A, outer.B), old_slips, new_slips, strict=True)
@@ -67,7 +75,9 @@ def slip_rates(
     force = dynamics.forces(outer, state, p, p.omega_0, slip_A, slip_B)
     rates = dynamics.newton_euler(outer, state, force, p, p.omega_0)
     slips = (getattr(rates, name) for name in names)
-    *along, A_y, B_x = (np.broadcast_to(value, n.shape[:-1]) for value in (*slips, force.A_y, force.B_x))
+    *along, A_y, B_x = (
+        np.broadcast_to(value, n.shape[:-1]) for value in (*slips, force.A_y, force.B_x)
+    )
     return np.stack(along, axis=-1), A_y, B_x
 
 
@@ -79,7 +89,8 @@ def gamma(inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Param
 
 
 def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
-    """v_y' in m s-2 of the case without the floor, at a state with it: the ball lifts if it is positive.
+    """v_y' in m s-2 of the case without the floor, at a state with it: the ball lifts if it is
+    positive.
 
     This is (53) for the dotted arrows of Fig. 6, with n along v_y.
     """
@@ -87,38 +98,47 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
 
 
 def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
-    """omega_c in rad s-1 at which the ball begins to lift, at states else like x in a flow as much faster than it.
+    """omega_c in rad s-1 at which the ball begins to lift, at states else like x in a flow as much
+    faster than it.
 
-    Out of SR slip_x is in proportion to omega_c. Looked for between a tenth and ten times omega_c of x; nan where it
-    lifts at both or at none.
-    """
+    Out of SR slip_x is in proportion to omega_c. Looked for between a tenth and ten times omega_c
+    of x; nan where it lifts at both or at none."""
     state = dynamics.check_state(inner, x, p)
 
     def lift_at(omega_c: float) -> float:
         slip_x = state.slip_x * omega_c / state.omega_c if inner is Case.SR else state.slip_x
         there = state._replace(omega_c=omega_c, slip_x=slip_x)
-        return lift_acceleration(inner, outer, there, p.replace(omega_0=p.omega_0 * omega_c / state.omega_c))
+        return lift_acceleration(
+            inner, outer, there, p.replace(omega_0=p.omega_0 * omega_c / state.omega_c)
+        )
 
     return float(roots.sign_change(np.vectorize(lift_at), 0.1 * state.omega_c, 10 * state.omega_c))
 
 
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
-    """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0 if None.
+    """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0
+    if None.
 
-    RR: (67), and (82) if eta < j, else (74): beyond omega_03 slip at A alone would need A_y < 0, and so would slip at
-    both if eta > j, so that for eta < j, mu > 1 rolling goes on beyond omega_03, to omega_01 (`slip_margin`).
-    SR and NR: (61). RS: the friction j m R omega_c^2 that its floor must supply. These are the signs of the work done
-    on a slight slip, over all directions along which the contacts stay closed; on a threshold, to round-off, it is
-    neutral.
+    RR: (67), and (82) if eta < j, else (74): beyond omega_03 slip at A alone would need A_y < 0,
+    and so would slip at both if eta > j, so that for eta < j, mu > 1 rolling goes on beyond
+    omega_03, to omega_01 (`slip_margin`). SR and NR: (61). RS: the friction j m R omega_c^2 that
+    its floor must supply. These are the signs of the work done on a slight slip, over all
+    directions along which the contacts stay closed; on a threshold, to round-off, it is neutral.
     """
     Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     match case:
         case Case.RR:
             divisor = p.mu * p.eta * (1 + p.j) + p.j - p.eta
-            slip = (Omega2 * divisor, p.mu * (1 + p.eta)) if p.eta < p.j else (p.mu * p.j * Omega2, p.mu)
+            slip = (
+                (Omega2 * divisor, p.mu * (1 + p.eta))
+                if p.eta < p.j
+                else (p.mu * p.j * Omega2, p.mu)
+            )
             kinds = {_by_sign(0.0, p.eta * Omega2), _by_sign(*slip)}
         case Case.SR | Case.NR:
-            smooth_floor = case is Case.SR and p.mu == 0  # the floor then carries the weight, the wall nothing
+            smooth_floor = (
+                case is Case.SR and p.mu == 0
+            )  # the floor then carries the weight, the wall nothing
             kinds = {_by_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
         case Case.RS:
             kinds = {_by_sign(p.j * Omega2, p.mu)}
@@ -129,11 +149,11 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
 
 
 def neutral_flow(case: Case, p: Parameters) -> float:
-    """The flow in rad s-1 at which a stationary motion is neutral (Definition 3), between stable and unstable.
+    """The flow in rad s-1 at which a stationary motion is neutral (Definition 3), between stable
+    and unstable.
 
-    Looked for between a thousandth and a thousand times sqrt(g/R), by bisection down to round-off; nan if it is the
-    same at both. p.omega_0 plays no part.
-    """
+    Looked for between a thousandth and a thousand times sqrt(g/R), by bisection down to round-off;
+    nan if it is the same at both. p.omega_0 plays no part."""
     unit, order = float(np.sqrt(p.g / p.R)), list(SlipStability)
 
     def stability_at(flow: Real) -> int:
@@ -143,7 +163,8 @@ def neutral_flow(case: Case, p: Parameters) -> float:
 
 
 def _by_sign(drive: float, hold: float) -> SlipStability:
-    """Unstable if drive > hold, stable if less, neutral within the round-off of both, which are >= 0."""
+    """Unstable if drive > hold, stable if less, neutral within the round-off of both, which are >=
+    0."""
     if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):
         return SlipStability.NEUTRAL
     return SlipStability.UNSTABLE if drive > hold else SlipStability.STABLE

@@ -1,17 +1,17 @@
-"""The branch of stationary solutions that slip at both points (SS): (37)-(42), its fold (87)-(90), its stability.
+"""The branch of stationary solutions that slip at both points (SS): (37)-(42), its fold (87)-(90),
+its stability.
 
-The branch is given in the groups of the model: Omega = omega sqrt(R/g), kappa = c sqrt(R/g), forces in units of m g,
-speeds in units of sqrt(g R). A point on it is given by ``s = ln|tan alpha|``, from -inf where the slip ends in RR
-(alpha = 0) to +inf where it ends in SR (alpha = -pi/2): no digit is lost at either end. Here omega_c > 0; the other
-sense of rotation is the mirror image.
+The branch is given in the groups of the model: Omega = omega sqrt(R/g), kappa = c sqrt(R/g), forces
+in units of m g, speeds in units of sqrt(g R). A point on it is given by ``s = ln|tan alpha|``, from
+-inf where the slip ends in RR (alpha = 0) to +inf where it ends in SR (alpha = -pi/2): no digit is
+lost at either end. Here omega_c > 0; the other sense of rotation is the mirror image.
 
-Friction and normal forces along the branch don't depend on the law of drag (`analytic.mechanics.drag`). It says which
-lag Omega_0 - Omega_c the drag needs to balance friction, and how much more drag a little more lag brings: `stiffness`,
-which is kappa for Stokes' law.
+Friction and normal forces along the branch don't depend on the law of drag
+(`analytic.mechanics.drag`). It says which lag Omega_0 - Omega_c the drag needs to balance friction,
+and how much more drag a little more lag brings: `stiffness`, which is kappa for Stokes' law.
 
-All functions take the place s, the parameters, and mu and eta if they aren't those of p: floats or arrays, which
-broadcast.
-"""
+All functions take the place s, the parameters, and mu and eta if they aren't those of p: floats or
+arrays, which broadcast."""
 
 from __future__ import annotations
 
@@ -52,15 +52,20 @@ class BranchPoint:
 
 
 def branch(
-    s: npt.ArrayLike, p: Parameters, mu: npt.ArrayLike | None = None, eta: npt.ArrayLike | None = None
+    s: npt.ArrayLike,
+    p: Parameters,
+    mu: npt.ArrayLike | None = None,
+    eta: npt.ArrayLike | None = None,
 ) -> BranchPoint:
     """Points s = ln|tan alpha| of the branch (37)-(42); needs mu > 0 and drag.
 
-    For eta > j the branch has A_y < 0: it solves the equations once (12) is released (Fig. 12). It is nan where
-    not even then a solution exists.
-    """
+    For eta > j the branch has A_y < 0: it solves the equations once (12) is released (Fig. 12). It
+    is nan where not even then a solution exists."""
     s, mu, eta = np.asarray(s, dtype=float), *_friction(p, mu, eta)
-    cos, sin = 1 / np.hypot(1.0, np.exp(s)), 1 / np.hypot(1.0, np.exp(-s))  # each to full relative accuracy
+    cos, sin = (
+        1 / np.hypot(1.0, np.exp(s)),
+        1 / np.hypot(1.0, np.exp(-s)),
+    )  # each to full relative accuracy
     den = _denominator(cos, p.j, mu, eta)
     den = np.where(den > 0, den, np.nan)
     Omega_c = np.sqrt(mu * (1 + eta * cos**2) / den)
@@ -69,45 +74,60 @@ def branch(
     lag = drag.speed_of(p.g * held, p)
     Omega_0, stiffness = Omega_c + lag / np.sqrt(p.g * p.R), drag.slope(lag, p) * np.sqrt(p.R / p.g)
     v_A, A_y, B_x = slip / (p.j * Omega_c), (p.j - eta) * cos / den, mu * (1 + p.j * cos**2) / den
-    return BranchPoint(*np.broadcast_arrays(cos, sin, Omega_c, Omega_0, held, stiffness, v_A, A_y, B_x))
+    return BranchPoint(
+        *np.broadcast_arrays(cos, sin, Omega_c, Omega_0, held, stiffness, v_A, A_y, B_x)
+    )
 
 
-def slope(s: npt.ArrayLike, p: Parameters, mu: npt.ArrayLike | None = None, eta: npt.ArrayLike | None = None) -> Array:
+def slope(
+    s: npt.ArrayLike,
+    p: Parameters,
+    mu: npt.ArrayLike | None = None,
+    eta: npt.ArrayLike | None = None,
+) -> Array:
     """A multiple > 0 of d omega_0/d|alpha| (89) for eta < j: its zero is the fold.
 
-    k (1 + 2 mu eta cos - eta cos^2)/(2 Omega_c |sin|) + den/tan^2 - mu eta (1 - j cos^2) with k the stiffness, which is
-    d Omega_0/d|alpha| without the factor mu (j - eta) sin^2/(k den^2). For eta > j its first term, and with it
-    the slope of Omega_c, changes sign.
-    """
+    k (1 + 2 mu eta cos - eta cos^2)/(2 Omega_c |sin|) + den/tan^2 - mu eta (1 - j cos^2) with k the
+    stiffness, which is d Omega_0/d|alpha| without the factor mu (j - eta) sin^2/(k den^2). For eta
+    > j its first term, and with it the slope of Omega_c, changes sign."""
     orbit, lag = _slopes(s, p, mu, eta)
     return np.asarray(orbit + lag)
 
 
 def characteristic_slope(s: npt.ArrayLike, p: Parameters) -> Array:
-    """d omega_c/d omega_0 along the branch: 0 at the end in RR, infinite at the fold, negative beyond it."""
+    """d omega_c/d omega_0 along the branch: 0 at the end in RR, infinite at the fold, negative
+    beyond it."""
     orbit, lag = _slopes(s, p)
     return np.asarray(orbit / (orbit + lag))
 
 
 def _slopes(
-    s: npt.ArrayLike, p: Parameters, mu: npt.ArrayLike | None = None, eta: npt.ArrayLike | None = None
+    s: npt.ArrayLike,
+    p: Parameters,
+    mu: npt.ArrayLike | None = None,
+    eta: npt.ArrayLike | None = None,
 ) -> tuple[Array, Array]:
-    """d Omega_c/d|alpha|, and that of the lag Omega_0 - Omega_c, both without the factor that `slope` leaves out."""
+    """d Omega_c/d|alpha|, and that of the lag Omega_0 - Omega_c, both without the factor that
+    `slope` leaves out."""
     at = branch(s, p, mu, eta)
     mu, eta = _friction(p, mu, eta)
     turned = 1 + 2 * mu * eta * at.cos - eta * at.cos**2
     orbit = np.sign(p.j - eta) * at.stiffness * turned / (2 * at.Omega_c * at.sin)
     den = _denominator(at.cos, p.j, mu, eta)
-    return np.asarray(orbit), np.asarray(den * (at.cos / at.sin) ** 2 - mu * eta * (1 - p.j * at.cos**2))
+    return np.asarray(orbit), np.asarray(
+        den * (at.cos / at.sin) ** 2 - mu * eta * (1 - p.j * at.cos**2)
+    )
 
 
 def light_drag(p: Parameters) -> float:
-    """The stiffness where the lag vanishes, at both ends of the branch: kappa, but 0 for the quadratic law."""
+    """The stiffness where the lag vanishes, at both ends of the branch: kappa, but 0 for the
+    quadratic law."""
     return float(drag.coefficient(0.0, p)) * float(np.sqrt(p.R / p.g))
 
 
 def eta_critical(mu: npt.ArrayLike, p: Parameters) -> Array:
-    """eta_cr (87): the fold exists for larger eta only; inf for mu = 0 with drag, nan without either.
+    """eta_cr (87): the fold exists for larger eta only; inf for mu = 0 with drag, nan without
+    either.
 
     The fold is born in SR, where the lag vanishes: for every law the drag of a slight lag decides.
     """
@@ -117,19 +137,23 @@ def eta_critical(mu: npt.ArrayLike, p: Parameters) -> Array:
 
 
 def fold(
-    p: Parameters, mu: npt.ArrayLike | None = None, eta: npt.ArrayLike | None = None, released: bool = False
+    p: Parameters,
+    mu: npt.ArrayLike | None = None,
+    eta: npt.ArrayLike | None = None,
+    released: bool = False,
 ) -> Array:
     """The place s of the fold (88) by a bracketed root of `slope`; nan where there is none.
 
-    It exists for eta_cr < eta < j (87) and drag, and is then unique for every law whose drag force grows ever faster
-    with the lag, as those of `model.drag` do (docs/theory.md); with (12) `released` also for eta > j, as long as the
-    whole branch exists.
-    """
+    It exists for eta_cr < eta < j (87) and drag, and is then unique for every law whose drag force
+    grows ever faster with the lag, as those of `model.drag` do (docs/theory.md); with (12)
+    `released` also for eta > j, as long as the whole branch exists."""
     mu, eta = np.broadcast_arrays(*_friction(p, mu, eta))
     exists = (eta > eta_critical(mu, p)) & (eta < p.j) & (p.c > 0)
     if released:
         lowest = np.clip((eta - p.j) / np.where(mu * eta > 0, 2 * p.j * mu * eta, 1.0), 0.0, 1.0)
-        exists = exists | (eta > p.j) & (mu > 0) & (p.c > 0) & (_denominator(lowest, p.j, mu, eta) > 0)
+        exists = exists | (eta > p.j) & (mu > 0) & (p.c > 0) & (
+            _denominator(lowest, p.j, mu, eta) > 0
+        )
     if not np.any(exists):
         return np.full(mu.shape, np.nan)
     # Valid numbers where there is no fold; the root there is discarded.
@@ -139,22 +163,30 @@ def fold(
 
 
 def points_at(p: Parameters) -> list[float]:
-    """All places s of the branch that belong to the flow p.omega_0 > 0, in the order of |alpha|; [] if none.
+    """All places s of the branch that belong to the flow p.omega_0 > 0, in the order of |alpha|; []
+    if none.
 
-    The first part of the branch, from RR to the fold, rises with Omega_0, the second falls; each gives at most one.
-    """
+    The first part of the branch, from RR to the fold, rises with Omega_0, the second falls; each
+    gives at most one."""
     if not (p.mu > 0 and p.c > 0 and p.eta < p.j):
         return []
     turning = float(fold(p))
     parts = [(-END, END)] if np.isnan(turning) else [(-END, turning), (turning, END)]
 
-    places = [float(roots.sign_change(lambda s: branch(s, p).Omega_0 - p.Omega_0, *part)) for part in parts]
+    places = [
+        float(roots.sign_change(lambda s: branch(s, p).Omega_0 - p.Omega_0, *part))
+        for part in parts
+    ]
     return [s for s in places if not np.isnan(s)]
 
 
-def _friction(p: Parameters, mu: npt.ArrayLike | None, eta: npt.ArrayLike | None) -> tuple[Array, Array]:
+def _friction(
+    p: Parameters, mu: npt.ArrayLike | None, eta: npt.ArrayLike | None
+) -> tuple[Array, Array]:
     """The given coefficients, or those of p."""
-    return np.asarray(p.mu if mu is None else mu, dtype=float), np.asarray(p.eta if eta is None else eta, dtype=float)
+    return np.asarray(p.mu if mu is None else mu, dtype=float), np.asarray(
+        p.eta if eta is None else eta, dtype=float
+    )
 
 
 def _denominator(cos: Array, j: float, mu: Array, eta: Array) -> Array:
@@ -163,19 +195,22 @@ def _denominator(cos: Array, j: float, mu: Array, eta: Array) -> Array:
 
 
 def states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
-    """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0 (37), (41)."""
+    """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0
+    (37), (41)."""
     b = branch(s, p)
     unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
     turn = np.sign(p.eta - p.j) * b.sin
-    return State(omega_c=b.Omega_c * unit, slip_x=w * turn, slip_z=w * b.cos).stacked(), b.Omega_0 * unit
+    return State(
+        omega_c=b.Omega_c * unit, slip_x=w * turn, slip_z=w * b.cos
+    ).stacked(), b.Omega_0 * unit
 
 
 def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128]:
     """Eigenvalues (..., 4) of SS at places s of its branch, rad s-1, rightmost first.
 
-    Those of `dynamics.jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z instead: near the
-    ends, where slip vanishes and two directions stiffen like 1/v_A, the others would drown in its round-off.
-    """
+    Those of `dynamics.jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z
+    instead: near the ends, where slip vanishes and two directions stiffen like 1/v_A, the others
+    would drown in its round-off."""
     b = branch(s, p)
     unit = np.sqrt(p.g / p.R)
     omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r
@@ -196,12 +231,13 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128
 def hopf_places(p: Parameters) -> list[float]:
     """Places s of the branch at which a complex pair crosses the imaginary axis (Hopf).
 
-    For eta < j none but for large mu. For eta > j, with (12) released, there is one in Fig. 12. `InputError` if the
-    branch has a gap, as far beyond j.
-    """
+    For eta < j none but for large mu. For eta > j, with (12) released, there is one in Fig. 12.
+    `InputError` if the branch has a gap, as far beyond j."""
     s = np.linspace(-30.0, 30.0, 1201)
     if not np.all(np.isfinite(branch(s, p).Omega_c)):
-        raise InputError(f"eta = {p.eta:g} is out of range: SS has no whole branch, so far beyond j = {p.j:g}")
+        raise InputError(
+            f"eta = {p.eta:g} is out of range: SS has no whole branch, so far beyond j = {p.j:g}"
+        )
 
     def pair_sums(s: npt.ArrayLike) -> Array:
         """Product of the sums of all pairs of eigenvalues: zero where lambda_i = -lambda_k."""

@@ -1,10 +1,10 @@
 """Stationary solutions of every case: Propositions 1-6, with forces, existence and stability.
 
-A solution of a case's equations (31) is listed whether or not its forces are admissible; `StationarySolution.exists`
-says so. Stability within the case comes from the eigenvalues of the exact Jacobian, taken by complex steps through the
-vector field itself. For omega_0 < 0 everything is the mirror image of omega_0 > 0. The law of drag shifts SS and the
-speed at which the ball sinks in NS; all else goes round with the fluid, whatever the law.
-"""
+A solution of a case's equations (31) is listed whether or not its forces are admissible;
+`StationarySolution.exists` says so. Stability within the case comes from the eigenvalues of the
+exact Jacobian, taken by complex steps through the vector field itself. For omega_0 < 0 everything
+is the mirror image of omega_0 > 0. The law of drag shifts SS and the speed at which the ball sinks
+in NS; all else goes round with the fluid, whatever the law."""
 
 from __future__ import annotations
 
@@ -24,10 +24,14 @@ from model.arrays import Array
 from model.drag import QUADRATIC, STOKES
 from model.errors import check_type
 
-_MIRROR, _MIRROR_FORCE = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0), np.array([1.0, 1.0, -1.0])
+_MIRROR, _MIRROR_FORCE = (
+    State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0),
+    np.array([1.0, 1.0, -1.0]),
+)
 """Signs of state and forces of the other sense of rotation."""
 _LEAST_REAL_PART = 1e-9
-"""Real part divided by modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
+"""Real part divided by modulus below which an eigenvalue counts as imaginary: the pair of NS is so,
+exactly."""
 
 
 class Stability(Enum):
@@ -35,7 +39,8 @@ class Stability(Enum):
 
     ASYMPTOTIC = "asymptotically stable"
     ALGEBRAIC = "asymptotically stable, but approached more slowly than exponentially"
-    """Where the fluid takes the ball along under the quadratic law, whose drag has no part linear in the lag."""
+    """Where the fluid takes the ball along under the quadratic law, whose drag has no part linear
+    in the lag."""
     NEUTRAL = "neutrally stable"
     UNSTABLE = "unstable"
 
@@ -46,13 +51,15 @@ class StationarySolution:
 
     case: Case
     x: Array
-    """State, shape (8,); of a family one member: y = 0, slip_y = 1 rad s-1 where it must slip, omega_c = omega_0."""
+    """State, shape (8,); of a family one member: y = 0, slip_y = 1 rad s-1 where it must slip,
+    omega_c = omega_0."""
     force_A: Array
     """Force of the floor, N, shape (3,); in RR the member of least friction utilisation."""
     force_B: Array
     """Force of the wall, N, shape (3,)."""
     eigenvalues: npt.NDArray[np.complex128]
-    """Of the Jacobian in the active variables (in NS without the cyclic y), rad s-1, rightmost first."""
+    """Of the Jacobian in the active variables (in NS without the cyclic y), rad s-1, rightmost
+    first."""
     exists: bool
     """Whether the contact forces obey (12) and (13)."""
     stability: Stability
@@ -81,16 +88,20 @@ class StationarySolution:
 
     @property
     def moves(self) -> bool:
-        """Whether the ball sinks along the wall all the same: stationary but for y (NS, Proposition 6)."""
+        """Whether the ball sinks along the wall all the same: stationary but for y (NS, Proposition
+        6)."""
         return bool(self.state.v_y != 0)
 
 
-def stationary_solutions(p: Parameters, cases: Collection[Case] = tuple(Case)) -> list[StationarySolution]:
-    """All stationary solutions at p.omega_0, or those of some cases, in the order of `Case`; SS by |alpha|.
+def stationary_solutions(
+    p: Parameters, cases: Collection[Case] = tuple(Case)
+) -> list[StationarySolution]:
+    """All stationary solutions at p.omega_0, or those of some cases, in the order of `Case`; SS by
+    |alpha|.
 
-    Solutions with inadmissible forces are listed with ``exists`` False. For omega_0 = 0 there are RR, RS and NS; for
-    c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and eta < j.
-    """
+    Solutions with inadmissible forces are listed with ``exists`` False. For omega_0 = 0 there are
+    RR, RS and NS; for c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and
+    eta < j."""
     check_type("p", p, Parameters)
     if p.omega_0 < 0:
         return [
@@ -107,33 +118,41 @@ def stationary_solutions(p: Parameters, cases: Collection[Case] = tuple(Case)) -
     return [s for case, solve in solvers.items() if case in map(Case, cases) for s in solve(p)]
 
 
-def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = False) -> StationarySolution:
+def solution(
+    p: Parameters, case: Case, *, stable: bool = True, formal: bool = False
+) -> StationarySolution:
     """The stable stationary solution of a case at p.omega_0, or the unstable one.
 
-    `formal` takes it even if its contact forces are inadmissible: NR below omega_02, SR with A_y < 0.
+    `formal` takes it even if its contact forces are inadmissible: NR below omega_02, SR with A_y <
+    0.
 
-    A case may be given by its name. Raises `InputError` if there is none, or more than one (two are unstable between
-    the Hopf points of a very rough floor).
-    """
+    A case may be given by its name. Raises `InputError` if there is none, or more than one (two are
+    unstable between the Hopf points of a very rough floor)."""
     case = Case(case)
-    those = [s for s in stationary_solutions(p, (case,)) if s.stable == stable and (formal or s.exists)]
+    those = [
+        s for s in stationary_solutions(p, (case,)) if s.stable == stable and (formal or s.exists)
+    ]
     if len(those) != 1:
         raise InputError(
-            f"case {case.name} has {len(those) or 'no'} {'stable' if stable else 'unstable'} stationary "
+            f"case {case.name} has {len(those) or 'no'} {'stable' if stable else 'unstable'} "
+            f"stationary "
             f"solution{'s' if those else ''} at omega_0 = {p.omega_0:g} rad s-1 "
-            f"(mu = {p.mu:g}, eta = {p.eta:g}, j = {p.j:g}, c = {p.c:g} s-1, R = {p.R:g} m, g = {p.g:g} m s-2)"
+            f"(mu = {p.mu:g}, eta = {p.eta:g}, j = {p.j:g}, c = {p.c:g} s-1, R = {p.R:g} m, g = "
+            f"{p.g:g} m s-2)"
         )
     return those[0]
 
 
 def stable_solutions(p: Parameters, sinking: bool = False) -> list[StationarySolution]:
-    """The stationary solutions that a disturbed ball returns to; not the one that only sinks (NS) unless `sinking`."""
+    """The stationary solutions that a disturbed ball returns to; not the one that only sinks (NS)
+    unless `sinking`."""
     those = [s for s in stationary_solutions(p) if s.exists and s.stable]
     return [s for s in those if (sinking if s.moves else s.slip_stable)]
 
 
 def slowest_time_constant(of: StationarySolution) -> float:
-    """Slowest time constant in s of the disturbances that die out within the case; inf if none does exponentially."""
+    """Slowest time constant in s of the disturbances that die out within the case; inf if none does
+    exponentially."""
     if of.stability is Stability.ALGEBRAIC:
         return np.inf
     rates = -of.eigenvalues.real
@@ -149,7 +168,8 @@ def _solution(
     family: tuple[str, ...] = (),
     values: npt.NDArray[np.complex128] | None = None,
 ) -> StationarySolution:
-    """The stationary solution at a state x, with forces and stability; eigenvalues by the Jacobian unless given."""
+    """The stationary solution at a state x, with forces and stability; eigenvalues by the Jacobian
+    unless given."""
     if p.c == 0:  # nothing pulls omega_c to omega_0
         family = (*family, "omega_c")
     force = dynamics.forces(case, x, p, p.omega_0)
@@ -160,7 +180,8 @@ def _solution(
         values = dynamics.eigenvalues(dynamics.jacobian(case, x, p))
     stability = _stability(values, zeros, bool(family) or case is Case.NS)
     if p.drag == QUADRATIC and p.c > 0 and case not in (Case.SS, Case.NS):
-        # No lag, so no drag to first order: any small linear drag decides the eigenvalues that are left at zero.
+        # No lag, so no drag to first order: any small linear drag decides the eigenvalues that are
+        # left at zero.
         damped = dynamics.eigenvalues(dynamics.jacobian(case, x, p.replace(drag=STOKES)))
         stability = _stability(damped, zeros, bool(family))
         stability = Stability.ALGEBRAIC if stability is Stability.ASYMPTOTIC else stability
@@ -178,7 +199,8 @@ def _solution(
 
 
 def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
-    """Stability by the rightmost eigenvalue, but for as many `zeros` as belong to the free variables of a family."""
+    """Stability by the rightmost eigenvalue, but for as many `zeros` as belong to the free
+    variables of a family."""
     rest = values[np.argsort(np.abs(values))][zeros:]
     if np.any(rest.real > _LEAST_REAL_PART * np.abs(rest)):
         return Stability.UNSTABLE
@@ -186,13 +208,22 @@ def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) ->
 
 
 def _rr(p: Parameters) -> list[StationarySolution]:
-    """Proposition 1: the ball rolls round with the fluid. Without drag every omega_c is stationary."""
+    """Proposition 1: the ball rolls round with the fluid. Without drag every omega_c is
+    stationary."""
     best = rolling_forces.least_utilisation(p.omega_0, p)
-    return [_solution(Case.RR, p, State(omega_c=p.omega_0), bool(best.utilisation <= 1 and not np.isnan(best.B_y)))]
+    return [
+        _solution(
+            Case.RR,
+            p,
+            State(omega_c=p.omega_0),
+            bool(best.utilisation <= 1 and not np.isnan(best.B_y)),
+        )
+    ]
 
 
 def _rs(p: Parameters) -> list[StationarySolution]:
-    """Proposition 2: the ball spins on the spot, if the fluid rests or drags nothing; on a smooth wall, anywhere."""
+    """Proposition 2: the ball spins on the spot, if the fluid rests or drags nothing; on a smooth
+    wall, anywhere."""
     if p.eta > 0 and p.c > 0 and p.omega_0 != 0:
         return []
     omega_c = p.omega_0 if p.eta == 0 else 0.0
@@ -203,8 +234,8 @@ def _rs(p: Parameters) -> list[StationarySolution]:
 def _sr(p: Parameters) -> list[StationarySolution]:
     """Proposition 3, for the formal field: A_y = 0 puts the solution on the border to NR.
 
-    On a smooth floor any slip_x is stationary; the member given is the one that doesn't spin about the radius.
-    """
+    On a smooth floor any slip_x is stationary; the member given is the one that doesn't spin about
+    the radius."""
     if p.omega_0 == 0:
         return []
     if p.mu == 0:
@@ -215,7 +246,8 @@ def _sr(p: Parameters) -> list[StationarySolution]:
 
 
 def _ss(p: Parameters) -> list[StationarySolution]:
-    """Proposition 4, by root finding along the branch. On a smooth wall slip_y is free: the member given has none."""
+    """Proposition 4, by root finding along the branch. On a smooth wall slip_y is free: the member
+    given has none."""
     smooth = ("slip_y",) if p.eta == 0 else ()
     if p.mu == p.eta == 0 and p.omega_0 != 0:
         x = State(omega_c=p.omega_0, slip_x=-p.omega_0 * p.R / p.r, slip_y=1.0)
@@ -223,7 +255,11 @@ def _ss(p: Parameters) -> list[StationarySolution]:
     solutions = []
     for s in slipping_branch.points_at(p):
         x, values = State.of(slipping_branch.states(s, p)[0]), slipping_branch.eigenvalues_at(s, p)
-        solutions.append(replace(_solution(Case.SS, p, x, True, smooth, values), alpha=-float(np.arctan(np.exp(s)))))
+        solutions.append(
+            replace(
+                _solution(Case.SS, p, x, True, smooth, values), alpha=-float(np.arctan(np.exp(s)))
+            )
+        )
     return solutions
 
 
@@ -236,7 +272,8 @@ def _nr(p: Parameters) -> list[StationarySolution]:
 
 
 def _ns(p: Parameters) -> list[StationarySolution]:
-    """Proposition 6: sinking along the wall at a constant speed; none without drag, which alone limits the speed."""
+    """Proposition 6: sinking along the wall at a constant speed; none without drag, which alone
+    limits the speed."""
     sink = p.g - p.eta * p.R * p.omega_0**2
     if p.c == 0 or sink <= 0:
         return []
@@ -256,21 +293,23 @@ def _wall_carries(p: Parameters) -> bool:
 
 
 def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
-    """Eigenvalues (2,) in rad s-1 of f_SR at its stationary solution, and unit vectors (2, 2), one a row.
+    """Eigenvalues (2,) in rad s-1 of f_SR at its stationary solution, and unit vectors (2, 2), one
+    a row.
 
-    There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only, where the ball leans
-    on the floor; on the other it lifts off. The first is that of leaning, which decays for omega_0 > omega_03 and grows
-    below; the second that of the orbit, the one closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to
-    A_y > 0. With s the sign of slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their
-    product -mu s c omega_0/(1+j), where c is that of a vanishing lag.
+    There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only,
+    where the ball leans on the floor; on the other it lifts off. The first is that of leaning,
+    which decays for omega_0 > omega_03 and grows below; the second that of the orbit, the one
+    closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to A_y > 0. With s the sign of
+    slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their product
+    -mu s c omega_0/(1+j), where c is that of a vanishing lag.
 
-    Raises `InputError` if SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at omega_03, where
-    slip_x = 0.
-    """
+    Raises `InputError` if SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at
+    omega_03, where slip_x = 0."""
     leaning = [s.state for s in stationary_solutions(p, (Case.SR,)) if p.mu > 0]
     if not leaning:
         raise InputError(
-            f"omega_0 = {p.omega_0:g} rad s-1, mu = {p.mu:g}: SR has no stationary solution that leans on the floor"
+            f"omega_0 = {p.omega_0:g} rad s-1, mu = {p.mu:g}: SR has no stationary solution that "
+            f"leans on the floor"
         )
     (x,) = leaning
     values, vectors = np.linalg.eig(dynamics.jacobian(Case.SR, x, p).astype(complex))

@@ -1,12 +1,12 @@
 """The ball in Siconos: a program for the Python that has it, which takes steps on demand.
 
-It reads and writes lines of JSON. First comes the problem; then nine numbers (position, velocity and spin) to start
-from, three (a force) for a step, answered by those three vectors, or none, answered by [contact, force, gap] of each
-contact point that carries something. All is in world axes. What fails is answered by {"error": ...}.
-`compare.adapters.siconos` is at the other end.
+It reads and writes lines of JSON. First comes the problem; then nine numbers (position, velocity
+and spin) to start from, three (a force) for a step, answered by those three vectors, or none,
+answered by [contact, force, gap] of each contact point that carries something. All is in world
+axes. What fails is answered by {"error": ...}. `compare.adapters.siconos` is at the other end.
 
-The Python that runs it isn't that of the project: nothing but Siconos, numpy and the standard library is imported.
-"""
+The Python that runs it isn't that of the project: nothing but Siconos, numpy and the standard
+library is imported."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ def main() -> None:
 
 
 class Scene:
-    """A ball in axes that turn with it, outward, along and up, so that floor and wall are planes."""
+    """A ball in axes that turn with it, outward, along and up, so that floor and wall are
+    planes."""
 
     def __init__(self, given: dict[str, Any]) -> None:
         self.given, self.R, self.r, self.mass = given, given["R"], given["r"], given["m"]
@@ -55,7 +56,11 @@ class Scene:
         self.azimuth, h, r = math.atan2(y, x), self.R - math.hypot(x, y), self.r
         self.axes = turned(self.azimuth)
         ball = TurningBall(
-            [-h, 0, z - r, 0, 0, 0], [*self.axes @ velocity, *self.axes @ spin], self.mass, self.inertia, self.R
+            [-h, 0, z - r, 0, 0, 0],
+            [*self.axes @ velocity, *self.axes @ spin],
+            self.mass,
+            self.inertia,
+            self.R,
         )
         floor = [[0, 0, 1, 0, 0, 0], [1, 0, 0, 0, -r, 0], [0, 1, 0, r, 0, 0]]
         wall = [[-1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, r], [0, 0, 1, 0, -r, 0]]
@@ -67,7 +72,9 @@ class Scene:
             if friction is None:  # there is no floor
                 continue
             law = kernel.NewtonImpactFrictionNSL(0.0, 0.0, friction, 3)
-            self.contacts.append(kernel.Interaction(law, kernel.LagrangianLinearTIR(np.array(rows, float))))
+            self.contacts.append(
+                kernel.Interaction(law, kernel.LagrangianLinearTIR(np.array(rows, float)))
+            )
             system.link(self.contacts[-1], ball)
         solver = kernel.FrictionContact(3)
         options = solver.numericsSolverOptions()
@@ -83,7 +90,8 @@ class Scene:
         self.simulation.initialize()
 
     def advance(self, force: list[float]) -> Any:
-        """Take a step under a force in world axes, constant over it; position, velocity and spin after it."""
+        """Take a step under a force in world axes, constant over it; position, velocity and spin
+        after it."""
         self.axes, q = turned(self.azimuth), self.ball.q()
         before, way = self.R + q[0], q[1]
         outward, along, upward = self.axes @ force
@@ -100,7 +108,8 @@ class Scene:
         return position, (rates[:3] @ axes).tolist(), (rates[3:] @ axes).tolist()
 
     def touches(self) -> list[Any]:
-        """Number, force on the ball and gap of each contact that carried something in the last step."""
+        """Number, force on the ball and gap of each contact that carried something in the last
+        step."""
         shown = []
         for number, contact in enumerate(self.contacts):
             impulse = contact.lambda_(1)
@@ -111,11 +120,11 @@ class Scene:
 
 
 class TurningBall(kernel.LagrangianDS):  # type: ignore[misc]
-    """A free ball in axes that turn with it: M dv/dt + M Omega x v = F for its velocity and its spin.
+    """A free ball in axes that turn with it: M dv/dt + M Omega x v = F for its velocity and its
+    spin.
 
-    Coordinates are -h, the way along the wall, y, and three that nothing depends on; axes outward, along and up.
-    Omega = (0, 0, v_along/(R - h)).
-    """
+    Coordinates are -h, the way along the wall, y, and three that nothing depends on; axes outward,
+    along and up. Omega = (0, 0, v_along/(R - h))."""
 
     def __init__(self, q: Any, v: Any, mass: float, inertia: float, R: float) -> None:
         self.R, self.across = R, np.zeros((6, 6))

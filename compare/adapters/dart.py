@@ -1,8 +1,8 @@
 """DART: semi-implicit Euler, and a contact problem on velocities in each step, in double precision.
 
-Traps: commands to joints are forgotten after each step; of the collision detectors only that of ODE places the contacts
-of a box on a plane so that it neither rocks nor sinks in; friction is the lesser of both bodies' coefficients.
-"""
+Traps: commands to joints are forgotten after each step; of the collision detectors only that of ODE
+places the contacts of a box on a plane so that it neither rocks nor sinks in; friction is the
+lesser of both bodies' coefficients."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ class Dart(Free):
         self.world.setTimeStep(self.timestep)
         self.world.setGravity([0.0, 0.0, -scene.g])
         if self.best:
-            solver, self.cone = self.world.getConstraintSolver(), engine.constraint.NsgsFrictionSolver()
+            solver, self.cone = (
+                self.world.getConstraintSolver(),
+                engine.constraint.NsgsFrictionSolver(),
+            )
             self.world.setCollisionDetector(engine.collision.OdeCollisionDetector())
             solver.setBoxedLcpSolver(self.cone)
             solver.setSplitImpulseEnabled(True)
@@ -49,7 +52,9 @@ class Dart(Free):
                     skeleton.createPrismaticJointAndBodyNodePair,
                 )
                 joint, node = turns() if surface.turning else slides()
-                joint.setAxis([0.0, 0.0, 1.0] if surface.turning else np.array(surface.velocity) / rate)
+                joint.setAxis(
+                    [0.0, 0.0, 1.0] if surface.turning else np.array(surface.velocity) / rate
+                )
                 joint.setActuatorType(bodies.ActuatorType.VELOCITY)
                 self.tables.append((joint, rate))
             else:
@@ -71,12 +76,22 @@ class Dart(Free):
                 if body.shape == "disc":
                     shape = bodies.CylinderShape(size[0], 2 * size[1])
                 else:
-                    shape = bodies.BoxShape(2 * size) if body.shape == "box" else bodies.SphereShape(size[0])
+                    shape = (
+                        bodies.BoxShape(2 * size)
+                        if body.shape == "box"
+                        else bodies.SphereShape(size[0])
+                    )
                 self.add(skeleton, node, shape, friction, at)
             self.nodes.append(node)
 
     def add(
-        self, skeleton: Any, node: Any, shape: Any, friction: float, at: Any = (0, 0, 0), restitution: float = 1.0
+        self,
+        skeleton: Any,
+        node: Any,
+        shape: Any,
+        friction: float,
+        at: Any = (0, 0, 0),
+        restitution: float = 1.0,
     ) -> None:
         """Give a body a shape with friction and restitution, at a place in its axes."""
         frame = node.createShapeNode(shape)
@@ -94,7 +109,9 @@ class Dart(Free):
         super().advance()
 
     def read(self) -> State:
-        return sum(((n.getCOM(), n.getLinearVelocity(), n.getAngularVelocity()) for n in self.nodes), ())
+        return sum(
+            ((n.getCOM(), n.getLinearVelocity(), n.getAngularVelocity()) for n in self.nodes), ()
+        )
 
     def push(self, force: Vector) -> None:
         self.nodes[0].setExtForce(force, np.zeros(3), False, True)
@@ -125,9 +142,12 @@ def translation(position: Any) -> Array:
     return pose
 
 
-defaults = Dart("dart-defaults", "boxes rock and creep, since FCL places their contacts anew in every step")
+defaults = Dart(
+    "dart-defaults", "boxes rock and creep, since FCL places their contacts anew in every step"
+)
 best = Dart(
     "dart",
     "a landing is late by up to a step, and its overlap is taken out slowly",
-    "contacts by ODE's collision detector, Coulomb's cone by NSGS, overlaps taken out by split impulses",
+    "contacts by ODE's collision detector, Coulomb's cone by NSGS, overlaps taken out by split "
+    "impulses",
 )

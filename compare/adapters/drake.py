@@ -1,15 +1,15 @@
-"""Drake: a discrete `MultibodyPlant` with point contact, normal forces implicit, friction regularised below a speed.
+"""Drake: a discrete `MultibodyPlant` with point contact, normal forces implicit, friction
+regularised below a speed.
 
-TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a contact that should
-roll creeps at a part of v_s, and a ball sinks in by its load divided by the stiffness. Both can be made small, as far
-as Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of
-their own, and creep.
+TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a
+contact that should roll creeps at a part of v_s, and a ball sinks in by its load divided by the
+stiffness. Both can be made small, as far as Newton's method converges. The convex solvers (SAP, its
+variants "similar" and "lagged") have a softer friction of their own, and creep.
 
-Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1 + k2); without
-`SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane has to be a half space, since
-boxes are less exact, but one among a dozen of other shapes crashes the engine; two half spaces that may meet are
-refused.
-"""
+Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1
++ k2); without `SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a
+plane has to be a half space, since boxes are less exact, but one among a dozen of other shapes
+crashes the engine; two half spaces that may meet are refused."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ from compare.adapters.scene import Surface, Vector, facing
 from model.arrays import Array
 
 STIFFNESS, DISSIPATION, STICTION = 1e7, 100.0, 1e-8
-"""N/m and s/m of body and surfaces, and v_s in m/s. A body that has landed comes out of its overlap at up to the
-reciprocal of the dissipation: with less it is thrown back, with more it stays sunk in for long. Where the wall is
-placed anew before each step a hundred times the stiffness makes the contact chatter, and TAMSI fail."""
+"""N/m and s/m of body and surfaces, and v_s in m/s. A body that has landed comes out of its overlap
+at up to the reciprocal of the dissipation: with less it is thrown back, with more it stays sunk in
+for long. Where the wall is placed anew before each step a hundred times the stiffness makes the
+contact chatter, and TAMSI fail."""
 HEAVY = 1e6
 """Mass of a wall that moves, divided by the body's: nothing slows it."""
 ROUND = 1e6
@@ -35,7 +36,9 @@ ROUND = 1e6
 SIZE = 100.0
 """Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
 
-logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
+logging.getLogger("drake").setLevel(
+    logging.ERROR
+)  # it warns that half spaces don't meet deformable bodies
 
 
 class Drake(Free):
@@ -48,7 +51,9 @@ class Drake(Free):
         scene, body = self.scene, self.scene.body
         self.most = max(surface.friction for surface in scene.surfaces)
         builder = engine.DiagramBuilder()
-        self.plant, graph = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(self.timestep))
+        self.plant, graph = engine.AddMultibodyPlantSceneGraph(
+            builder, engine.MultibodyPlant(self.timestep)
+        )
         plant = self.plant
         plant.set_contact_model(engine.ContactModel.kPoint)
         solver = engine.DiscreteContactApproximation
@@ -60,15 +65,21 @@ class Drake(Free):
         self.own = ball.index()
         for k, (place, shape) in enumerate(self.shapes()):
             self.add(ball, place, shape, f"body{k}")
-        moving = [surface for surface in scene.surfaces if self.goes_along(surface) or surface.turning]
+        moving = [
+            surface for surface in scene.surfaces if self.goes_along(surface) or surface.turning
+        ]
         walls = {surface.name: self.moving_body(surface) for surface in moving}
         self.surfaces = {}
         for surface, name, point, normal in self.planes():
             of = walls.get(surface.name, plant.world_body())
             if self.goes_along(surface):
                 point, normal = np.zeros(3), np.array([-1.0, 0.0, 0.0])
-            self.surfaces[self.plane(of, point, normal, name, surface)] = scene.surfaces.index(surface)
-        apart = engine.CollisionFilterDeclaration().ExcludeWithin(engine.GeometrySet([*self.surfaces]))
+            self.surfaces[self.plane(of, point, normal, name, surface)] = scene.surfaces.index(
+                surface
+            )
+        apart = engine.CollisionFilterDeclaration().ExcludeWithin(
+            engine.GeometrySet([*self.surfaces])
+        )
         graph.collision_filter_manager().Apply(apart)
         plant.Finalize()
         if self.best:
@@ -76,7 +87,10 @@ class Drake(Free):
         self.diagram = builder.Build()  # which, as its context, must outlive the plant's
         self.root = self.diagram.CreateDefaultContext()
         self.context = plant.GetMyMutableContextFromRoot(self.root)
-        self.force, self.x = np.zeros(plant.num_velocities()), plant.GetPositionsAndVelocities(self.context)
+        self.force, self.x = (
+            np.zeros(plant.num_velocities()),
+            plant.GetPositionsAndVelocities(self.context),
+        )
         self.ball = self.wall = self.state_slices(ball)
         self.x[self.ball[0]] = [*body.orientation, *body.position]
         self.x[self.ball[1]] = [*body.spin, *body.velocity]
@@ -88,10 +102,13 @@ class Drake(Free):
                 self.wall = self.state_slices(walls[surface.name])
 
     def moving_body(self, surface: Surface) -> Any:
-        """The body of a surface that moves: a turntable on its hinge, or one that floats without gravity."""
+        """The body of a surface that moves: a turntable on its hinge, or one that floats without
+        gravity."""
         plant, own = self.plant, self.plant.AddModelInstance(surface.name)
         plant.set_gravity_enabled(own, False)
-        mass = self.scene.body.mass * (1.0 if surface.turning else HEAVY)  # the engine's own stiffness is by mass
+        mass = self.scene.body.mass * (
+            1.0 if surface.turning else HEAVY
+        )  # the engine's own stiffness is by mass
         inertia = engine.SpatialInertia(mass, np.zeros(3), engine.UnitInertia(ROUND, ROUND, ROUND))
         body = plant.AddRigidBody(surface.name, own, inertia)
         if surface.turning:
@@ -103,39 +120,59 @@ class Drake(Free):
         """Shapes of the body with their poses; a box in the best settings is its corners."""
         body = self.scene.body
         if body.shape == "sphere" or not self.best:
-            whole = engine.Sphere(*body.size) if body.shape == "sphere" else engine.Box(*(2 * np.array(body.size)))
+            whole = (
+                engine.Sphere(*body.size)
+                if body.shape == "sphere"
+                else engine.Box(*(2 * np.array(body.size)))
+            )
             return [(engine.RigidTransform(), whole)]
         corners = itertools.product(*((-half, half) for half in body.size))
-        return [(engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners]
+        return [
+            (engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners
+        ]
 
     def add(self, of: Any, pose: Any, shape: Any, name: str, friction: float | None = None) -> Any:
-        """Register a shape of the body or of a surface; `friction` is that of the pair, None for the body."""
+        """Register a shape of the body or of a surface; `friction` is that of the pair, None for
+        the body."""
         material, mu = engine.ProximityProperties(), self.most
         if friction is not None:  # the harmonic mean of both is the pair's
             mu = mu * friction / (2 * mu - friction) if friction else 0.0
         springs = {"dissipation": DISSIPATION, "point_stiffness": STIFFNESS} if self.best else {}
-        engine.AddContactMaterial(**springs, friction=engine.CoulombFriction(mu, mu), properties=material)
+        engine.AddContactMaterial(
+            **springs, friction=engine.CoulombFriction(mu, mu), properties=material
+        )
         return self.plant.RegisterCollisionGeometry(of, pose, shape, name, material)
 
     def plane(self, of: Any, point: Array, normal: Array, name: str, surface: Surface) -> Any:
-        """Register a plane: a half space, or one side of a cube, as a dozen half spaces crash the engine."""
-        size = 0.0 if self.best else SIZE * max((each.radius or 0.0) for each in self.scene.surfaces)
+        """Register a plane: a half space, or one side of a cube, as a dozen half spaces crash the
+        engine."""
+        size = (
+            0.0 if self.best else SIZE * max((each.radius or 0.0) for each in self.scene.surfaces)
+        )
         if not size:
             pose, shape = engine.HalfSpace.MakePose(normal, point), engine.HalfSpace()
         else:
             turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
-            pose, shape = engine.RigidTransform(turn, point - size / 2 * normal), engine.Box(size, size, size)
+            pose, shape = (
+                engine.RigidTransform(turn, point - size / 2 * normal),
+                engine.Box(size, size, size),
+            )
         return self.add(of, pose, shape, name, surface.friction)
 
     def state_slices(self, body: Any) -> tuple[slice, slice]:
         """Slices of the state: orientation and place of a free body, and its spin and velocity."""
-        at, rate = body.floating_positions_start(), self.plant.num_positions() + body.floating_velocities_start_in_v()
+        at, rate = (
+            body.floating_positions_start(),
+            self.plant.num_positions() + body.floating_velocities_start_in_v(),
+        )
         return slice(at, at + 7), slice(rate, rate + 6)
 
     def advance(self) -> None:
         self.plant.get_applied_generalized_force_input_port().FixValue(self.context, self.force)
         self.plant.SetPositionsAndVelocities(self.context, self.x)
-        self.x = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
+        self.x = (
+            self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
+        )
 
     def read(self) -> State:
         pose, rate = (self.x[part] for part in self.ball)
@@ -146,21 +183,32 @@ class Drake(Free):
         self.force[first + 3 : first + 6] = force
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        self.x[self.wall[0]], self.x[self.wall[1]] = [*facing(normal), *point], [0.0, 0.0, 0.0, *velocity]
+        self.x[self.wall[0]], self.x[self.wall[1]] = (
+            [*facing(normal), *point],
+            [0.0, 0.0, 0.0, *velocity],
+        )
 
     def touches(self) -> list[Touch]:
         results = self.plant.get_contact_results_output_port().Eval(self.context)
         shown = []
-        for info in (results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())):
-            pair, sign = info.point_pair(), 1 if info.bodyB_index() == self.own else -1  # it acts on the second body
+        for info in (
+            results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())
+        ):
+            pair, sign = (
+                info.point_pair(),
+                1 if info.bodyB_index() == self.own else -1,
+            )  # it acts on the second body
             surface = self.surfaces[pair.id_A if sign > 0 else pair.id_B]
             shown.append(Touch(surface, sign * info.contact_force(), -pair.depth))
         return shown
 
 
-defaults = Drake("drake-defaults", "boxes touch a plane at one point at a time, and tumble from corner to corner")
+defaults = Drake(
+    "drake-defaults", "boxes touch a plane at one point at a time, and tumble from corner to corner"
+)
 best = Drake(
     "drake",
     "a body that lands overlaps by up to a step's way, and comes out slowly",
-    f"TAMSI, {STIFFNESS:.0e} N/m, stiction tolerance {STICTION:g} m/s; a box touches by its corners",
+    f"TAMSI, {STIFFNESS:.0e} N/m, stiction tolerance {STICTION:g} m/s; a box touches by its "
+    f"corners",
 )

@@ -1,4 +1,5 @@
-"""What adapters of engines share: free bodies, the force of each step, a plane that goes along for a cylinder."""
+"""What adapters of engines share: free bodies, the force of each step, a plane that goes along for
+a cylinder."""
 
 from __future__ import annotations
 
@@ -37,7 +38,11 @@ class Library:
     @property
     def missing(self) -> str:
         """Why the engine can't be used here, and what to do about it; empty if it can."""
-        return "" if self.version != ABSENT else f"{self.name} is not installed: pip install {self.name}"
+        return (
+            ""
+            if self.version != ABSENT
+            else f"{self.name} is not installed: pip install {self.name}"
+        )
 
     @property
     def version(self) -> str:
@@ -45,7 +50,8 @@ class Library:
         return version(self.name)
 
     def load(self, member: str) -> Free:
-        """A copy of an adapter by its name in the module; `InputError` if the package is missing or broken."""
+        """A copy of an adapter by its name in the module; `InputError` if the package is missing or
+        broken."""
         try:
             engine: Free = getattr(importlib.import_module(self.module), member)
         except ImportError as error:
@@ -69,32 +75,39 @@ class BreakdownError(RuntimeError):
 
 
 class Free(ABC):
-    """A free body in an engine: in the best settings, with a wall that moves along, or as it comes, with facets."""
+    """A free body in an engine: in the best settings, with a wall that moves along, or as it comes,
+    with facets."""
 
     PRECISION = "f64"
     FEATURES: tuple[str, ...] = ()
     """Of `Scene.needs`, what it can do."""
     AHEAD = 0.5
-    """Share of a step by which positions, where contacts and forces are found, are ahead of velocities. Semi-implicit
-    steps are leapfrog, of second order, once one says so: in the best settings bodies start so far on, and what is read
-    of them is taken back."""
+    """Share of a step by which positions, where contacts and forces are found, are ahead of
+    velocities. Semi-implicit steps are leapfrog, of second order, once one says so: in the best
+    settings bodies start so far on, and what is read of them is taken back."""
     RESOLUTION = 1e-9
-    """The least slip speed that the engine tells from rolling, m/s: to what its solver goes, or round-off."""
+    """The least slip speed that the engine tells from rolling, m/s: to what its solver goes, or
+    round-off."""
 
     TELLS = TURNS = False
-    """Whether the engine tells what contacts carry, friction included, and whether its planes turn."""
+    """Whether the engine tells what contacts carry, friction included, and whether its planes
+    turn."""
 
     def __init__(self, name: str, note: str, best: str = "") -> None:
-        """`note`: what is worst, and why; `best` declares settings other than the engine's own; empty for those."""
+        """`note`: what is worst, and why; `best` declares settings other than the engine's own;
+        empty for those."""
         self.NAME, self.NOTE, self.best = name, note, bool(best)
         moved = "one plane that goes with the body for a cylinder; positions half a step ahead of velocities"
-        self.DECLARED = "; ".join(filter(None, (moved if best else f"{FACETS} planes for a cylinder", best)))
+        self.DECLARED = "; ".join(
+            filter(None, (moved if best else f"{FACETS} planes for a cylinder", best))
+        )
         self.scene: Scene
         self.world: Any
         self.timestep = self.now = self.ahead = 0.0
 
     def build(self, scene: Scene, timestep: float) -> None:
-        """Put the scene at its start into the engine; raises `NotImplementedError` for one that it can't have."""
+        """Put the scene at its start into the engine; raises `NotImplementedError` for one that it
+        can't have."""
         self.ahead = self.now = self.AHEAD * timestep * self.best
         body, under = scene.body.after(self.ahead), scene.under and scene.under.after(self.ahead)
         self.scene, self.timestep = dataclasses.replace(scene, body=body, under=under), timestep
@@ -131,7 +144,8 @@ class Free(ABC):
         return self.best and surface.radius is not None
 
     def planes(self) -> Iterator[tuple[Surface, str, Array, Array]]:
-        """The planes of the scene, as `Scene.planes`: a cylinder's are many, or the one that moves along."""
+        """The planes of the scene, as `Scene.planes`: a cylinder's are many, or the one that moves
+        along."""
         if any(surface.turning for surface in self.scene.surfaces) and not self.TURNS:
             raise NotImplementedError("its planes don't turn")
         return self.scene.planes(1 if self.best else FACETS)
@@ -153,7 +167,8 @@ class Free(ABC):
         raise NotImplementedError("it takes no forces")
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        """Place the plane that stands for the cylinder, and give it a velocity for the next step, m/s."""
+        """Place the plane that stands for the cylinder, and give it a velocity for the next step,
+        m/s."""
         raise NotImplementedError("its planes can't be moved")
 
     def touches(self) -> list[Touch]:

@@ -1,4 +1,5 @@
-"""MuJoCo with free bodies in a case's own MJCF: as it comes, with settings, or under Coulomb's law."""
+"""MuJoCo with free bodies in a case's own MJCF: as it comes, with settings, or under Coulomb's
+law."""
 
 from __future__ import annotations
 
@@ -22,12 +23,13 @@ _SOLIMP = 0.999
 _PARTS = 16
 """Steps in one in which something lands."""
 _WALL = 2.0
-"""Half edges of the piece of wall that goes with the body, in radii: what rolls on a wall of the size of the body is
-told from what stays where it is."""
+"""Half edges of the piece of wall that goes with the body, in radii: what rolls on a wall of the
+size of the body is told from what stays where it is."""
 
 
 class Bodies(Free):
-    """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step."""
+    """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a
+    time step."""
 
     TELLS = TURNS = True
     FEATURES: tuple[str, ...] = FEATURES
@@ -41,7 +43,8 @@ class Bodies(Free):
         tune: Callable[[Any, Scene, float], None] | None = None,
         declared: str = "",
     ) -> None:
-        """`tune` is that function; `declared` is for what `best`, a wall that goes along, doesn't declare."""
+        """`tune` is that function; `declared` is for what `best`, a wall that goes along, doesn't
+        declare."""
         super().__init__(name, note, best)
         self.tune, self.DECLARED = tune, declared or self.DECLARED
 
@@ -65,7 +68,9 @@ class Bodies(Free):
         found, rate = [], np.empty(6)
         for name in ("body", "under")[: len(self.scene.bodies)]:
             body = self.data.body(name)
-            mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body.id, rate, 0)
+            mujoco.mj_objectVelocity(
+                self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body.id, rate, 0
+            )
             found += [body.xpos, rate[3:].copy(), rate[:3].copy()]
         return tuple(found)
 
@@ -74,7 +79,9 @@ class Bodies(Free):
 
     def touches(self) -> list[Touch]:
         shown, force, contact = [], np.empty(6), self.data.contact
-        for k, (geom, frame, gap) in enumerate(zip(contact.geom1, contact.frame, contact.dist.tolist(), strict=True)):
+        for k, (geom, frame, gap) in enumerate(
+            zip(contact.geom1, contact.frame, contact.dist.tolist(), strict=True)
+        ):
             mujoco.mj_contactForce(self.model, self.data, k, force)
             shown.append(Touch(self.surfaces[geom], force[:3] @ frame.reshape(3, 3), gap))
         return shown
@@ -83,8 +90,8 @@ class Bodies(Free):
 class Lawful(Bodies):
     """Rigid contacts under Coulomb's law; of a cylinder a piece of wall that goes with the body.
 
-    A blow takes two steps, and what bore a body until then may let go in the first; so steps are short round it.
-    """
+    A blow takes two steps, and what bore a body until then may let go in the first; so steps are
+    short round it."""
 
     FEATURES = (*FEATURES, "restitution")
 
@@ -95,15 +102,22 @@ class Lawful(Bodies):
         self.whole = self.timestep
 
     def step(self, n: int) -> None:
-        model, data, slow = self.model, self.data, 2 * self.whole * float(np.linalg.norm(self.model.opt.gravity))
+        model, data, slow = (
+            self.model,
+            self.data,
+            2 * self.whole * float(np.linalg.norm(self.model.opt.gravity)),
+        )
         for _ in range(n):
             mujoco.mj_step1(model, data)
             contact, seen = data.contact, data.contact.efc_address >= 0
             speed, gap = data.efc_vel[contact.efc_address[seen]], contact.dist[seen]
-            # Whether a contact closes in this step or by the middle of the next, where a whole one would see it.
+            # Whether a contact closes in this step or by the middle of the next, where a whole one
+            # would see it.
             lands = ((speed < -slow) & (gap + 1.5 * self.whole * speed < 0)).any()
             parts = _PARTS if lands else 1
-            if change := (self.whole / parts - self.timestep) / 2:  # positions are half a step ahead of velocities
+            if (
+                change := (self.whole / parts - self.timestep) / 2
+            ):  # positions are half a step ahead of velocities
                 mujoco.mj_integratePos(model, data.qpos, data.qvel, change)
                 self.timestep = model.opt.timestep = self.whole / parts
                 self.ahead, self.now = self.ahead + change, self.now + change
@@ -116,16 +130,23 @@ class Lawful(Bodies):
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
         wall = self.model.body("wall")
         wall.pos, wall.quat = point, facing(normal)
-        # From the opposite velocity on, so that in the middle of the step, which friction looks at, it has none.
+        # From the opposite velocity on, so that in the middle of the step, which friction looks at,
+        # it has none.
         self.data.qpos[-2:], self.data.qvel[-2:] = 0.0, (-velocity @ normal, -velocity[2])
-        self.data.qfrc_applied[-2:] = self.model.dof_M0[-2:] * 2 / self.timestep * (velocity @ normal, velocity[2])
+        self.data.qfrc_applied[-2:] = (
+            self.model.dof_M0[-2:] * 2 / self.timestep * (velocity @ normal, velocity[2])
+        )
 
 
 def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
-    """Add a contact pair, with the surface's friction, for each surface and what touches it; yield name and pair."""
+    """Add a contact pair, with the surface's friction, for each surface and what touches it; yield
+    name and pair."""
     lowest = "under" if scene.under else "body"
     for surface in scene.surfaces:
-        of = [[g.name for g in spec.geoms if g.name.rstrip("0123456789") == name] for name in (surface.name, lowest)]
+        of = [
+            [g.name for g in spec.geoms if g.name.rstrip("0123456789") == name]
+            for name in (surface.name, lowest)
+        ]
         for geom, part in itertools.product(*of):
             pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
             pair.friction = (surface.friction, surface.friction, 0.0, 0.0, 0.0)
@@ -133,10 +154,11 @@ def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
 
 
 def studied(spec: Any, scene: Scene, timestep: float) -> None:
-    """Set an elliptic cone, stiff friction, and normal rows soft and slow enough for blocks on four points.
+    """Set an elliptic cone, stiff friction, and normal rows soft and slow enough for blocks on four
+    points.
 
-    b_f h is a tenth, so that contacts don't hover at 2 m/s; impratio 1e4 leaves a creep of some micrometres a second.
-    """
+    b_f h is a tenth, so that contacts don't hover at 2 m/s; impratio 1e4 leaves a creep of some
+    micrometres a second."""
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio, spec.option.tolerance = 1e4, 1e-12
     for _, pair in pairs(spec, scene):
@@ -145,10 +167,14 @@ def studied(spec: Any, scene: Scene, timestep: float) -> None:
 
 
 def rigid(spec: Any, scene: Scene, timestep: float) -> None:
-    """Set an elliptic cone, solved to round-off; dry joints stop within a step; a wall that moves replaces facets."""
+    """Set an elliptic cone, solved to round-off; dry joints stop within a step; a wall that moves
+    replaces facets."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
     for joint in spec.joints:
-        joint.solref_friction, joint.solimp_friction = (-1.0, -_SOLIMP / timestep), (_SOLIMP, _SOLIMP, 1.0, 0.5, 2.0)
+        joint.solref_friction, joint.solimp_friction = (
+            (-1.0, -_SOLIMP / timestep),
+            (_SOLIMP, _SOLIMP, 1.0, 0.5, 2.0),
+        )
     for surface in scene.surfaces:
         if not surface.radius:
             continue
@@ -157,9 +183,18 @@ def rigid(spec: Any, scene: Scene, timestep: float) -> None:
         spec.option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
         own, half = spec.worldbody.add_body(name=surface.name), _WALL * scene.body.size[0]
         for axis in ([-1, 0, 0], [0, 0, 1]):
-            own.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=_HEAVY * scene.body.mass)
+            own.add_joint(
+                type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=_HEAVY * scene.body.mass
+            )
         box, friction = mujoco.mjtGeom.mjGEOM_BOX, [surface.friction, 0.0, 0.0]
-        own.add_geom(name=surface.name, type=box, size=[half] * 3, pos=[half, 0, 0], friction=friction, mass=1e-9)
+        own.add_geom(
+            name=surface.name,
+            type=box,
+            size=[half] * 3,
+            pos=[half, 0, 0],
+            friction=friction,
+            mass=1e-9,
+        )
         spec.add_exclude(bodyname1="world", bodyname2=surface.name)
         key = spec.key("start")
         key.qpos, key.qvel = [*key.qpos, 0.0, 0.0], [*key.qvel, 0.0, 0.0]
@@ -168,7 +203,9 @@ def rigid(spec: Any, scene: Scene, timestep: float) -> None:
 defaults = Bodies("mujoco-defaults", CORNERS)
 best = Lawful(
     "mujoco",
-    "of second order where bodies slide or roll, but on what turns, and where something lands of first",
-    f"rigid contacts under Coulomb's law (mjsim.Coulomb); a step in which something lands is divided by {_PARTS}",
+    "of second order where bodies slide or roll, but on what turns, and where something lands of "
+    "first",
+    f"rigid contacts under Coulomb's law (mjsim.Coulomb); a step in which something lands is "
+    f"divided by {_PARTS}",
     rigid,
 )

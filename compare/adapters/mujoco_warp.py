@@ -1,4 +1,5 @@
-"""MuJoCo on Warp, on a processor in single precision, in scenes of `compare.adapters.mujoco_free`."""
+"""MuJoCo on Warp, on a processor in single precision, in scenes of
+`compare.adapters.mujoco_free`."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ warp.config.quiet = True
 
 
 _WORST = (
-    "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft friction creeps; "
+    "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft "
+    "friction creeps; "
     "nothing is seen of single precision beside that"
 )
 
@@ -37,8 +39,13 @@ class Warp(mujoco_free.Bodies):
         mujoco.mj_forward(model, data)
         self.number = model.body("body").id
         with warp.ScopedDevice("cpu"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that the friction of one geom is less than MuJoCo likes: a pair's counts
-            self.model, self.data = engine.put_model(model), engine.put_data(model, data, nconmax=32, njmax=128)
+            warnings.simplefilter(
+                "ignore"
+            )  # that the friction of one geom is less than MuJoCo likes: a pair's counts
+            self.model, self.data = (
+                engine.put_model(model),
+                engine.put_data(model, data, nconmax=32, njmax=128),
+            )
 
     def advance(self) -> None:
         with warp.ScopedDevice("cpu"):
@@ -49,8 +56,15 @@ class Warp(mujoco_free.Bodies):
         return q[-7:-4], v[-6:-3], rotated(q[-4:], v[-3:])
 
     def push(self, force: Vector) -> None:
-        self.data.xfrc_applied.numpy()[0, self.number, :3] = force  # on a processor the engine's own memory
+        self.data.xfrc_applied.numpy()[0, self.number, :3] = (
+            force  # on a processor the engine's own memory
+        )
 
 
 defaults = Warp("mujoco-warp-defaults", _WORST)
-best = Warp("mujoco-warp", _WORST, tune=mujoco_free.studied, declared="elliptic cone, contact settings of the study")
+best = Warp(
+    "mujoco-warp",
+    _WORST,
+    tune=mujoco_free.studied,
+    declared="elliptic cone, contact settings of the study",
+)

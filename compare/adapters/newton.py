@@ -1,11 +1,11 @@
 """Newton, four of its solvers, on a processor in single precision.
 
-Traps: quaternions end with the scalar; shapes have torsional and rolling friction unless that is set to zero; friction
-is the mean of both coefficients, in VBD the root of their product; room for a thousand contacts, which is what there is
-unless a model says otherwise, makes a step of Kamino twelve times as long. The solver MuJoCo wants a MuJoCo older than
-4: it is in `compare.adapters.mujoco_warp` by itself. Kernels are compiled when they are first needed, which takes
-minutes.
-"""
+Traps: quaternions end with the scalar; shapes have torsional and rolling friction unless that is
+set to zero; friction is the mean of both coefficients, in VBD the root of their product; room for a
+thousand contacts, which is what there is unless a model says otherwise, makes a step of Kamino
+twelve times as long. The solver MuJoCo wants a MuJoCo older than 4: it is in
+`compare.adapters.mujoco_warp` by itself. Kernels are compiled when they are first needed, which
+takes minutes."""
 
 from __future__ import annotations
 
@@ -29,8 +29,11 @@ class Newton(Free):
 
     PRECISION = "f32"
 
-    def __init__(self, solver: str, note: str, best: str = "", shortest: float = 1e-3, **options: Any) -> None:
-        """Of two steps the shorter one is given, s: one of 1 ms would take some of them minutes a case."""
+    def __init__(
+        self, solver: str, note: str, best: str = "", shortest: float = 1e-3, **options: Any
+    ) -> None:
+        """Of two steps the shorter one is given, s: one of 1 ms would take some of them minutes a
+        case."""
         super().__init__(f"newton-{solver.lower()}{'' if best else '-defaults'}", note, best)
         self.solver, self.options = getattr(engine.solvers, f"Solver{solver}"), options
         self.TIMESTEPS = (4e-3, shortest)
@@ -45,18 +48,26 @@ class Newton(Free):
         if hasattr(self.solver, "register_custom_attributes"):
             self.solver.register_custom_attributes(builder)
         for surface, _, point, normal in self.planes():
-            material, own, at = rough(surface.friction**2 if rooted else 2 * surface.friction), -1, pose(point, normal)
+            material, own, at = (
+                rough(surface.friction**2 if rooted else 2 * surface.friction),
+                -1,
+                pose(point, normal),
+            )
             if self.goes_along(surface):
                 self.wall = own = builder.add_body(xform=at, mass=1.0, is_kinematic=True)
                 at = warp.transform()
             builder.add_shape_plane(None, body=own, xform=at, width=0.0, length=0.0, cfg=material)
         w, *axis = body.orientation
         start = warp.transform(body.position, (*axis, w))
-        number = builder.add_body(xform=start, mass=body.mass, inertia=np.diag(body.inertia), lock_inertia=True)
+        number = builder.add_body(
+            xform=start, mass=body.mass, inertia=np.diag(body.inertia), lock_inertia=True
+        )
         if body.shape == "sphere":
             builder.add_shape_sphere(number, radius=body.size[0], cfg=rough(float(rooted)))
         else:
-            builder.add_shape_box(number, hx=body.size[0], hy=body.size[1], hz=body.size[2], cfg=rough(float(rooted)))
+            builder.add_shape_box(
+                number, hx=body.size[0], hy=body.size[1], hz=body.size[2], cfg=rough(float(rooted))
+            )
         builder.joint_qd[-6:] = builder.body_qd[number] = [*body.velocity, *body.spin]
         self.number = number
         if rooted:
@@ -73,11 +84,15 @@ class Newton(Free):
         self.old.clear_forces()
 
     def read(self) -> State:
-        place, rate = (each.numpy()[self.number].astype(float) for each in (self.old.body_q, self.old.body_qd))
+        place, rate = (
+            each.numpy()[self.number].astype(float) for each in (self.old.body_q, self.old.body_qd)
+        )
         return place[:3], rate[:3], rate[3:]
 
     def push(self, force: Vector) -> None:
-        self.old.body_f.numpy()[self.number, :3] = force  # on a processor this is the engine's own memory
+        self.old.body_f.numpy()[self.number, :3] = (
+            force  # on a processor this is the engine's own memory
+        )
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
         self.old.body_q.numpy()[self.wall] = pose(point, normal)
@@ -91,25 +106,29 @@ def pose(point: Array, normal: Array) -> Any:
 
 
 _CREEPS = (
-    "worst with what must not move: it takes a share of the slip out of positions in each of a few iterations, so that "
+    "worst with what must not move: it takes a share of the slip out of positions in each of a few "
+    "iterations, so that "
     "bodies creep at a rate that more iterations lessen"
 )
 xpbd_defaults = Newton("XPBD", _CREEPS)
 xpbd = Newton("XPBD", _CREEPS, "10 iterations", iterations=10)
 semiimplicit_defaults = Newton(
     "SemiImplicit",
-    "worst at long steps and with light bodies: its springs and friction of 1000 N s/m are explicit, and explode at "
+    "worst at long steps and with light bodies: its springs and friction of 1000 N s/m are "
+    "explicit, and explode at "
     "4 ms, or with the ball in the vessel",
 )
 vbd_defaults = Newton(
     "VBD",
-    "worst with what must not move: below 1 cm/s its friction is smoothed, and neither step nor iterations lessen that",
+    "worst with what must not move: below 1 cm/s its friction is smoothed, and neither step nor "
+    "iterations lessen that",
     shortest=2e-3,
     rigid_body_contact_buffer_size=128,
 )
 kamino = Newton(
     "Kamino",
-    "resting, sliding and rolling to first order, by ADMM with Coulomb's cone; worst where it lands",
+    "resting, sliding and rolling to first order, by ADMM with Coulomb's cone; worst where it "
+    "lands",
     "the engine's own settings",
     shortest=2e-3,
 )

@@ -1,10 +1,11 @@
-"""PyBullet: projected Gauss-Seidel on the velocities of a multibody, contacts rigid within tolerances.
+"""PyBullet: projected Gauss-Seidel on the velocities of a multibody, contacts rigid within
+tolerances.
 
-Traps: its margins are absolute lengths and its solver stops at an absolute residual, both made for things the size of
-a man, but where a length unit is so small that things move by 0.4 of it in a step, friction is gone; bodies have
-damping and a limit of velocity unless they are switched off; friction and inertia given in one call of `changeDynamics`
-leave friction at 0.5; friction is the product of both bodies' coefficients.
-"""
+Traps: its margins are absolute lengths and its solver stops at an absolute residual, both made for
+things the size of a man, but where a length unit is so small that things move by 0.4 of it in a
+step, friction is gone; bodies have damping and a limit of velocity unless they are switched off;
+friction and inertia given in one call of `changeDynamics` leave friction at 0.5; friction is the
+product of both bodies' coefficients."""
 
 from __future__ import annotations
 
@@ -35,17 +36,27 @@ class PyBullet(Free):
         if here["physicsClientId"] < 0:
             raise RuntimeError("PyBullet has no more servers")
         engine.setPhysicsEngineParameter(fixedTimeStep=self.timestep, enableConeFriction=1, **here)
-        if self.best:  # the solver to round-off, no overlap left alone, contacts prepared for from 2 cm on
-            engine.setPhysicsEngineParameter(numSolverIterations=200, solverResidualThreshold=1e-24, **here)
+        if (
+            self.best
+        ):  # the solver to round-off, no overlap left alone, contacts prepared for from 2 cm on
+            engine.setPhysicsEngineParameter(
+                numSolverIterations=200, solverResidualThreshold=1e-24, **here
+            )
             engine.setPhysicsEngineParameter(contactSlop=0.0, contactBreakingThreshold=0.2, **here)
         engine.setGravity(0, 0, -scene.g * self.scale, **here)
         self.surfaces: dict[int, int] = {}
         for surface, _, point, normal in self.planes():
             shape = engine.createCollisionShape(engine.GEOM_PLANE, planeNormal=[0, 0, 1], **here)
-            self.wall = engine.createMultiBody(0, shape, **here)  # the last one is the one that moves
+            self.wall = engine.createMultiBody(
+                0, shape, **here
+            )  # the last one is the one that moves
             self.surfaces[self.wall] = scene.surfaces.index(surface)
-            engine.changeDynamics(self.wall, -1, lateralFriction=surface.friction, restitution=0, **here)
-            self.turn(point, normal)  # boxes rock on a plane that isn't turned, but has another normal than z
+            engine.changeDynamics(
+                self.wall, -1, lateralFriction=surface.friction, restitution=0, **here
+            )
+            self.turn(
+                point, normal
+            )  # boxes rock on a plane that isn't turned, but has another normal than z
         size = [each * self.scale for each in body.size]
         kinds: dict[str, tuple[int, dict[str, Any]]] = {
             "sphere": (engine.GEOM_SPHERE, {"radius": size[0]}),
@@ -61,7 +72,9 @@ class PyBullet(Free):
         engine.changeDynamics(self.body, -1, lateralFriction=1, restitution=0, **here)
         self.put(self.body, body.position, body.orientation, body.velocity, body.spin)
 
-    def put(self, body: int, place: Any, orientation: Any, velocity: Any, spin: Any = (0, 0, 0)) -> None:
+    def put(
+        self, body: int, place: Any, orientation: Any, velocity: Any, spin: Any = (0, 0, 0)
+    ) -> None:
         """Set place, orientation (scalar first), velocity and spin of a body or a plane."""
         (w, *axis), (place, velocity) = (
             orientation,
@@ -90,8 +103,12 @@ class PyBullet(Free):
         shown = []
         for point in engine.getContactPoints(self.body, **self.here):
             if point[9] > 0:  # force, direction of the normal; the same of both tangents
-                force = sum(point[k] * np.array(point[way]) for k, way in ((9, 7), (10, 11), (12, 13)))
-                shown.append(Touch(self.surfaces[point[2]], force / self.scale, point[8] / self.scale))
+                force = sum(
+                    point[k] * np.array(point[way]) for k, way in ((9, 7), (10, 11), (12, 13))
+                )
+                shown.append(
+                    Touch(self.surfaces[point[2]], force / self.scale, point[8] / self.scale)
+                )
         return shown
 
     def close(self) -> None:

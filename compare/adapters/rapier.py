@@ -1,11 +1,12 @@
-"""Rapier: projected Gauss-Seidel in substeps with contacts as overdamped springs, in single precision.
+"""Rapier: projected Gauss-Seidel in substeps with contacts as overdamped springs, in single
+precision.
 
 Along which directions friction acts it doesn't tell.
 
-Traps: it expects things the size of a metre, and clamps speeds at 400 times `length_unit`; contacts are kept while the
-bodies move less than `normalized_contact_recycle_distance`, also where a wall was moved; quaternions begin with the
-scalar; with `FrictionModel.COULOMB` a block on a plane has hardly any friction.
-"""
+Traps: it expects things the size of a metre, and clamps speeds at 400 times `length_unit`; contacts
+are kept while the bodies move less than `normalized_contact_recycle_distance`, also where a wall
+was moved; quaternions begin with the scalar; with `FrictionModel.COULOMB` a block on a plane has
+hardly any friction."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ class Rapier(Free):
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")
     RESOLUTION = 1e-4
     SMALL = 16
-    """Small steps in one, in the best settings: the engine's own, but where a wall has to be placed before each."""
+    """Small steps in one, in the best settings: the engine's own, but where a wall has to be placed
+    before each."""
 
     def build(self, scene: Scene, timestep: float) -> None:
         self.small = self.SMALL if self.best and scene.in_cylinder else 1
@@ -40,43 +42,74 @@ class Rapier(Free):
     def make(self) -> None:
         scene = self.scene
         self.world = engine.PhysicsWorld(gravity=(0.0, 0.0, -scene.g))
-        settings, multiply = self.world.integration_parameters, engine.CoefficientCombineRule.MULTIPLY
+        settings, multiply = (
+            self.world.integration_parameters,
+            engine.CoefficientCombineRule.MULTIPLY,
+        )
         settings.dt = self.timestep
         if self.best:
-            settings.contact_recycling, settings.num_solver_iterations = False, self.SMALL // self.small
-            if self.small > 1:  # what contacts carried before a landing throws the body off the wall after it
+            settings.contact_recycling, settings.num_solver_iterations = (
+                False,
+                self.SMALL // self.small,
+            )
+            if (
+                self.small > 1
+            ):  # what contacts carried before a landing throws the body off the wall after it
                 settings.num_internal_pgs_iterations, settings.warmstart_coefficient = 20, 0.0
             settings.length_unit, settings.normalized_max_linear_velocity = 0.01, 1e6
-            settings.contact_softness = settings.static_contact_softness = engine.SpringCoefficients(200.0, 10.0)
+            settings.contact_softness = settings.static_contact_softness = (
+                engine.SpringCoefficients(200.0, 10.0)
+            )
         for surface, _, point, normal in self.planes():
             moves = surface.turning or any(surface.velocity) or self.goes_along(surface)
             if self.goes_along(surface):
                 point, normal = np.zeros(3), np.array([-1.0, 0.0, 0.0])
-            kind = engine.RigidBody.kinematic_velocity_based() if moves else engine.RigidBody.fixed()
-            shape = engine.Collider.halfspace(normal.tolist()).friction(surface.friction / (scene.between or 1.0))
+            kind = (
+                engine.RigidBody.kinematic_velocity_based() if moves else engine.RigidBody.fixed()
+            )
+            shape = engine.Collider.halfspace(normal.tolist()).friction(
+                surface.friction / (scene.between or 1.0)
+            )
             shape = shape.friction_combine_rule(multiply).restitution(surface.restitution)
-            kind = kind.translation(point.tolist()).angvel((0.0, 0.0, surface.turning)).linvel(surface.velocity)
+            kind = (
+                kind.translation(point.tolist())
+                .angvel((0.0, 0.0, surface.turning))
+                .linvel(surface.velocity)
+            )
             self.wall = self.world.add_body(kind, [shape])  # the last one is the one that moves
         self.bodies = []
         for body, friction in zip(scene.bodies, (1.0, scene.between), strict=False):
             shapes: list[Any] = []
             for at in body.parts.tolist():
                 if body.shape == "disc":  # its axis is y
-                    shape = engine.Collider.cylinder(*body.size[::-1]).rotation((math.pi / 2, 0.0, 0.0))
+                    shape = engine.Collider.cylinder(*body.size[::-1]).rotation(
+                        (math.pi / 2, 0.0, 0.0)
+                    )
                 elif body.shape == "box":
                     shape = engine.Collider.cuboid(*body.size)
                 else:
                     shape = engine.Collider.ball(body.size[0])
-                shape = shape.translation(at).density(0.0).friction(friction).friction_combine_rule(multiply)
+                shape = (
+                    shape.translation(at)
+                    .density(0.0)
+                    .friction(friction)
+                    .friction_combine_rule(multiply)
+                )
                 shapes.append(shape.restitution(1.0).restitution_combine_rule(multiply))
             start = engine.Isometry3(body.position, engine.Quaternion(*body.orientation))
-            moving = engine.RigidBody.dynamic().position(start).linvel(body.velocity).angvel(body.spin)
-            moving = moving.additional_mass_properties(engine.MassProperties((0, 0, 0), body.mass, body.inertia))
+            moving = (
+                engine.RigidBody.dynamic().position(start).linvel(body.velocity).angvel(body.spin)
+            )
+            moving = moving.additional_mass_properties(
+                engine.MassProperties((0, 0, 0), body.mass, body.inertia)
+            )
             self.bodies.append(self.world.add_body(moving, shapes))
 
     def read(self) -> State:
         own = [self.world.rigid_bodies[body] for body in self.bodies]
-        return tuple([v.x, v.y, v.z] for body in own for v in (body.translation, body.linvel, body.angvel))
+        return tuple(
+            [v.x, v.y, v.z] for body in own for v in (body.translation, body.linvel, body.angvel)
+        )
 
     def push(self, force: Vector) -> None:
         body = self.world.rigid_bodies[self.bodies[0]]

@@ -2,9 +2,8 @@
 
 What friction carries it doesn't tell.
 
-Traps: spin is limited to 100 rad/s, and damped; friction is the mean of both bodies' coefficients; the normal of a
-plane is the x axis of its pose; planes don't turn.
-"""
+Traps: spin is limited to 100 rad/s, and damped; friction is the mean of both bodies' coefficients;
+the normal of a plane is the x axis of its pose; planes don't turn."""
 
 from __future__ import annotations
 
@@ -36,7 +35,11 @@ class Sapien(Free):
         config, bodies = physx.PhysxSceneConfig(), physx.PhysxBodyConfig()
         config.gravity = [0.0, 0.0, -scene.g]
         if self.best:
-            config.enable_tgs, bodies.solver_position_iterations, bodies.solver_velocity_iterations = False, 50, 20
+            (
+                config.enable_tgs,
+                bodies.solver_position_iterations,
+                bodies.solver_velocity_iterations,
+            ) = False, 50, 20
         physx.set_scene_config(config)
         physx.set_body_config(bodies)
         self.world = engine.Scene([physx.PhysxCpuSystem()])
@@ -47,10 +50,19 @@ class Sapien(Free):
             if self.goes_along(surface):  # planes have no velocity
                 own, size = physx.PhysxRigidDynamicComponent(), (WALL * body.size[0],) * 3
                 own.kinematic, self.half = True, size[0]
-            self.wall, self.face = self.add(own, pose(point, normal), 2 * surface.friction, size), own
+            self.wall, self.face = (
+                self.add(own, pose(point, normal), 2 * surface.friction, size),
+                own,
+            )
         self.body = physx.PhysxRigidDynamicComponent()
-        self.entity = self.add(self.body, engine.Pose(body.position, body.orientation), 0.0, body.size)
-        self.body.mass, self.body.inertia, self.body.cmass_local_pose = body.mass, body.inertia, engine.Pose()
+        self.entity = self.add(
+            self.body, engine.Pose(body.position, body.orientation), 0.0, body.size
+        )
+        self.body.mass, self.body.inertia, self.body.cmass_local_pose = (
+            body.mass,
+            body.inertia,
+            engine.Pose(),
+        )
         self.body.linear_damping = self.body.angular_damping = 0.0
         if self.best:
             self.body.max_angular_velocity = 1e6
@@ -58,10 +70,17 @@ class Sapien(Free):
         self.body.set_angular_velocity(body.spin)
 
     def add(self, component: Any, pose: Any, friction: float, size: tuple[float, ...] = ()) -> Any:
-        """Attach a shape with a friction: a plane, sphere or box, as its size has no, one or three numbers."""
-        kinds = {0: physx.PhysxCollisionShapePlane, 1: physx.PhysxCollisionShapeSphere, 3: physx.PhysxCollisionShapeBox}
+        """Attach a shape with a friction: a plane, sphere or box, as its size has no, one or three
+        numbers."""
+        kinds = {
+            0: physx.PhysxCollisionShapePlane,
+            1: physx.PhysxCollisionShapeSphere,
+            3: physx.PhysxCollisionShapeBox,
+        }
         material = physx.PhysxMaterial(friction, friction, 0.0)
-        component.attach(kinds[len(size)](*(size if len(size) == 1 else [size] * bool(size)), material))
+        component.attach(
+            kinds[len(size)](*(size if len(size) == 1 else [size] * bool(size)), material)
+        )
         entity = engine.Entity()
         entity.add_component(component)
         entity.set_pose(pose)
@@ -89,6 +108,7 @@ def pose(point: Array, normal: Array) -> Any:
 defaults = Sapien("sapien-defaults", f"spin is limited to 100 rad/s, and {CORNERS}")
 best = Sapien(
     "sapien",
-    "PGS has friction in two directions of their own, by which what slips obliquely is wrong by 4 % at every step",
+    "PGS has friction in two directions of their own, by which what slips obliquely is wrong by 4 "
+    "% at every step",
     "PGS with 50 and 20 iterations, no limit to spin",
 )

@@ -1,9 +1,9 @@
-"""A rigid body, or one on another, in plain geometry, and what acts on it, as data: what an engine is asked to build.
+"""A rigid body, or one on another, in plain geometry, and what acts on it, as data: what an engine
+is asked to build.
 
-SI units, world axes with z up. Contacts are rigid, friction is Coulomb's with one coefficient for stick and slip, and
-impacts are plastic unless a surface has a restitution. The body's friction is nothing of its own: the coefficient of a
-pair is that of the surface.
-"""
+SI units, world axes with z up. Contacts are rigid, friction is Coulomb's with one coefficient for
+stick and slip, and impacts are plastic unless a surface has a restitution. The body's friction is
+nothing of its own: the coefficient of a pair is that of the surface."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ class Surface:
     radius: float | None = None
     """Of the cylinder, m; None for a plane."""
     turning: float = 0.0
-    """Angular velocity of its material about the vertical through `point`, rad/s; a turntable has one."""
+    """Angular velocity of its material about the vertical through `point`, rad/s; a turntable has
+    one."""
     velocity: Vector = (0.0, 0.0, 0.0)
     """Of its material along itself, m/s; a belt has one."""
     restitution: float = 0.0
@@ -56,10 +57,11 @@ class Body:
     spin: Vector
     """Angular velocity, rad/s."""
     shape: str
-    """``sphere``, ``box``, ``disc``, round its own z axis, or ``tripod``: three spheres that are joined, and stand."""
+    """``sphere``, ``box``, ``disc``, round its own z axis, or ``tripod``: three spheres that are
+    joined, and stand."""
     size: tuple[float, ...]
-    """Radius; or the three half edges; or radius and half the thickness; or of a tripod's feet the radius, how far from
-    the axis, and how far below the centre they are, the first along x; m."""
+    """Radius; or the three half edges; or radius and half the thickness; or of a tripod's feet the
+    radius, how far from the axis, and how far below the centre they are, the first along x; m."""
     mass: float
     """kg"""
     inertia: Vector
@@ -79,7 +81,9 @@ class Body:
     def after(self, time: float) -> Body:
         """The body that has moved on freely by a short time, s."""
         spin, rate = np.array(self.spin), math.hypot(*self.spin)
-        turn = np.append(math.cos(rate * time / 2), spin / max(rate, 1e-300) * math.sin(rate * time / 2))
+        turn = np.append(
+            math.cos(rate * time / 2), spin / max(rate, 1e-300) * math.sin(rate * time / 2)
+        )
         w, *axis = self.orientation
         ours = turn[0] * np.array(axis) + w * turn[1:] + np.cross(turn[1:], axis)
         place = np.array(self.position) + time * np.array(self.velocity)
@@ -116,7 +120,8 @@ class Scene:
     """Coulomb's coefficient of the two bodies."""
 
     def force(self, t: float, position: Any, velocity: Any) -> Vector:
-        """All that acts at the body's centre at a time in s but gravity and contacts, N; engines set it every step."""
+        """All that acts at the body's centre at a time in s but gravity and contacts, N; engines
+        set it every step."""
         (x, y, *_), (v_x, v_y, v_z), mc = position, velocity, self.body.mass * self.drag
         relative = (v_x + self.flow * y, v_y - self.flow * x, v_z)
         pulls = zip(self.pull, self.growth, relative, position, strict=True)
@@ -135,7 +140,8 @@ class Scene:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Features that not every engine has, by name: one that has them declares so in `FEATURES`."""
+        """Features that not every engine has, by name: one that has them declares so in
+        `FEATURES`."""
         asked = {
             "two bodies": self.under,
             "moving surface": any(any(surface.velocity) for surface in self.surfaces),
@@ -158,26 +164,42 @@ class Scene:
                 yield surface, surface.name, np.array(surface.point), np.array(surface.normal)
             else:
                 for k in range(facets):
-                    yield surface, f"{surface.name}{k}", *tangent(surface.radius, math.tau * k / facets)
+                    yield (
+                        surface,
+                        f"{surface.name}{k}",
+                        *tangent(surface.radius, math.tau * k / facets),
+                    )
 
     def mjcf(self, timestep: float = 1e-3) -> str:
-        """The scene for MuJoCo with all of its contact parameters as they come; it lacks `force` and restitution."""
+        """The scene for MuJoCo with all of its contact parameters as they come; it lacks `force`
+        and restitution."""
         parts: list[str] = []
         qpos: list[float] = []
         qvel: list[float] = []
         for surface, name, point, normal in self.planes(FACETS):
-            moves = (*in_body_axes(upright(normal), np.array(surface.velocity)), 0.0, 0.0, surface.turning)
+            moves = (
+                *in_body_axes(upright(normal), np.array(surface.velocity)),
+                0.0,
+                0.0,
+                surface.turning,
+            )
             pose = f'pos="{_text(point)}" quat="{_text(upright(normal))}"'
             belt = f'surfacevel="{_text(moves)}" ' if any(moves) else ""
             parts.append(
-                f'<geom name="{name}" type="plane" size="0 0 1" {pose} {belt}friction="{surface.friction} 0 0"/>'
+                f'<geom name="{name}" type="plane" size="0 0 1" {pose} '
+                f'{belt}friction="{surface.friction} 0 0"/>'
             )
         for name, body in reversed([*zip(("body", "under"), self.bodies, strict=False)]):
-            joint = f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>' if self.joint else ""
+            joint = (
+                f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>'
+                if self.joint
+                else ""
+            )
             shape = {"tripod": "sphere", "disc": "cylinder"}.get(body.shape, body.shape)
             size = body.size[:1] if body.shape == "tripod" else body.size
             geoms = [
-                f'<geom name="{name}{k or ""}" type="{shape}" size="{_text(size)}" pos="{_text(at)}" friction="0 0 0"/>'
+                f'<geom name="{name}{k or ""}" type="{shape}" size="{_text(size)}" '
+                f'pos="{_text(at)}" friction="0 0 0"/>'
                 for k, at in enumerate(body.parts)
             ]
             parts.append(f"""<body name="{name}" pos="{_text(body.position)}" quat="{_text(body.orientation)}">
@@ -186,11 +208,16 @@ class Scene:
       {(chr(10) + "      ").join(geoms)}
     </body>""")
             # MuJoCo counts the spin of a free body in its own axes.
-            free = [*body.position, *body.orientation], [*body.velocity, *in_body_axes(body.orientation, body.spin)]
+            free = (
+                [*body.position, *body.orientation],
+                [*body.velocity, *in_body_axes(body.orientation, body.spin)],
+            )
             start = ([0.0], [float(np.dot(self.joint, body.velocity))]) if self.joint else free
             qpos, qvel = qpos + start[0], qvel + start[1]
         pair = (
-            f'<pair geom1="under" geom2="body" friction="{self.between} {self.between} 0 0 0"/>' if self.under else ""
+            f'<pair geom1="under" geom2="body" friction="{self.between} {self.between} 0 0 0"/>'
+            if self.under
+            else ""
         )
         return f"""<mujoco model="{self.name}">
   <option timestep="{timestep}" gravity="0 0 {-self.g}"/>
@@ -209,7 +236,8 @@ def _text(numbers: Any) -> str:
 
 
 def in_body_axes(orientation: tuple[float, ...], vectors: Any) -> Array:
-    """Vectors (3,) or (n, 3) in world axes, in the axes of a body with an orientation (a unit quaternion)."""
+    """Vectors (3,) or (n, 3) in world axes, in the axes of a body with an orientation (a unit
+    quaternion)."""
     w, *axis = orientation
     return rotated(np.array([w, *(-a for a in axis)]), np.array(vectors))
 

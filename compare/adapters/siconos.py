@@ -1,12 +1,13 @@
-"""Siconos: Moreau's time stepping by a theta method, rigid contacts with Coulomb's cone, impacts by Newton's law.
+"""Siconos: Moreau's time stepping by a theta method, rigid contacts with Coulomb's cone, impacts by
+Newton's law.
 
-It has no wheel, and where a distribution packages it, it belongs to the system's Python. There it runs, a process for
-each run (`_siconos_worker.py`), which takes a step a line. `DUALBALL_SICONOS_PYTHON` names another Python that has it.
+It has no wheel, and where a distribution packages it, it belongs to the system's Python. There it
+runs, a process for each run (`_siconos_worker.py`), which takes a step a line.
+`DUALBALL_SICONOS_PYTHON` names another Python that has it.
 
-Traps: a theta method keeps the forces at the end of the last step, so that of a force set between steps only the part
-theta would act; threads of BLAS take longer than matrices of six rows; setters of contact points crash where writing
-into the points works; warnings go to standard output.
-"""
+Traps: a theta method keeps the forces at the end of the last step, so that of a force set between
+steps only the part theta would act; threads of BLAS take longer than matrices of six rows; setters
+of contact points crash where writing into the points works; warnings go to standard output."""
 
 from __future__ import annotations
 
@@ -33,14 +34,21 @@ PATIENCE = 60.0
 """For how long, s, an answer is waited for."""
 
 
-SETTINGS = {"theta": 0.5, "activation": 1e-9, "projection": 1e-12, "newton": 1e-15, "tolerance": 1e-14}
+SETTINGS = {
+    "theta": 0.5,
+    "activation": 1e-9,
+    "projection": 1e-12,
+    "newton": 1e-15,
+    "tolerance": 1e-14,
+}
 """theta of `MoreauJeanDirectProjectionOSI`, the share of forces that is taken at the end of a step;
-`ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is less than that, and at
-zero a resting contact that is open by round-off is left open, so that the ball falls for a step;
-`ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection` takes a ball out of an overlap; `TimeStepping`
-leaves it there, up to a step's way after an impact, for as long as the contact lasts; `NewtonTolerance`, N s, of the
-iteration on the equations of motion: with 1e-10 spin changes in flight; relative tolerance of `FrictionContact`'s
-solver, non-smooth Gauss-Seidel. Its own settings are none: the user of Siconos writes the contacts."""
+`ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is
+less than that, and at zero a resting contact that is open by round-off is left open, so that the
+ball falls for a step; `ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection`
+takes a ball out of an overlap; `TimeStepping` leaves it there, up to a step's way after an impact,
+for as long as the contact lasts; `NewtonTolerance`, N s, of the iteration on the equations of
+motion: with 1e-10 spin changes in flight; relative tolerance of `FrictionContact`'s solver,
+non-smooth Gauss-Seidel. Its own settings are none: the user of Siconos writes the contacts."""
 _NAMED = "DUALBALL_SICONOS_PYTHON"
 
 
@@ -70,7 +78,9 @@ def locate(named: str | None) -> tuple[str, str]:
     for python in [named] if named else [sys.executable, shutil.which("python3", path=os.defpath)]:
         command = [python or "", "-I", "-c", "import siconos; print(siconos.version)"]
         try:
-            version = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True).stdout
+            version = subprocess.run(
+                command, capture_output=True, text=True, timeout=PATIENCE, check=True
+            ).stdout
         except (OSError, subprocess.SubprocessError):
             continue
         return command[0], version.strip()
@@ -103,10 +113,16 @@ class Siconos(Free):
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},  # matrices are of six rows
+            env=os.environ
+            | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},  # matrices are of six rows
             start_new_session=True,  # Ctrl-C is for us
         )
-        numbers: dict[str, float | None] = {"m": body.mass, "r": body.size[0], "inertia": body.inertia[0], "g": scene.g}
+        numbers: dict[str, float | None] = {
+            "m": body.mass,
+            "r": body.size[0],
+            "inertia": body.inertia[0],
+            "g": scene.g,
+        }
         numbers |= {"R": wall.radius - body.size[0], "eta": wall.friction}
         numbers["mu"] = floors[0].friction if floors else None
         try:
@@ -118,7 +134,8 @@ class Siconos(Free):
         self._state, self._force = (body.position, body.velocity, body.spin), (0.0, 0.0, 0.0)
 
     def _ask(self, what: Any) -> Any:
-        """Send a line to the process and return its answer; raises `BreakdownError` if there is none."""
+        """Send a line to the process and return its answer; raises `BreakdownError` if there is
+        none."""
         assert self._process
         sent, answers = self._process.stdin, self._process.stdout
         assert sent
@@ -131,7 +148,9 @@ class Siconos(Free):
         if not line:
             assert self._process.stderr
             words = self._process.stderr.read().strip().splitlines()
-            raise BreakdownError(f"ended ({words[-1] if words else f'exit code {self._process.wait()}'})")
+            raise BreakdownError(
+                f"ended ({words[-1] if words else f'exit code {self._process.wait()}'})"
+            )
         answer = json.loads(line)
         if isinstance(answer, dict):
             raise BreakdownError(f"could not go on ({answer['error']})")

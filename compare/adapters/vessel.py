@@ -1,9 +1,8 @@
 """The ball in its vessel, by the adapter of any engine: the loop that makes a trajectory of it.
 
-The engine has the scene of a free ball between a plane and a cylinder, and is driven by -m c(|w|) w (9) alone, with the
-velocity w relative to the fluid at the beginning of each step. The loop adds samples, cases, and what becomes of a run
-that breaks down.
-"""
+The engine has the scene of a free ball between a plane and a cylinder, and is driven by -m c(|w|) w
+(9) alone, with the velocity w relative to the fluid at the beginning of each step. The loop adds
+samples, cases, and what becomes of a run that breaks down."""
 
 from __future__ import annotations
 
@@ -32,13 +31,13 @@ _HUGE = 1e8
 _REACH = 1e-3
 """Gap, in radii, up to which a contact is closed by what is seen of the motion alone."""
 _ROLLS = 3.0
-"""Slip speed, in units of the least that an engine tells from rolling, up to which a contact rolls: how exact that is
-isn't known."""
+"""Slip speed, in units of the least that an engine tells from rolling, up to which a contact rolls:
+how exact that is isn't known."""
 NOTED = 1024
 """Steps of which the cases are told at once."""
 _CARRIED = 5
-"""Numbers of a contact in a step's row, after the ball's nine: whether it carried anything, its force, N, its gap, m.
-"""
+"""Numbers of a contact in a step's row, after the ball's nine: whether it carried anything, its
+force, N, its gap, m. """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +52,15 @@ class Settings:
 
 
 def scene_fields(p: Parameters, x: State) -> dict[str, Any]:
-    """Fields of the `Scene` of a ball in the study's vessel: the ball at azimuth zero, floor and wall, gravity."""
+    """Fields of the `Scene` of a ball in the study's vessel: the ball at azimuth zero, floor and
+    wall, gravity."""
     place, velocity, spin = (part.tolist() for part in to_world(x, 0.0, p))
     body = Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3)
-    return {"body": body, "surfaces": (Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)), "g": p.g}
+    return {
+        "body": body,
+        "surfaces": (Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)),
+        "g": p.g,
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +73,9 @@ class Vessel(Scene):
     @classmethod
     def of(cls, p: Parameters, x: State, flow: Flow) -> Vessel:
         """The scene of a ball with these parameters, which starts at azimuth zero."""
-        ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
+        ball = Ball.of(
+            p, ContactSettings()
+        )  # for its drag, which has nothing to do with MuJoCo's settings
         return cls(name="vessel", **scene_fields(p, x), ball=ball, fluid=flow)
 
     @property
@@ -84,25 +90,29 @@ class Vessel(Scene):
         return float(-mc * w_x), float(-mc * w_y), float(-mc * v_z)
 
 
-def simulate(library: Library, member: str, task: Any, progress: Callable[[float], None]) -> Trajectory:
+def simulate(
+    library: Library, member: str, task: Any, progress: Callable[[float], None]
+) -> Trajectory:
     """One run, a `compare.kit.tasks.Task`, with one of the adapters of an engine's library.
 
-    Where it breaks down, the header says why. Where its adapter doesn't tell what contacts carry, forces are nan, and
-    cases are told by gaps and slip alone.
+    Where it breaks down, the header says why. Where its adapter doesn't tell what contacts carry,
+    forces are nan, and cases are told by gaps and slip alone.
 
-    Forces of a sample are those of the step that begins there, gaps of touching contacts the engine's own.
+    Forces of a sample are those of the step that begins there, gaps of touching contacts the
+    engine's own.
 
     Raises
     ------
-    InputError
-        If the library is not installed, an argument out of range, or the time step too large for the problem.
+    InputError If the library is not installed, an argument out of range, or the time step too large
+        for the problem.
     """
     p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep
     every, count = sampling(t_end, h, task.sample_interval)
     check_timestep(h, p, flow, t_end)
     if p.fluid_torque:
         raise InputError(
-            f"fluid_torque = {p.fluid_torque:g} s-1: {task.engine} leaves it out; mujoco, time-stepping don't"
+            f"fluid_torque = {p.fluid_torque:g} s-1: {task.engine} leaves it out; mujoco, "
+            f"time-stepping don't"
         )
     x = State.one(task.x0)
     check_place(x, p, p.r / 10)
@@ -111,7 +121,9 @@ def simulate(library: Library, member: str, task: Any, progress: Callable[[float
         try:
             engine.build(Vessel.of(p, x, flow), h)
         except RuntimeError as error:
-            raise InputError(f"{task.engine} can't build the vessel: {' '.join(str(error).split())[:80]}") from error
+            raise InputError(
+                f"{task.engine} can't build the vessel: {' '.join(str(error).split())[:80]}"
+            ) from error
         # A wall that moves along for a step is a cylinder to (Omega h)^2.
         fastest = max(abs(x.omega_c), float(np.abs(flow(np.linspace(0.0, t_end, NOTED))).max()))
         steps = _Steps(engine, h, p, every, p.R * fastest * (fastest * h) ** 2 / 4)
@@ -121,7 +133,10 @@ def simulate(library: Library, member: str, task: Any, progress: Callable[[float
                 if steps.done % NOTED == 0 and steps.done < total:
                     steps.tell(last=False)
                     progress(steps.done / total)
-        except (RuntimeError, InterruptedError) as error:  # what engines raise where they can't go on
+        except (
+            RuntimeError,
+            InterruptedError,
+        ) as error:  # what engines raise where they can't go on
             known = isinstance(error, (BreakdownError, InterruptedError))
             said = f"{error}" if known else f"could not go on ({' '.join(str(error).split())[:80]})"
             failure = f"{said} by t = {steps.done * h:g} s"
@@ -138,13 +153,19 @@ def simulate(library: Library, member: str, task: Any, progress: Callable[[float
 
 
 class _Steps:
-    """The steps of a run: states and contact forces are noted, then turned into samples and cases in blocks."""
+    """The steps of a run: states and contact forces are noted, then turned into samples and cases
+    in blocks."""
 
-    def __init__(self, engine: Free, timestep: float, p: Parameters, every: int, along: float) -> None:
-        """One of `every` steps is a sample; `along` is how fast the plane that stands for the wall slips, m s-1."""
+    def __init__(
+        self, engine: Free, timestep: float, p: Parameters, every: int, along: float
+    ) -> None:
+        """One of `every` steps is a sample; `along` is how fast the plane that stands for the wall
+        slips, m s-1."""
         self.engine, self.timestep, self.p, self.every, self.done = engine, timestep, p, every, 0
         self.band = band = _ROLLS * (engine.RESOLUTION + along)
-        self.classifier = Classifier(p, timestep, engine.ahead / timestep, lambda load: np.full(np.shape(load), band))
+        self.classifier = Classifier(
+            p, timestep, engine.ahead / timestep, lambda load: np.full(np.shape(load), band)
+        )
         self.kept = list[npt.NDArray[np.void]]()
         self._rows, self._told, self._theta = np.empty((NOTED, 9 + 2 * _CARRIED)), 0, 0.0
 
@@ -179,11 +200,16 @@ class _Steps:
         for name, own in zip("AB", np.split(rows[:, 9:], 2, axis=1), strict=True):
             block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
             block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])
-        slips, gaps = (np.stack([block[f"{what}_{k}"] for k in "AB"], axis=-1) for what in ("slip_speed", "gap"))
+        slips, gaps = (
+            np.stack([block[f"{what}_{k}"] for k in "AB"], axis=-1)
+            for what in ("slip_speed", "gap")
+        )
         A, B = block["force_A"], block["force_B"]
         loads = np.stack([A[:, 1], B[:, 0]], axis=-1)
         used = np.stack([np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])], axis=-1)
-        if np.isnan(A).any():  # a closed contact bears 1 N, and uses all of its friction if it slips
+        if np.isnan(
+            A
+        ).any():  # a closed contact bears 1 N, and uses all of its friction if it slips
             loads = (gaps < _REACH * p.r) * 1.0
             used = np.array([p.mu, p.eta]) * loads * (slips > 3 * self.band)
         self.classifier.add(Contacts(loads, used, slips, gaps), last)

@@ -1,4 +1,5 @@
-"""What to change in a settled model: the one option that helps its contacts, and the law that holds where none does."""
+"""What to change in a settled model: the one option that helps its contacts, and the law that holds
+where none does."""
 
 from __future__ import annotations
 
@@ -80,10 +81,15 @@ def remedied(model: Any, data: Any) -> tuple[Any, Any, Callable[[Any, Any, int],
 
 
 def apply(model: Any, option: str, value: Sequence[float]) -> None:
-    """Set one option of a model; `solref` and `solimp` only of geoms and pairs that are softer than the value."""
+    """Set one option of a model; `solref` and `solimp` only of geoms and pairs that are softer than
+    the value."""
     if option in ("impratio", "cone", "timestep"):
         setattr(model.opt, option, value[0])
-    for own in (getattr(model, f"{kind}_{option}") for kind in ("geom", "pair") if option in ("solref", "solimp")):
+    for own in (
+        getattr(model, f"{kind}_{option}")
+        for kind in ("geom", "pair")
+        if option in ("solref", "solimp")
+    ):
         if option == "solimp":
             own[:, :2] = np.maximum(own[:, :2], value)
         else:
@@ -108,11 +114,14 @@ class AtRest:
 
     @np.errstate(over="ignore")
     def harm(self, c: Contacts) -> dict[str, Array]:
-        """How bad each contact is, (n,), by each of `FAULTS`: its value divided by the largest that passes for good."""
+        """How bad each contact is, (n,), by each of `FAULTS`: its value divided by the largest that
+        passes for good."""
         law = c.law()
         speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
         pair = np.unique(c.geoms, axis=0, return_inverse=True)[1].ravel()
-        slides = np.isin(pair, pair[law.slides & ~self.moves])  # as a whole, if one of its contacts does
+        slides = np.isin(
+            pair, pair[law.slides & ~self.moves]
+        )  # as a whole, if one of its contacts does
         return {
             "creep": np.where(self.moves | slides, 0, speed / self.creep),
             "depth": np.where(self.moves, 0, law.depth / self.depth),
@@ -121,13 +130,17 @@ class AtRest:
 
 
 def best_change(
-    scene: AtRest, pair: str, members: Sequence[int], harm: Mapping[str, float], calm: Callable[[Any], bool]
+    scene: AtRest,
+    pair: str,
+    members: Sequence[int],
+    harm: Mapping[str, float],
+    calm: Callable[[Any], bool],
 ) -> tuple[Change | None, dict[str, Array]]:
-    """The first option, in its mildest value, that makes all contacts good, or else the one that helps most.
+    """The first option, in its mildest value, that makes all contacts good, or else the one that
+    helps most.
 
-    Also the harm that is left then. `pair` is the worst one, `members` are its contacts, `harm` is its own; `calm` says
-    whether a changed model settles as well.
-    """
+    Also the harm that is left then. `pair` is the worst one, `members` are its contacts, `harm` is
+    its own; `calm` says whether a changed model settles as well."""
     c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
     part, names = np.isin(np.arange(len(scene.number)), members), geom_names(scene.model)
     for option, value in _options(c.subset(part)) if harm[what] > 1 else ():
@@ -135,7 +148,10 @@ def best_change(
         apply(other, option, value)
         mujoco.mj_fwdPosition(other, state)
         changed = dataclasses.replace(c, **parameters(other, state, scene.number))
-        harms, (now, then) = scene.harm(changed), (_worst(each, part, what) for each in (c, changed))
+        harms, (now, then) = (
+            scene.harm(changed),
+            (_worst(each, part, what) for each in (c, changed)),
+        )
         left = max(float(each.max()) for each in harms.values())
         softness = [(model.geom_solref, model.geom_solimp) for model in (scene.model, other)]
         differ = np.any([(old != new).any(1) for old, new in zip(*softness, strict=True)], axis=0)
@@ -180,5 +196,7 @@ def _two_digits(value: float) -> float:
 def _worst(c: Contacts, part: Array, quantity: str) -> float:
     """The worst creep, m/s, or depth, m, or the largest stable step, s, of some contacts."""
     return (
-        c.subset(part).largest_step() if quantity == "largest_step" else float(getattr(c.law(), quantity)[part].max())
+        c.subset(part).largest_step()
+        if quantity == "largest_step"
+        else float(getattr(c.law(), quantity)[part].max())
     )

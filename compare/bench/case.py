@@ -1,4 +1,5 @@
-"""An exact contact case as data: a scene whose motion is known to 1e-10, and how errors are counted."""
+"""An exact contact case as data: a scene whose motion is known to 1e-10, and how errors are
+counted."""
 
 from __future__ import annotations
 
@@ -17,11 +18,12 @@ from model.arrays import Array
 from model.files import reading_json
 
 VERSION = 2
-"""Of the set of cases and their files; a change of any number is another version. 2 has all of 1."""
+"""Of the set of cases and their files; a change of any number is another version. 2 has all of
+1."""
 TOLERANCE = 1e-2
-"""Error, in units of the case's scales, up to which an engine passes at the shortest step. A method of first order is
-wrong by about a step divided by the time that the motion takes to change, 1 ms by 0.1 s or more; every wrong answer
-that a case must notice is off by several times as much."""
+"""Error, in units of the case's scales, up to which an engine passes at the shortest step. A method
+of first order is wrong by about a step divided by the time that the motion takes to change, 1 ms by
+0.1 s or more; every wrong answer that a case must notice is off by several times as much."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,16 +35,18 @@ class Case(Scene):
     times: Array = field(repr=False)
     """Of the samples, (n,), s."""
     exact: Array = field(repr=False)
-    """(n, 9): position, velocity and spin of the body at those times; (n, 18) with those of `under`."""
+    """(n, 9): position, velocity and spin of the body at those times; (n, 18) with those of
+    `under`."""
     contacts: tuple[str, ...] = field(repr=False)
-    """For each sample a letter a surface: R sticks or rolls, S slips, N does not touch, T stands on an edge of a body
-    that turns; then one for what is `between` two bodies, or for a joint."""
+    """For each sample a letter a surface: R sticks or rolls, S slips, N does not touch, T stands on
+    an edge of a body that turns; then one for what is `between` two bodies, or for a joint."""
     bound: float
     """Of the error of `exact`, in units of `scales`."""
     source: str
     """Where `exact` is from."""
     scales: tuple[float, float, float]
-    """By what errors of position (m), velocity (m/s) and spin (rad/s) are divided; infinite: not compared."""
+    """By what errors of position (m), velocity (m/s) and spin (rad/s) are divided; infinite: not
+    compared."""
     wrong: Mapping[str, Array] = field(default_factory=dict, repr=False)
     """Answers that the case must notice: what is wrong, and `exact` as it would then be."""
     motion: Any = field(default=None, repr=False)
@@ -50,7 +54,8 @@ class Case(Scene):
 
     @property
     def kind(self) -> str:
-        """Landing if a contact closes, else sticking if the body rests, sliding if it slips, or rolling."""
+        """Landing if a contact closes, else sticking if the body rests, sliding if it slips, or
+        rolling."""
         alike = zip(*self.contacts, strict=True)
         if (
             "restitution" in self.needs
@@ -65,9 +70,8 @@ class Case(Scene):
     def compared(self, states: Array) -> Array:
         """Position, velocity and spin of states (n, 9 or 18) as they are compared, (n, 3 or 6, 3).
 
-        In a cylinder each is turned about the z axis until the body stands at azimuth zero: a small error of its speed
-        grows into any error of the azimuth.
-        """
+        In a cylinder each is turned about the z axis until the body stands at azimuth zero: a small
+        error of its speed grows into any error of the azimuth."""
         parts = states.reshape(len(states), -1, 3)
         if not self.in_cylinder:
             return parts
@@ -77,23 +81,27 @@ class Case(Scene):
         return np.asarray(np.einsum("ijn,nkj->nki", turn, parts))
 
     def error(self, states: Array) -> float:
-        """The largest error of states (n, 9 or 18): the length of a difference of vectors divided by its scale."""
+        """The largest error of states (n, 9 or 18): the length of a difference of vectors divided
+        by its scale."""
         off = np.linalg.norm(self.compared(states) - self.compared(self.exact), axis=2)
         off /= np.tile(self.scales, len(self.bodies))
         return float(off.max())
 
     def touching(self, states: Array) -> tuple[Array, Array]:
-        """Gap (m) and slip speed (m/s) of states (n, 9 or 18) at each contact, (n, contacts); only spheres turn.
+        """Gap (m) and slip speed (m/s) of states (n, 9 or 18) at each contact, (n, contacts); only
+        spheres turn.
 
-        Where a soft contact lets the body sink in, it touches halfway between its own surface and the other.
-        """
+        Where a soft contact lets the body sink in, it touches halfway between its own surface and
+        the other."""
         body = self.bodies[-1]
         position, velocity, spin = np.split(states[:, -9:], 3, axis=1)
         gaps, slips = [np.zeros((0, len(states)))], [np.zeros((0, len(states)))]
 
         def add_contact(gap: Array, slip: Array, normal: Array) -> None:
             gaps.append(gap[None])
-            slips.append(np.linalg.norm(slip - np.sum(slip * normal, axis=1)[:, None] * normal, axis=1)[None])
+            slips.append(
+                np.linalg.norm(slip - np.sum(slip * normal, axis=1)[:, None] * normal, axis=1)[None]
+            )
 
         for surface in self.surfaces:
             away = position - surface.point
@@ -107,23 +115,40 @@ class Case(Scene):
             gap = height - reach(body, normal)
             arm = -(reach(body, normal) + np.minimum(gap, 0.0) / 2)[:, None] * normal
             moves = surface.velocity + surface.turning * np.cross([0.0, 0.0, 1.0], away + arm)
-            add_contact(gap, velocity + (np.cross(spin, arm) if body.shape == "sphere" else 0) - moves, normal)
+            add_contact(
+                gap,
+                velocity + (np.cross(spin, arm) if body.shape == "sphere" else 0) - moves,
+                normal,
+            )
         if self.under:
             apart = states[:, :3] - position
             height = np.sum(apart * normal, axis=1)
-            add_contact(height - reach(self.body, normal) - reach(body, normal), states[:, 3:6] - velocity, normal)
+            add_contact(
+                height - reach(self.body, normal) - reach(body, normal),
+                states[:, 3:6] - velocity,
+                normal,
+            )
         if self.joint:
             add_contact(np.zeros(len(states)), velocity, np.zeros(3))
         return np.concatenate(gaps).T, np.concatenate(slips).T
 
     def in_contact(self, letters: str) -> Array:
-        """Where contacts of the exact motion are in one of these states, letters such as R or S; (n, surfaces)."""
+        """Where contacts of the exact motion are in one of these states, letters such as R or S;
+        (n, surfaces)."""
         return np.array([[letter in letters for letter in sample] for sample in self.contacts])
 
     def to_mapping(self) -> dict[str, Any]:
         """The case without its MJCF as JSON-able data; scales that are infinite are None."""
-        data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": TIME_STEPS, "tolerance": TOLERANCE}
-        data |= {"turned": self.in_cylinder, "wrong": {name: self.error(states) for name, states in self.wrong.items()}}
+        data = vars(self) | {
+            "schema": "dualball-case",
+            "version": VERSION,
+            "steps": TIME_STEPS,
+            "tolerance": TOLERANCE,
+        }
+        data |= {
+            "turned": self.in_cylinder,
+            "wrong": {name: self.error(states) for name, states in self.wrong.items()},
+        }
         del data["motion"]
         return dict(plain(data))
 
@@ -132,14 +157,17 @@ def reach(body: Body, normal: Array) -> Array:
     """How far a body in its first orientation extends from its centre against normals (n, 3), m."""
     if body.shape == "disc":
         along = np.abs(in_body_axes(body.orientation, normal)[..., 2])
-        return np.asarray(body.size[0] * np.sqrt(np.maximum(1 - along**2, 0.0)) + body.size[1] * along)
+        return np.asarray(
+            body.size[0] * np.sqrt(np.maximum(1 - along**2, 0.0)) + body.size[1] * along
+        )
     if body.shape == "box":
         return np.asarray(np.abs(in_body_axes(body.orientation, normal)) @ np.array(body.size))
     return np.full(len(normal), body.size[0] + (body.size[2] if body.shape == "tripod" else 0.0))
 
 
 def read(path: Path) -> Case:
-    """A case from a file that `dualball cases -o` wrote, of this version or version 1; without its wrong answers.
+    """A case from a file that `dualball cases -o` wrote, of this version or version 1; without its
+    wrong answers.
 
     Raises
     ------
@@ -150,16 +178,29 @@ def read(path: Path) -> Case:
     """
     with reading_json(path, "exact case") as data:
         if (schema := data["schema"]) != "dualball-case":
-            raise InputError(f"{path} is no exact case: its schema is {schema!r}, not 'dualball-case'")
+            raise InputError(
+                f"{path} is no exact case: its schema is {schema!r}, not 'dualball-case'"
+            )
         if (written := data["version"]) not in range(1, VERSION + 1):
-            raise InputError(f"{path} is of version {written!r} of the exact cases; this program reads 1 to {VERSION}")
-        own = {each.name: data[each.name] for each in fields(Case) if each.name in data and each.name != "wrong"}
+            raise InputError(
+                f"{path} is of version {written!r} of the exact cases; this program reads 1 to "
+                f"{VERSION}"
+            )
+        own = {
+            each.name: data[each.name]
+            for each in fields(Case)
+            if each.name in data and each.name != "wrong"
+        }
         own["scales"] = [math.inf if scale is None else scale for scale in own["scales"]]
         own["surfaces"] = [Surface(**_tuples(surface)) for surface in own["surfaces"]]
         own |= {name: Body(**_tuples(own[name])) for name in ("body", "under") if own.get(name)}
-        return Case(**_tuples(own) | {name: np.array(own[name], float) for name in ("times", "exact")})
+        return Case(
+            **_tuples(own) | {name: np.array(own[name], float) for name in ("times", "exact")}
+        )
 
 
 def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
     """Data as JSON has it, with tuples for lists."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}
+    return {
+        name: tuple(value) if isinstance(value, list) else value for name, value in data.items()
+    }

@@ -1,9 +1,8 @@
 """Exact cases in closed form: a block or a ball on a surface, or in a groove.
 
-Each course is written as a function of time and of the constants that a wrong engine or theory would have otherwise;
-the wrong answers of a case are the same course with other constants. Above a course stands its case, or below it, if it
-has several. Moments of a uniform sphere: j = 2/5.
-"""
+Each course is written as a function of time and of the constants that a wrong engine or theory
+would have otherwise; the wrong answers of a case are the same course with other constants. Above a
+course stands its case, or below it, if it has several. Moments of a uniform sphere: j = 2/5."""
 
 from __future__ import annotations
 
@@ -22,13 +21,15 @@ from model.arrays import Array
 
 G, J = 9.81, 0.4
 RADIUS, BLOCK, MU = 0.1, (0.1, 0.1, 0.05), 0.5
-"""Radius of the spheres and half edges of the blocks, m; all weigh 1 kg; friction of most surfaces."""
+"""Radius of the spheres and half edges of the blocks, m; all weigh 1 kg; friction of most
+surfaces."""
 CLOSED_FORMS: list[Callable[[], Case]] = []
 """Functions that make these cases, in the order in which they are listed."""
 CLOSED = 1e-14
 """Round-off of a closed form, in units of the scales."""
 SPEED_ALONE = (math.inf, 0.01, math.inf)
-"""Scales of a body that must not move: a creep of 0.1 mm/s passes, and how far it sinks into its floor is left out."""
+"""Scales of a body that must not move: a creep of 0.1 mm/s passes, and how far it sinks into its
+floor is left out."""
 UP, WAY = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 """The vertical, and the way of what goes along a level floor."""
 _Motion = tuple[Array, ...]
@@ -52,15 +53,18 @@ def closed_form(
     under: Mapping[str, Any] | None = None,
     **forces: Any,
 ) -> Case:
-    """A case whose course is a closed form, sampled 25 times; `wrong` are other constants of the course.
+    """A case whose course is a closed form, sampled 25 times; `wrong` are other constants of the
+    course.
 
-    `contacts` are the letters of `Case.contacts`, with the times at which they change, s, between them.
-    """
+    `contacts` are the letters of `Case.contacts`, with the times at which they change, s, between
+    them."""
     times: Array = np.arange(1.0, 26.0) * (until / 25)
     letters, changes = contacts[::2], contacts[1::2]
 
     def states_with(**constants: Any) -> Array:
-        return np.concatenate([np.broadcast_to(part, (25, 3)) for part in course(times, **constants)], axis=1)
+        return np.concatenate(
+            [np.broadcast_to(part, (25, 3)) for part in course(times, **constants)], axis=1
+        )
 
     start: Any = [tuple(np.broadcast_to(part, (1, 3))[0].tolist()) for part in course(np.zeros(1))]
     return Case(
@@ -114,14 +118,16 @@ def slope(angle: float) -> tuple[Array, Vector]:
 
 
 def along(way: Array, s: Any, v: Any, spin: Any, start: Any) -> _Motion:
-    """Motion along a straight way: distance s and speed v along it, and a spin about the horizontal axis across it."""
+    """Motion along a straight way: distance s and speed v along it, and a spin about the horizontal
+    axis across it."""
     across = np.array([-way[1], way[0], 0.0]) / math.hypot(way[0], way[1])
     return start + np.outer(s, way), np.outer(v, way), np.outer(spin, across)
 
 
 # fmt: off
 def _slides_down(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> _Motion:
-    """A block on a slope with a speed v at first; where friction is the stronger it stops and doesn't start again."""
+    """A block on a slope with a speed v at first; where friction is the stronger it stops and
+    doesn't start again."""
     way, normal = slope(angle)
     a = G * (math.sin(angle) - mu * math.cos(angle))
     if a < 0:
@@ -137,29 +143,34 @@ def _on_slope(tangent: float, v: float, *row: str, **given: Any) -> None:
 
 
 _on_slope(
-    0.9 * MU, 0.0, "block-rests", "a block on a slope whose tangent is 0.9 of its friction must not move",
+    0.9 * MU, 0.0, "block-rests", "a block on a slope whose tangent is 0.9 of its friction must "
+                                  "not move",
     wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.85 * MU}},
     until=2.0, scales=SPEED_ALONE, contacts=("R",))
 _on_slope(
     1.25 * MU, 0.0,
-    "block-slides", "a block on a slope whose tangent is 1.25 of its friction slides down at g (sin - mu cos)",
+    "block-slides", "a block on a slope whose tangent is 1.25 of its friction slides down at g "
+                    "(sin - mu cos)",
     wrong={"no friction": {"mu": 0.0}, "friction 5 % too strong": {"mu": 1.05 * MU},
            "a threshold at 1.3 of Coulomb's": {"mu": 1.3 * MU}},
     until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S",))
 _on_slope(
-    0.0, 2.0, "box-stops", "a box that is pushed off at 2 m/s slides v^2/(2 mu g) on a level floor, stops and stays",
+    0.0, 2.0, "box-stops", "a box that is pushed off at 2 m/s slides v^2/(2 mu g) on a level "
+                           "floor, stops and stays",
     wrong={"friction 5 % too weak": {"mu": 0.95 * MU}, "no friction": {"mu": 0.0}},
     until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S", 2.0 / (MU * G), "R"))
 
 
 @_case(
-    "growing-pull", "a block under a force that grows by 10 N a second breaks away at mu m g and then slides",
+    "growing-pull", "a block under a force that grows by 10 N a second breaks away at mu m g and "
+                    "then slides",
     block(), (Surface("floor", MU),),
     wrong={"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
     until=1.0, scales=(0.1, 0.5, math.inf), contacts=("R", MU * G / 10.0, "S"),
     source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive", growth=(10.0, 0.0, 0.0))
 def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> _Motion:
-    """A block pulled by a force that grows by 10 N each second: it slides once that is more than friction can hold."""
+    """A block pulled by a force that grows by 10 N each second: it slides once that is more than
+    friction can hold."""
     late = np.maximum(t - grip * mu * G / 10.0, 0.0)
     a0 = (grip - 1) * mu * G
     return along(WAY, a0 * late**2 / 2 + 10.0 * late**3 / 6, a0 * late + 5.0 * late**2, 0 * t, BLOCK[2] * UP)
@@ -171,7 +182,8 @@ _PUSH = G / (0.5 * MU)
 
 @_case(
     "pinched-block",
-    "a block is pressed against a vertical wall, half of the friction there is carries it: it must not move",
+    "a block is pressed against a vertical wall, half of the friction there is carries it: it must "
+    "not move",
     block(), (Surface("wall", MU, normal=(-1.0, 0.0, 0.0)),),
     wrong={"friction of 0.45 of Coulomb's": {"mu": 0.45 * MU}},
     until=2.0, scales=SPEED_ALONE, contacts=("R",),
@@ -192,7 +204,8 @@ def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
     until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
     source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)")
 def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
-    """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)), then rolls."""
+    """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)),
+    then rolls."""
     slid = np.minimum(t, 2.0 / (mu * G * (1 + 1 / j)))
     v, s = 2.0 - mu * G * slid, 2.0 * slid - mu * G * slid**2 / 2
     return along(WAY, s + v * (t - slid), v, mu * G * slid / (j * RADIUS), RADIUS * UP)
@@ -212,11 +225,13 @@ _case(
     "sphere-rolls-down", "a sphere rolls down a slope from rest at 5/7 g sin",
     sphere(), (Surface("slope", 0.5, normal=slope(_GENTLE)[1]),),
     wrong={"it slides without friction": {"mu": 0.0}, "a hollow sphere": {"j": 2 / 3}},
-    until=1.0, scales=(1.0, 2.0, 20.0), contacts=("R",), source="Newton and Euler: (1 + j) a = g sin",
+    until=1.0, scales=(1.0, 2.0, 20.0), contacts=("R",), source="Newton and Euler: (1 + j) a = g "
+                                                                "sin",
 )(partial(_rolls_down, angle=_GENTLE))
 _case(
     "sphere-slips-down",
-    "a sphere on a slope too steep for rolling, tan > 7/2 mu, slips down and is spun up by friction",
+    "a sphere on a slope too steep for rolling, tan > 7/2 mu, slips down and is spun up by "
+    "friction",
     sphere(), (Surface("slope", 0.5, normal=slope(_STEEP)[1]),),
     wrong={"it rolls": {"j": J, "mu": 10.0}, "friction 5 % too strong": {"mu": 0.525}},
     until=0.5, scales=(1.0, 2.0, 20.0), contacts=("S",),
@@ -245,7 +260,8 @@ _TURNING = 3.0
     until=4.0, scales=(0.5, 0.5, 15.0), contacts=("R",),
     source="Weltner, Am. J. Phys. 47 (1979): v' = 2/7 turning z x v for a uniform ball")
 def _circles_on_turntable(t: Array, j: float = J) -> _Motion:
-    """A sphere on a turntable, x'' = k turning z x x' with k = j/(1 + j), that circles about the table's axis."""
+    """A sphere on a turntable, x'' = k turning z x x' with k = j/(1 + j), that circles about the
+    table's axis."""
     k = _TURNING * j / (1 + j)
     cos, sin, none = np.cos(k * t), np.sin(k * t), 0 * t
     place, way = 0.5 * np.stack([cos, sin, none], axis=1), 0.5 * k * np.stack([-sin, cos, none], axis=1)
@@ -261,14 +277,16 @@ _CYLINDER = Parameters(m=1.0, r=RADIUS, R=_ORBIT, j=J, mu=1.0, eta=1.0, g=G, c=0
 
 @_case(
     "cylinder",
-    "a ball rolls round inside a vertical cylinder: it comes down and rises again, at sqrt(2/7) of its orbit",
+    "a ball rolls round inside a vertical cylinder: it comes down and rises again, at sqrt(2/7) of "
+    "its orbit",
     sphere(), (Surface("wall", 1.0, radius=_ORBIT + RADIUS),),
     wrong={"a hollow sphere": {"j": 2 / 3}, "it falls freely": {"j": 1e-9}},
     until=2.0, scales=(1.0, 8.0, 80.0), contacts=("R",),
     source="Newton and Euler in the turning frame: the spin along the radius changes with height",
     motion=(_CYLINDER, State(y=10.0, omega_c=_TURNS, slip_x=-_TURNS * _ORBIT / RADIUS)))
 def _rolls_in_cylinder(t: Array, j: float = J) -> _Motion:
-    """A sphere rolling round in a cylinder: z'' = -g/(1 + j) - k^2 z with k = turns sqrt(j/(1 + j))."""
+    """A sphere rolling round in a cylinder: z'' = -g/(1 + j) - k^2 z with k = turns sqrt(j/(1 +
+    j))."""
     k = _TURNS * math.sqrt(j / (1 + j))
     deep = G / (j * _TURNS**2)
     z, fall = -deep * (1 - np.cos(k * t)), -deep * k * np.sin(k * t)
@@ -287,7 +305,8 @@ def _groove(angle: float, mu: float) -> tuple[Surface, Surface]:
 
 
 def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> _Motion:
-    """A body goes down a groove at g sin/(1 + j/sin^2 45) if it rolls, faster if it slips; a block can't roll.
+    """A body goes down a groove at g sin/(1 + j/sin^2 45) if it rolls, faster if it slips; a block
+    can't roll.
 
     Each plane of the groove carries m g cos/sqrt(2).
     """
@@ -315,7 +334,8 @@ _case(
 )(partial(_descends, angle=_GENTLE))
 _case(
     "groove-rests",
-    "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
+    "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its "
+    "friction",
     _CUBE, _groove(_PINCHED, 0.5),
     wrong={"a threshold as on a plane": {"mu": 0.5 * math.sqrt(0.5)}, "at 0.85 of Coulomb's": {"mu": 0.425}},
     until=2.0, scales=SPEED_ALONE, contacts=("RR",), source=_IN_GROOVE,

@@ -1,8 +1,9 @@
-"""The law of MuJoCo's contacts, for those of any settled model: depth, creep, hovering, and small motions.
+"""The law of MuJoCo's contacts, for those of any settled model: depth, creep, hovering, and small
+motions.
 
-Formulas and their derivation: docs/friction.md. The engine says where contacts are, what they carry, and how it
-estimates their inverse mass; the rest is computed from parameters, so that it can be computed for other ones, too.
-"""
+Formulas and their derivation: docs/friction.md. The engine says where contacts are, what they
+carry, and how it estimates their inverse mass; the rest is computed from parameters, so that it can
+be computed for other ones, too."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ SOLREF = (0.02, 1.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Contacts:
-    """The n contacts of a settled model: its options and their parameters, which advice may change, and their loads."""
+    """The n contacts of a settled model: its options and their parameters, which advice may change,
+    and their loads."""
 
     timestep: float
     impratio: float
@@ -69,7 +71,9 @@ class Contacts:
     def cone(self) -> Array:
         """Share of the friction cone, or pyramid, in use."""
         used = np.abs(self.force[:, 1:]) / self.friction * self._frictional
-        share: Array = (used.sum(1) if self.pyramidal else np.hypot.reduce(used, 1)) / self.force[:, 0]
+        share: Array = (used.sum(1) if self.pyramidal else np.hypot.reduce(used, 1)) / self.force[
+            :, 0
+        ]
         return share
 
     @property
@@ -79,24 +83,31 @@ class Contacts:
 
     @property
     def parts(self) -> bool:
-        """Whether any joint can move a body along a contact normal, so that the contacts may part."""
+        """Whether any joint can move a body along a contact normal, so that the contacts may
+        part."""
         return bool((abs(self.rows[:, 0]) > 1e-9 * abs(self.rows).max(initial=1e-300)).any())
 
     @property
     def softness(self) -> Array:
-        """R d/(1 - d): the inverse mass that scales the softness of normal rows, or of the edges of a pyramid, 1/kg."""
+        """R d/(1 - d): the inverse mass that scales the softness of normal rows, or of the edges of
+        a pyramid, 1/kg."""
         mu2 = self.friction[:, 0] ** 2
-        edges = np.where(self.dim > 1, 2 * mu2 * (1 + mu2) / self.impratio, 1) if self.pyramidal else 1
+        edges = (
+            np.where(self.dim > 1, 2 * mu2 * (1 + mu2) / self.impratio, 1) if self.pyramidal else 1
+        )
         found: Array = self.inverse_mass * edges
         return found
 
     @np.errstate(all="ignore")  # what is not chosen divides by zero
     def reference(self, solref: Array) -> tuple[Array, Array]:
-        """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine replaces."""
+        """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine
+        replaces."""
         high = np.clip(self.solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
         time, ratio = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref).T
         if self.refsafe and self.discrete:
-            shortest = np.where(time * ratio < self.timestep, self.timestep / (np.sqrt(high) * ratio), time)
+            shortest = np.where(
+                time * ratio < self.timestep, self.timestep / (np.sqrt(high) * ratio), time
+            )
             time = np.where(time > 0, shortest, time)
         elif self.refsafe:
             time = np.where(time > 0, np.maximum(time, 2 * self.timestep), time)
@@ -117,20 +128,29 @@ class Contacts:
         return np.where(self._frictional, np.abs(self.force[:, 1:]) / self.friction, 0)
 
     def _rows(self, depth: Array) -> tuple[Array, Array, Array]:
-        """Softness of a row, its stiffness, and the damping of friction as a steady state sees it."""
+        """Softness of a row, its stiffness, and the damping of friction as a steady state sees
+        it."""
         (spring, b, b_f), h = self._springs, self.timestep
         low, high, middle = np.clip(self.solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
         width, power = np.maximum(self.solimp[:, 2], 1e-15), np.maximum(self.solimp[:, 4], 1)
         x = np.minimum(depth / width, 1)
-        rising, falling = x**power / middle ** (power - 1), (1 - x) ** power / (1 - middle) ** (power - 1)
+        rising, falling = (
+            x**power / middle ** (power - 1),
+            (1 - x) ** power / (1 - middle) ** (power - 1),
+        )
         d = low + (high - low) * np.where(x <= middle, rising, 1 - falling)  # the impedance
         softness, k = (1 - d) / d * self.softness, spring * d
         if not self.discrete:
             return softness, k, b_f
-        return softness, k, b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
+        return (
+            softness,
+            k,
+            b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h),
+        )
 
     def _depth(self, slides: Array) -> Array:
-        """Depth below the margin at which contacts bear their loads, by bisection, m; `slides` says which slip."""
+        """Depth below the margin at which contacts bear their loads, by bisection, m; `slides` says
+        which slip."""
         load = self.force[:, 0]
         low, kept = np.zeros(len(load)), self.friction[:, 0] ** 2 / self.impratio * load
         softness, k, _ = self._rows(low)
@@ -139,7 +159,13 @@ class Contacts:
             middle = (low + high) / 2
             softness, k, damping = self._rows(middle)
             x = k * middle / softness
-            sliding = damping[:, None] * self.friction * np.abs(self.slip) / softness[:, None] * self._frictional
+            sliding = (
+                damping[:, None]
+                * self.friction
+                * np.abs(self.slip)
+                / softness[:, None]
+                * self._frictional
+            )
             if self.pyramidal:
                 edge = np.where(slides[:, None], x[:, None] + sliding, self._scaled_friction)
                 edges = (np.maximum(2 * x[:, None], edge) * self._frictional).sum(1)
@@ -152,7 +178,12 @@ class Contacts:
     @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
     def law(self) -> Law:
         """What the contacts do under their loads."""
-        load, mu, frictional, slides = self.force[:, 0], self.friction, self._frictional, self.cone >= CONE
+        load, mu, frictional, slides = (
+            self.force[:, 0],
+            self.friction,
+            self._frictional,
+            self.cone >= CONE,
+        )
         _, b, b_f = self._springs
         depth = self._depth(slides)
         softness, k, damping = self._rows(depth)
@@ -160,24 +191,46 @@ class Contacts:
         if self.pyramidal:
             x = (k * depth / softness)[:, None]
             wanted = self._scaled_friction
-            creep = softness[:, None] * np.where(wanted <= 2 * x, wanted / 2, wanted - x) / (mu * damping[:, None])
+            creep = (
+                softness[:, None]
+                * np.where(wanted <= 2 * x, wanted / 2, wanted - x)
+                / (mu * damping[:, None])
+            )
             hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
             sideways = 2 * mu**2 / softness[:, None]
         else:
             soft = softness[:, None] / self.impratio * (mu[:, :1] / mu) ** 2
             creep = soft * np.abs(self.force[:, 1:]) / damping[:, None]
-            hover = (1 + mu[:, 0] ** 2 / self.impratio) * first * load / (mu[:, :2].max(1) * first_damping)
+            hover = (
+                (1 + mu[:, 0] ** 2 / self.impratio)
+                * first
+                * load
+                / (mu[:, :2].max(1) * first_damping)
+            )
             sideways = 1 / soft
         shift = 1e-6 * depth
-        (softer, k_less, _), (harder, k_more, _) = self._rows(depth - shift), self._rows(depth + shift)
-        slope = softness * (k_more * (depth + shift) / harder - k_less * (depth - shift) / softer) / (2 * shift)
-        if self.noslip:  # it corrects friction alone, after normal forces were found beside friction at no creep
+        (softer, k_less, _), (harder, k_more, _) = (
+            self._rows(depth - shift),
+            self._rows(depth + shift),
+        )
+        slope = (
+            softness
+            * (k_more * (depth + shift) / harder - k_less * (depth - shift) / softer)
+            / (2 * shift)
+        )
+        if (
+            self.noslip
+        ):  # it corrects friction alone, after normal forces were found beside friction at no creep
             creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
             along, soft = self.rows[:, 1:][sticks], 1 / sideways[sticks]
-            lacking = np.linalg.solve(along @ along.T + np.diag(soft), soft * self.force[:, 1:][sticks])
+            lacking = np.linalg.solve(
+                along @ along.T + np.diag(soft), soft * self.force[:, 1:][sticks]
+            )
             depth = depth - self.rows[:, 0] @ (along.T @ lacking) / k
         creep = np.where(frictional, creep, 0)
-        bearing = np.where((self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1)  # one row, or all edges of a pyramid
+        bearing = np.where(
+            (self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1
+        )  # one row, or all edges of a pyramid
         sideways = np.where(frictional & ~slides[:, None], sideways, 0)
         return Law(
             depth=depth - self.margin,
@@ -194,7 +247,9 @@ class Contacts:
         """The contacts `which` alone, with their Jacobian in the coordinates that they move."""
         n = len(self.dim)
         chosen = {
-            f.name: v[which] for f in dataclasses.fields(self) if np.ndim(v := getattr(self, f.name)) and len(v) == n
+            f.name: v[which]
+            for f in dataclasses.fields(self)
+            if np.ndim(v := getattr(self, f.name)) and len(v) == n
         }
         flat = chosen["rows"].reshape(6 * len(chosen["dim"]), self.rows.shape[2])
         _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
@@ -202,22 +257,28 @@ class Contacts:
         return dataclasses.replace(self, **chosen)
 
     def matrices(self) -> tuple[Array, Array, Array]:
-        """Mass, damping and stiffness (n, n) of small motions about the settled state, m a + d v + k x = 0."""
+        """Mass, damping and stiffness (n, n) of small motions about the settled state, m a + d v +
+        k x = 0."""
         law, flat = self.law(), self.rows.reshape(6 * len(self.dim), self.rows.shape[2])
         weight = law.weight * (np.arange(6) < self.dim[:, None])
 
         values = weight, weight * law.damping, weight * law.stiffness[:, None] * (np.arange(6) == 0)
-        mass, damping, stiffness = ((flat.T * np.nan_to_num(each).ravel()) @ flat for each in values)
+        mass, damping, stiffness = (
+            (flat.T * np.nan_to_num(each).ravel()) @ flat for each in values
+        )
         return np.eye(len(mass)) + mass, damping, stiffness
 
     def stable(self, timestep: float) -> bool:
-        """Whether small motions die out at a time step: the first that doesn't changes sign in every step."""
+        """Whether small motions die out at a time step: the first that doesn't changes sign in
+        every step."""
         if self.discrete:
             return True
         mass, damping, stiffness = dataclasses.replace(self, timestep=timestep).matrices()
         damping, stiffness = timestep * damping, timestep**2 * stiffness
         forms = [4 * mass - 2 * damping - stiffness]
-        if self.integrator == mujoco.mjtIntegrator.mjINT_RK4:  # its region ends at -2.785 and 2.83 i
+        if (
+            self.integrator == mujoco.mjtIntegrator.mjINT_RK4
+        ):  # its region ends at -2.785 and 2.83 i
             forms = [2.785**2 * mass - 2.785 * damping + stiffness, 8 * mass - stiffness]
         return all((np.linalg.eigvalsh(form) > 0).all() for form in forms)
 
@@ -234,7 +295,8 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Law:
-    """What n contacts do under their loads, nan where one slides or lacks that friction; and their small motions."""
+    """What n contacts do under their loads, nan where one slides or lacks that friction; and their
+    small motions."""
 
     depth: Array
     creep: Array
@@ -250,19 +312,27 @@ class Law:
 
 def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     """The contacts that carry more than a faint load at a state, and their numbers in `data`."""
-    twin = copy.copy(model)  # in it each row is a direction of a contact, whatever the cone and the integrator
-    twin.opt.cone, twin.opt.integrator = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtIntegrator.mjINT_EULER
+    twin = copy.copy(
+        model
+    )  # in it each row is a direction of a contact, whatever the cone and the integrator
+    twin.opt.cone, twin.opt.integrator = (
+        mujoco.mjtCone.mjCONE_ELLIPTIC,
+        mujoco.mjtIntegrator.mjINT_EULER,
+    )
     twin.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     state = mujoco.MjData(twin)
     mujoco.mj_copyData(state, twin, data)
     mujoco.mj_forward(twin, state)
     mujoco.mj_forward(model, data)
     found, mass = data.contact, np.zeros((model.nv, model.nv))
-    number = np.flatnonzero((state.contact.efc_address >= 0) & (found.exclude == 0) & (found.geom >= 0).all(1))
+    number = np.flatnonzero(
+        (state.contact.efc_address >= 0) & (found.exclude == 0) & (found.geom >= 0).all(1)
+    )
     force = np.zeros((len(number), 6))
     for k, each in enumerate(number):
         mujoco.mj_contactForce(model, data, each, force[k])
-    # The weight of each body with all that is welded to it, N; inf if no joint moves it, 0 without gravity.
+    # The weight of each body with all that is welded to it, N; inf if no joint moves it, 0 without
+    # gravity.
     welded = np.bincount(model.body_weldid, model.body_mass, model.nbody)[model.body_weldid]
     weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
     g = 0.0 if weightless else np.hypot.reduce(model.opt.gravity)
@@ -276,7 +346,9 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     if len(number):
         mujoco.mj_fullM(model, data, mass)
         start = np.append(state.efc_J_rowadr, state.nJ)
-        jacobian = scipy.sparse.csr_array((state.efc_J, state.efc_J_colind, start), (state.nefc, model.nv)).toarray()
+        jacobian = scipy.sparse.csr_array(
+            (state.efc_J, state.efc_J_colind, start), (state.nefc, model.nv)
+        ).toarray()
         whitened = scipy.linalg.solve_triangular(np.linalg.cholesky(mass), jacobian.T, lower=True).T
         rows = whitened[row] * there[..., None]
     described = Contacts(
@@ -293,7 +365,8 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
 
 
 def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
-    """What options of a model decide for the contacts of these numbers, by the names in `Contacts`."""
+    """What options of a model decide for the contacts of these numbers, by the names in
+    `Contacts`."""
     option = model.opt
     return {
         "timestep": option.timestep,
@@ -302,26 +375,43 @@ def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
         "integrator": option.integrator,
         "noslip": option.noslip_iterations > 0,
         "refsafe": not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE,
-        **{name: getattr(data.contact, name)[number] for name in ("solref", "solreffriction", "solimp", "friction")},
+        **{
+            name: getattr(data.contact, name)[number]
+            for name in ("solref", "solreffriction", "solimp", "friction")
+        },
     }
 
 
 def replacements(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Parameters of one pair's contacts in whose place the engine takes others: the kind, and a sentence on it."""
+    """Parameters of one pair's contacts in whose place the engine takes others: the kind, and a
+    sentence on it."""
     asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
     if (asked > 0).sum() == 1:
-        yield "solref of neither format", f"{asked[0]:g} {asked[1]:g}: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
+        yield (
+            "solref of neither format",
+            f"{asked[0]:g} {asked[1]:g}: {SOLREF[0]:g} {SOLREF[1]:g} is taken",
+        )
     for name in ("solref", "solreffriction"):
         ref = getattr(c, name)
         if (ref[0] > 0).all():
             taken = 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))
             if taken > 1.000001 * ref[0, 0]:
-                yield f"{name} too short for the time step", f"{ref[0, 0]:g} s: {taken:.3g} s is taken (refsafe)"
+                yield (
+                    f"{name} too short for the time step",
+                    f"{ref[0, 0]:g} s: {taken:.3g} s is taken (refsafe)",
+                )
     if c.solreffriction.any() and c.pyramidal:
         yield "solreffriction", "the pyramidal cone ignores it"
     if (clipped := np.clip(imp[:2], *limits) != imp[:2]).any():
-        yield "impedance out of range", f"{imp[:2][clipped][0]:g}: the limit is taken, {limits[0]:g} or {limits[1]:g}"
-    if (np.sort(c.geoms[0]) == np.sort(np.column_stack([model.pair_geom1, model.pair_geom2]))).all(1).any():
+        yield (
+            "impedance out of range",
+            f"{imp[:2][clipped][0]:g}: the limit is taken, {limits[0]:g} or {limits[1]:g}",
+        )
+    if (
+        (np.sort(c.geoms[0]) == np.sort(np.column_stack([model.pair_geom1, model.pair_geom2])))
+        .all(1)
+        .any()
+    ):
         return  # parameters of the geoms count for nothing
     for name, mixed in (("solref", asked), ("solimp", imp), ("friction", c.friction[0, [0, 2, 3]])):
         own = getattr(model, f"geom_{name}")[c.geoms[0]]

@@ -1,8 +1,8 @@
-"""The set of exact cases, the study's ball among them, and all as files for engines that don't speak Python.
+"""The set of exact cases, the study's ball among them, and all as files for engines that don't
+speak Python.
 
-The ball's motion is that of `analytic.simulate`, event-driven, at its sharpest; its wrong answers are the motions of
-other parameters.
-"""
+The ball's motion is that of `analytic.simulate`, event-driven, at its sharpest; its wrong answers
+are the motions of other parameters."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ README = Path(__file__).with_name("templates") / "cases.md"
 SHARP = 1e-13
 """Relative tolerance of the event-driven simulation."""
 BOUND = 1e-10
-"""Of what it then is wrong by: a hundred times what it differs by from itself at ten times the tolerance."""
+"""Of what it then is wrong by: a hundred times what it differs by from itself at ten times the
+tolerance."""
 
 
 @cache
@@ -42,12 +43,14 @@ def cases() -> tuple[Case, ...]:
 
 
 def listing() -> list[list[str]]:
-    """A row for each case: name, number of contacts, kind, what happens; templates/cases.json has them, too."""
+    """A row for each case: name, number of contacts, kind, what happens; templates/cases.json has
+    them, too."""
     return [[case.name, str(len(case.contacts[0])), case.kind, case.about] for case in cases()]
 
 
 def write(directory: Path) -> None:
-    """Write JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises `StorageError`."""
+    """Write JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises
+    `StorageError`."""
     make_directory(directory)
     check_ours(directory / "README.md", beside=directory / "cases.h5")
     said = {"version": VERSION, "tolerance": TOLERANCE, "dualball": current_versions()["dualball"]}
@@ -60,11 +63,16 @@ def write(directory: Path) -> None:
             write_text(directory / f"{case.name}.json", json.dumps(data, indent=1))
             write_text(directory / f"{case.name}.xml", case.mjcf())
             group = file.create_group(case.name)
-            group.attrs["about"], group.attrs["case"] = case.about, json.dumps(data | {"times": [], "exact": []})
+            group.attrs["about"], group.attrs["case"] = (
+                case.about,
+                json.dumps(data | {"times": [], "exact": []}),
+            )
             group["time"], group["exact"] = case.times, case.exact
             group["contacts"] = np.array(case.contacts, dtype="S")
             group["time"].attrs["units"] = "s"
-            group["exact"].attrs["columns"] = "position (m), velocity (m s-1), spin (rad s-1), of each body"
+            group["exact"].attrs["columns"] = (
+                "position (m), velocity (m s-1), spin (rad s-1), of each body"
+            )
         whole.finish()
     write_text(directory / "README.md", README.read_text("utf-8").format(**said))
 
@@ -86,27 +94,39 @@ VESSEL: tuple[tuple[str, str, Parameters, State, float, Mapping[str, Mapping[str
      State(omega_c=14.35, slip_x=-1.0, slip_y=2.0, slip_z=7.0), 2.0, _SLIP),
     ("rides-the-wall", "the wall alone carries it, and it rolls there (NR)", ROUGH,
      State(y=0.1, v_y=0.1, omega_c=22.0, slip_x=5.0), 1.0, _ROLL),
-    ("onset-of-slip", "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
+    ("onset-of-slip", "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, "
+                      "SS)",
      SLOW.replace(omega_0=20.0), State(omega_c=8.0), 3.0, _SLIP),
-    ("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)", SLOW,
+    ("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, "
+              "RR)", SLOW,
      State(y=0.02, v_y=-0.2, omega_c=12.0, slip_x=30.0, slip_y=-10.0, slip_z=20.0), 0.5, _BLOW),
-    ("hits-the-wall", "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)", SLOW,
+    ("hits-the-wall", "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, "
+                      "RR)", SLOW,
      State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3), 0.5, _BLOW),
-    ("falls-in", "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)", SLOW,
+    ("falls-in", "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, "
+                 "RS, RR)", SLOW,
      State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, _BLOW),
 )  # fmt: skip
 """The paper's ball: name, what happens, parameters, start, duration in s, and wrong answers."""
 
 
 def _in_vessel(
-    name: str, about: str, p: Parameters, x0: State, until: float, wrong: Mapping[str, Mapping[str, float]]
+    name: str,
+    about: str,
+    p: Parameters,
+    x0: State,
+    until: float,
+    wrong: Mapping[str, Mapping[str, float]],
 ) -> Case:
-    """A case of the ball between floor and wall, as in `VESSEL`, by event-driven simulation, sampled 25 times."""
+    """A case of the ball between floor and wall, as in `VESSEL`, by event-driven simulation,
+    sampled 25 times."""
 
     def run(rtol: float, restitution: float = 0.0, **factors: float) -> tuple[Array, Trajectory]:
         """States (n, 9) of a ball with parameters wrong by factors, and its motion."""
         other = p.replace(**{key: factor * getattr(p, key) for key, factor in factors.items()})
-        found = analytic.simulate(other, x0, until, rtol=rtol, restitution=restitution, sample_interval=until / 25)
+        found = analytic.simulate(
+            other, x0, until, rtol=rtol, restitution=restitution, sample_interval=until / 25
+        )
         return np.concatenate(to_world(found.x, found.theta, other), axis=1)[1:], found
 
     exact, motion = run(SHARP)

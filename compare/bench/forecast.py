@@ -1,9 +1,9 @@
-"""What the contacts of any MuJoCo model will do, beside what they measurably do, and what to change.
+"""What the contacts of any MuJoCo model will do, beside what they measurably do, and what to
+change.
 
-The engine says what the contacts of a settled model carry. From that `compare.bench.contact_law` computes depth, creep
-and the rest; measured are the places of bodies before and after the next tenth of a second, or of a second where some
-of them still move.
-"""
+The engine says what the contacts of a settled model carry. From that `compare.bench.contact_law`
+computes depth, creep and the rest; measured are the places of bodies before and after the next
+tenth of a second, or of a second where some of them still move."""
 
 from __future__ import annotations
 
@@ -37,20 +37,23 @@ from compare.bench.settled import (
 from model import InputError
 
 CREEP, DEPTH = 1e-5, 0.01
-"""What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller body."""
+"""What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller
+body."""
 SECOND, CHECKED = 1.0, 3.0
-"""What still moves is measured for so long, s; and a changed model must settle within so many to be advised."""
+"""What still moves is measured for so long, s; and a changed model must settle within so many to be
+advised."""
 SHOWN = 12
 """The worst pairs, which are shown."""
 
 
 @dataclass(frozen=True)
 class PairForecast:
-    """Two geoms in contact, at the worst of their contacts: what is predicted of them, and what was measured.
+    """Two geoms in contact, at the worst of their contacts: what is predicted of them, and what was
+    measured.
 
-    If speeds still change, loads are means over the second in which the rest was measured. Of a pair that `moves`, as
-    its bodies move on or lose contact, depth, creep and turning aren't predicted: nan.
-    """
+    If speeds still change, loads are means over the second in which the rest was measured. Of a
+    pair that `moves`, as its bodies move on or lose contact, depth, creep and turning aren't
+    predicted: nan."""
 
     name: str
     members: tuple[int, ...]
@@ -94,7 +97,8 @@ class Forecast:
     """Contacts of flexible bodies, which are left out."""
     change: advice.Change | None
     remedy: str
-    """Lines of Python that hold what still creeps harmfully after the change, or without one; empty: nothing does."""
+    """Lines of Python that hold what still creeps harmfully after the change, or without one;
+    empty: nothing does."""
 
     @property
     def unsettled(self) -> str:
@@ -112,31 +116,45 @@ def forecast(
     depth: float | None = None,
     control: Control | None = None,
 ) -> Forecast:
-    """The forecast for a model as `settle` has left it; `data` is left at the end of what is measured.
+    """The forecast for a model as `settle` has left it; `data` is left at the end of what is
+    measured.
 
-    `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for good; `control` is run
-    before each step. Raises `InputError` if nothing touches, `UnsettledError` if the model diverges.
-    """
+    `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for
+    good; `control` is run before each step. Raises `InputError` if nothing touches,
+    `UnsettledError` if the model diverges."""
     scene = _measured(awake(model), data, settled, with_control(control), creep, depth)
     found = _without_advice(scene, settled)
     worst = found.pairs[0]
 
     def calm(other: Any) -> bool:
-        """Whether a changed model settles as well: contacts may chatter that are stable for small motions."""
+        """Whether a changed model settles as well: contacts may chatter that are stable for small
+        motions."""
         try:
-            return len(settle(other, copy.copy(scene.data), CHECKED, control).moving) <= len(settled.moving)
+            return len(settle(other, copy.copy(scene.data), CHECKED, control).moving) <= len(
+                settled.moving
+            )
         except UnsettledError:
             return False
 
     change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm)
-    creeps = max(pair.harm["creep"] for pair in found.pairs) > 1 and 1 < left["creep"].max() < math.inf
-    return dataclasses.replace(found, change=change, remedy=advice.remedy_code(model) if creeps else "")
+    creeps = (
+        max(pair.harm["creep"] for pair in found.pairs) > 1 and 1 < left["creep"].max() < math.inf
+    )
+    return dataclasses.replace(
+        found, change=change, remedy=advice.remedy_code(model) if creeps else ""
+    )
 
 
 def follow_advice(
-    model: Any, data: Any, before: Forecast, limit: float, control: Control | None = None, **good: Any
+    model: Any,
+    data: Any,
+    before: Forecast,
+    limit: float,
+    control: Control | None = None,
+    **good: Any,
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
-    """Follow the advice and settle anew, for at most `limit` s: the forecast with what was found, after it, and beyond.
+    """Follow the advice and settle anew, for at most `limit` s: the forecast with what was found,
+    after it, and beyond.
 
     The second forecast is that after the change, the third that with the remedy on top.
     What isn't advised isn't tried: None. The change is made in `model`. Raises as `forecast` does.
@@ -145,28 +163,49 @@ def follow_advice(
     if change := before.change:
         advice.apply(model, change.option, change.value)
         after = _settled_anew(model, data, mujoco.mj_step, limit, control, good)
-        quantity = f"{change.quantity}_measured" if change.quantity in ("creep", "depth") else change.quantity
+        quantity = (
+            f"{change.quantity}_measured"
+            if change.quantity in ("creep", "depth")
+            else change.quantity
+        )
         found = [getattr(pair, quantity) for pair in after.pairs if pair.name == change.pair]
-        before = dataclasses.replace(before, change=dataclasses.replace(change, found=max(found, default=math.nan)))
+        before = dataclasses.replace(
+            before, change=dataclasses.replace(change, found=max(found, default=math.nan))
+        )
     if before.remedy:
         held = _settled_anew(*advice.remedied(model, data), limit, control, good)
-        nothing = [dataclasses.replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs]
+        nothing = [
+            dataclasses.replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs
+        ]
         held = dataclasses.replace(held, pairs=tuple(nothing))
     return before, after, held
 
 
 def _settled_anew(
-    model: Any, data: Any, law: Advance, limit: float, control: Control | None, good: Mapping[str, Any]
+    model: Any,
+    data: Any,
+    law: Advance,
+    limit: float,
+    control: Control | None,
+    good: Mapping[str, Any],
 ) -> Forecast:
     """A forecast without advice, of a model that is settled anew under another law of stepping."""
     settled = settle(model, data, limit, control, law)
-    return _without_advice(_measured(awake(model), data, settled, with_control(control, law), **good), settled)
+    return _without_advice(
+        _measured(awake(model), data, settled, with_control(control, law), **good), settled
+    )
 
 
 def _measured(
-    model: Any, data: Any, settled: Rest, step: Advance, creep: float = CREEP, depth: float | None = None
+    model: Any,
+    data: Any,
+    settled: Rest,
+    step: Advance,
+    creep: float = CREEP,
+    depth: float | None = None,
 ) -> advice.AtRest:
-    """The contacts of a settled model, and what was measured of them; `data` is left at the end of that."""
+    """The contacts of a settled model, and what was measured of them; `data` is left at the end of
+    that."""
     moving = settled.moving
     if moving:
         step_to_most_contacts(model, data, step)
@@ -210,7 +249,9 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
     """The forecast for a settled model without advice."""
     those, moves, names = scene.contacts, scene.moves, geom_names(scene.model)
     law, harms, pairs = those.law(), scene.harm(those), []
-    told = {name: np.where(moves, np.nan, getattr(law, name)) for name in ("depth", "creep", "turning")}
+    told = {
+        name: np.where(moves, np.nan, getattr(law, name)) for name in ("depth", "creep", "turning")
+    }
     told |= {"cone": np.where(moves, np.nan, those.cone), **scene.found}
     geoms, belongs = np.unique(those.geoms, axis=0, return_inverse=True)
     for k, (first, second) in enumerate(geoms):

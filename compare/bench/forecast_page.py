@@ -19,25 +19,32 @@ Table = tuple[str, list[list[str]]]
 
 
 def sentences(f: Forecast) -> Iterator[str]:
-    """A forecast in sentences: what to do, what was found when it was tried, and what else one should know."""
+    """A forecast in sentences: what to do, what was found when it was tried, and what else one
+    should know."""
     sliding, rattling = [p.name for p in f.pairs if p.slides], [p.name for p in f.pairs if p.moves]
     moving = [*f.settled.moving.values()]
     if f.change:
         name, factor, unit = FAULTS[f.change.quantity]
         endless = "any" if f.change.quantity == "largest_step" else "∞"
-        before, after, found = (_number(v, factor, endless) for v in (f.change.before, f.change.after, f.change.found))
+        before, after, found = (
+            _number(v, factor, endless) for v in (f.change.before, f.change.after, f.change.found)
+        )
         done = "" if found == "–" else f" Tried: {found} {unit}."
         yield f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to {after} {unit}.{done}"
     if f.remedy:
         yield (
-            f"{'That alone does not cure' if f.change else 'No single option cures'} the creep. Step with "
-            "mjsim.Coulomb: what friction can hold then stays. Creep 0, depth as it is; what it costs is not forecast."
+            f"{'That alone does not cure' if f.change else 'No single option cures'} the creep. "
+            f"Step with "
+            "mjsim.Coulomb: what friction can hold then stays. Creep 0, depth as it is; what it "
+            "costs is not forecast."
         )
     if sliding:
         yield f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction holds them."
     if lost := [p.name for p in f.pairs if p.slides and p.creep_measured > p.hover]:
         yield f"These slide so fast that contact is lost again and again: {few(lost)}."
-    if off := [p.name for p in f.pairs if abs(p.creep_measured - p.creep) > CREEP_OFF * p.creep + NOISE]:
+    if off := [
+        p.name for p in f.pairs if abs(p.creep_measured - p.creep) > CREEP_OFF * p.creep + NOISE
+    ]:
         yield f"Creep is not what was predicted at {few(off)}: not settled yet, or the solver stops early (tolerance)."
     if f.settled.collapsed:
         how = "To hold it up: --ctrl, --keyframe, or in Python control."
@@ -65,29 +72,49 @@ def sentences(f: Forecast) -> Iterator[str]:
 
 
 def _number(value: float, factor: float = 1, endless: str = "any") -> str:
-    """A number times a factor as text: three digits, 0 for what is next to nothing, `endless` for infinity."""
+    """A number times a factor as text: three digits, 0 for what is next to nothing, `endless` for
+    infinity."""
     value *= factor
     if not math.isfinite(value):
         return endless if math.isinf(value) else "–"
-    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
+    return (
+        f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
+    )
 
 
 def tables(f: Forecast, after: Forecast | None = None, held: Forecast | None = None) -> list[Table]:
-    """Tables of the worst pairs in contact: at rest and in motion; what was measured is called found.
+    """Tables of the worst pairs in contact: at rest and in motion; what was measured is called
+    found.
 
-    Then what the change was made for, once it was made, and the creep with the remedy, if these forecasts are given.
-    """
-    rest = [["pair", "creep\nµm/s", "found\nµm/s", "turning\nµrad/s", "found\nµrad/s", "depth\nµm", "found\nµm"]]
+    Then what the change was made for, once it was made, and the creep with the remedy, if these
+    forecasts are given."""
+    rest = [
+        [
+            "pair",
+            "creep\nµm/s",
+            "found\nµm/s",
+            "turning\nµrad/s",
+            "found\nµrad/s",
+            "depth\nµm",
+            "found\nµm",
+        ]
+    ]
     rest[0] += ["load\nN", "cone\n%"]
     motion = [["pair", "hover\nmm/s", "step\nms"]]
     for p in f.pairs[:SHOWN]:
         micro = p.creep, p.creep_measured, p.turning, p.turning_measured, p.depth, p.depth_measured
-        rest.append([p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), _number(p.cone, 100)])
+        rest.append(
+            [p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), _number(p.cone, 100)]
+        )
         motion.append([p.name, _number(p.hover, 1e3), _number(p.largest_step, 1e3)])
-    title = f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
+    title = f"Pairs in contact: {len(f.pairs)}" + (
+        f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else ""
+    )
     shown = [(title, _without_empty_columns(rest)), ("In motion", _without_empty_columns(motion))]
     if after and f.change:
-        shown.append((f"With {f.change.written}", tables(after)[f.change.quantity == "largest_step"][1]))
+        shown.append(
+            (f"With {f.change.written}", tables(after)[f.change.quantity == "largest_step"][1])
+        )
     return shown + ([("With mjsim.Coulomb", tables(held)[0][1])] if held else [])
 
 
@@ -98,7 +125,8 @@ def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
 
 
 def snippets(f: Forecast) -> list[tuple[str, str]]:
-    """Text to paste into the model or program that makes it better, each with what it is: MJCF or Python."""
+    """Text to paste into the model or program that makes it better, each with what it is: MJCF or
+    Python."""
     mjcf = [("MJCF", f.change.mjcf)] if f.change else []
     return mjcf + ([("Python", f.remedy)] if f.remedy else [])
 
@@ -106,5 +134,10 @@ def snippets(f: Forecast) -> list[tuple[str, str]]:
 def html(f: Forecast, after: Forecast | None, held: Forecast | None, file: str) -> str:
     """The forecast, and those after the change and with the remedy, as one self-contained page."""
     shown = tables(f, after, held)
-    said = {"file": file, "sentences": list(sentences(f)), "paste": snippets(f), "faint": f"{FAINT:.1%}"}
+    said = {
+        "file": file,
+        "sentences": list(sentences(f)),
+        "paste": snippets(f),
+        "faint": f"{FAINT:.1%}",
+    }
     return pages.render("compare.bench", "forecast.html", tables=shown, **said)

@@ -1,4 +1,5 @@
-"""The league: every engine that is installed on every exact case, as it comes and in the best settings known here."""
+"""The league: every engine that is installed on every exact case, as it comes and in the best
+settings known here."""
 
 from __future__ import annotations
 
@@ -53,10 +54,13 @@ ENTRY_MARKS, ENTRY_COLOURS = (
 )
 CAPTION = (
     "Errors at the shortest step in units of each case's scales; up to "
-    f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors fall, the median over "
+    f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors "
+    f"fall, the median over "
     "the cases. "
-    "Cost: processor time divided by simulated time at the shortest step, the median. The shortest step is 1 ms, of "
-    "MuJoCo on Warp and of Newton's Kamino and VBD 2 ms. A dash: the engine can't express the case, and was not tried."
+    "Cost: processor time divided by simulated time at the shortest step, the median. The shortest "
+    "step is 1 ms, of "
+    "MuJoCo on Warp and of Newton's Kamino and VBD 2 ms. A dash: the engine can't express the "
+    "case, and was not tried."
 )
 """What the numbers are."""
 
@@ -64,14 +68,17 @@ CAPTION = (
 def measure(
     engines: Mapping[str, Any], steps: Sequence[float] | None, workers: int, show: Show
 ) -> dict[str, list[Result]]:
-    """Results by engine, one for each case; engines that can't be used have results that say why."""
+    """Results by engine, one for each case; engines that can't be used have results that say
+    why."""
     asked, done = cases(), 0
     total, over = len(engines) * len(asked), threading.Event()
 
     def results_of(name: str) -> list[Result]:
         nonlocal done
         found = []
-        for result in run_all(itertools.takewhile(lambda _: not over.is_set(), asked), engines[name], steps):
+        for result in run_all(
+            itertools.takewhile(lambda _: not over.is_set(), asked), engines[name], steps
+        ):
             found.append(result)
             done += 1
             show(f"{name}: {result.case}", done, total, 0)
@@ -85,7 +92,8 @@ def measure(
 
 
 def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
-    """A row for each engine that was tried: how many cases it passes, the median error of each kind, order and cost."""
+    """A row for each engine that was tried: how many cases it passes, the median error of each
+    kind, order and cost."""
     kinds = {case.name: case.kind for case in cases()}
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
     for name, results in ranked(league).items():
@@ -116,15 +124,20 @@ def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
 
 
 def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
-    """Engines that were tried in some case; those that pass the largest share first, as they come behind all others."""
-    tried = {name: [result.passed for result in results if not result.skipped] for name, results in league.items()}
+    """Engines that were tried in some case; those that pass the largest share first, as they come
+    behind all others."""
+    tried = {
+        name: [result.passed for result in results if not result.skipped]
+        for name, results in league.items()
+    }
     there = [name for name, own in tried.items() if own]
     there.sort(key=lambda name: (name.endswith("-defaults"), -statistics.mean(tried[name])))
     return {name: league[name] for name in there}
 
 
 def cell(result: Result) -> str:
-    """The cell of a result: its error, or in a word why there is none; marked where it is too much to pass."""
+    """The cell of a result: its error, or in a word why there is none; marked where it is too much
+    to pass."""
     if result.skipped:
         return "–"
     floor = FLOORS[result.engine.precision]
@@ -143,31 +156,46 @@ def number(value: float, floor: float) -> str:
 
 
 def declarations(league: Mapping[str, Sequence[Result]]) -> Rows:
-    """What each engine that was tried declares, its worst case and why; `notes` say why others were not."""
+    """What each engine that was tried declares, its worst case and why; `notes` say why others were
+    not."""
     table = [["engine", "version", "declared", "worst case", "why"]]
     for name, results in league.items():
         if tried := [result for result in results if not result.skipped]:
             worst = max(tried, key=lambda r: r.error if math.isfinite(r.error) else math.inf)
             engine, failed = worst.engine, f": {worst.failure}" if worst.failure else ""
-            table.append([name, engine.version, engine.declared, f"{worst.case}, {cell(worst)}{failed}", engine.note])
+            table.append(
+                [
+                    name,
+                    engine.version,
+                    engine.declared,
+                    f"{worst.case}, {cell(worst)}{failed}",
+                    engine.note,
+                ]
+            )
     return table
 
 
 def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, str]]:
-    """Engines and cases that failed or were not tried, and why; one line for each reason of an engine."""
+    """Engines and cases that failed or were not tried, and why; one line for each reason of an
+    engine."""
     for name, results in league.items():
         reasons: dict[str, list[str]] = {}
         for result in results:
             if reason := result.failure or result.skipped:
                 reasons.setdefault(reason, []).append(result.case)
         for reason, those in reasons.items():
-            yield f"{name}, {'all cases' if len(those) == len(results) else ', '.join(those)}", reason
+            yield (
+                f"{name}, {'all cases' if len(those) == len(results) else ', '.join(those)}",
+                reason,
+            )
 
 
 def to_mapping(league: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
     """All results of the league as JSON-able data."""
     entries = {
-        name: [vars(result) | {"order": result.order, "passed": result.passed} for result in results]
+        name: [
+            vars(result) | {"order": result.order, "passed": result.passed} for result in results
+        ]
         for name, results in league.items()
     }
     return dict(plain({"version": VERSION, "tolerance": TOLERANCE, "engines": entries}))
@@ -179,7 +207,8 @@ def _median(values: Iterator[float]) -> float:
 
 
 def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
-    """A figure with a panel for each kind of case: an engine's median error over its median cost, its steps joined."""
+    """A figure with a panel for each kind of case: an engine's median error over its median cost,
+    its steps joined."""
     from matplotlib.ticker import NullFormatter  # here, because drawing takes a second to load
 
     from compare.kit import style
@@ -194,7 +223,9 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             if not len(own):
                 continue
             known = np.isfinite(own[:, 1]).mean(0) > 0.5  # where the median is
-            cost, error = np.nanmedian(np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known], axis=0)
+            cost, error = np.nanmedian(
+                np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known], axis=0
+            )
             number = families.index(name.removesuffix("-defaults"))
             look = {
                 "marker": ENTRY_MARKS[number % len(ENTRY_MARKS)],
@@ -206,7 +237,9 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
             for at in zip(cost, error, strict=True) if len(shown) <= FEW else ():
                 place = at[0], max(at[1], LEAST)
-                axes.annotate(f"{at[1]:.1e}", place, xytext=(6, 3), textcoords="offset points", fontsize=8)
+                axes.annotate(
+                    f"{at[1]:.1e}", place, xytext=(6, 3), textcoords="offset points", fontsize=8
+                )
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)

@@ -1,8 +1,9 @@
-"""Exact cases of version 2: on feet, one body on another, on a belt, on a joint, on an edge or a rim, after a bounce.
+"""Exact cases of version 2: on feet, one body on another, on a belt, on a joint, on an edge or a
+rim, after a bounce.
 
-As in `compare.bench.closed_forms`: courses are functions of time and of the constants that a wrong engine or theory
-would have otherwise, each under its case. That of the tripod and of what it stands on are quadratures, to 1e-12.
-"""
+As in `compare.bench.closed_forms`: courses are functions of time and of the constants that a wrong
+engine or theory would have otherwise, each under its case. That of the tripod and of what it stands
+on are quadratures, to 1e-12."""
 
 from __future__ import annotations
 
@@ -17,7 +18,18 @@ from scipy.special import ellipj, ellipk, ellipkinc
 
 from compare.adapters.scene import Surface
 from compare.bench.case import Case
-from compare.bench.closed_forms import BLOCK, SPEED_ALONE, UP, WAY, G, along, block, case, slope, sphere
+from compare.bench.closed_forms import (
+    BLOCK,
+    SPEED_ALONE,
+    UP,
+    WAY,
+    G,
+    along,
+    block,
+    case,
+    slope,
+    sphere,
+)
 from model.arrays import Array
 
 MECHANISMS: list[Callable[[], Case]] = []
@@ -29,18 +41,22 @@ _Motion = tuple[Array, ...]
 def _plate(mass: float, tilt: float, size: tuple[float, float, float]) -> dict[str, Any]:
     """A box of a size and mass, turned about the y axis, as fields of `Body`."""
     x, y, z = (2 * half for half in size)
-    moments = tuple(mass / 12 * sum(pair) for pair in ((y * y, z * z), (x * x, z * z), (x * x, y * y)))
+    moments = tuple(
+        mass / 12 * sum(pair) for pair in ((y * y, z * z), (x * x, z * z), (x * x, y * y))
+    )
     return block(tilt) | {"size": size, "mass": mass, "inertia": moments}
 
 
 # fmt: off
 _FOOT, _OUT, _DOWN, _MOMENT = 0.01, 0.1, 0.04, 0.006
-"""Of the tripod the size, m, as a `Body` has it, and the moment of inertia about its axis, kg m2."""
+"""Of the tripod the size, m, as a `Body` has it, and the moment of inertia about its axis, kg
+m2."""
 
 
 @_case(
     "tripod-turns",
-    "three legs that slide and turn: each bears what keeps it from tilting, and slows it along its own slip",
+    "three legs that slide and turn: each bears what keeps it from tilting, and slows it along its "
+    "own slip",
     {"shape": "tripod", "size": (_FOOT, _OUT, _DOWN), "mass": 1.0, "inertia": (0.004, 0.004, _MOMENT)},
     (Surface("floor", 0.3),),
     wrong={"each leg bears a third": {"share": 0.0}, "friction 5 % too weak": {"mu": 0.95 * 0.3},
@@ -48,11 +64,11 @@ _FOOT, _OUT, _DOWN, _MOMENT = 0.01, 0.1, 0.04, 0.006
     until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",),
     source="Newton and Euler in the plane, loads from the balance of moments, integrated to 1e-13")
 def _tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: float = 1.0) -> _Motion:
-    """Position, velocity and spin of a tripod of 1 kg each foot of which bears what keeps it from tilting.
+    """Position, velocity and spin of a tripod of 1 kg each foot of which bears what keeps it from
+    tilting.
 
-    The loads N of three feet at p follow from sum N = m g and the two moments of weight and friction about the
-    centre, at `height`; `share` 0 gives each a third of the weight.
-    """
+    The loads N of three feet at p follow from sum N = m g and the two moments of weight and
+    friction about the centre, at `height`; `share` 0 gives each a third of the weight. """
 
     angles = math.tau / 3 * np.arange(3)
 
@@ -86,7 +102,8 @@ _STOP = _MEET + (_SPEED - _ABOVE * G * _MEET) / (_BELOW * G)
 
 
 @_case(
-    "plank", "a block that is pushed off on a plank draws it along, until both go together and stop on the floor",
+    "plank", "a block that is pushed off on a plank draws it along, until both go together and "
+             "stop on the floor",
     block(), (Surface("floor", _BELOW),),
     wrong={"the floor doesn't feel the block": {"load": 0.0},
            "friction between them 5 % too weak": {"above": 0.95 * _ABOVE}, "the plank is held": {"below": _ABOVE}},
@@ -94,7 +111,8 @@ _STOP = _MEET + (_SPEED - _ABOVE * G * _MEET) / (_BELOW * G)
     source="Coulomb's law and Newton's third: m mu g drives the plank, mu' (m + M) g brakes it",
     under=_plate(_HEAVIER, 0.0, _PLANK), between=_ABOVE)
 def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float = 1.0) -> _Motion:
-    """A block that slides on a plank slows by mu g and draws the plank until both go together, then stop.
+    """A block that slides on a plank slows by mu g and draws the plank until both go together, then
+    stop.
 
     `load` is what of the block's weight the floor bears under the plank.
     """
@@ -116,10 +134,12 @@ _LEAN = math.atan(0.9 * 0.5)
 
 @_case(
     "thousandfold",
-    "a block of 1000 kg on one of 1 kg on a slope whose tangent is 0.9 of their friction: neither must move",
+    "a block of 1000 kg on one of 1 kg on a slope whose tangent is 0.9 of their friction: neither "
+    "must move",
     _plate(1000.0, _LEAN, (0.2, 0.2, 0.2)), (Surface("slope", 0.5, normal=slope(_LEAN)[1]),),
     wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.425}},
-    until=2.0, scales=SPEED_ALONE, contacts=("RR",), source="Coulomb's law: whatever the masses, tan < mu holds both",
+    until=2.0, scales=SPEED_ALONE, contacts=("RR",), source="Coulomb's law: whatever the masses, "
+                                                            "tan < mu holds both",
     under=_plate(1.0, _LEAN, (0.2, 0.2, 0.1)), between=0.5)
 def _stays(t: Array, mu: float = 0.5) -> _Motion:
     """Two blocks on a slope, the lower of which slides where friction is the weaker."""
@@ -143,7 +163,8 @@ _INCLINE, _DOWNHILL = math.atan(0.3), 0.8
     contacts=("S", (_DOWNHILL + 1.0) / (G * (0.5 * math.cos(_INCLINE) - math.sin(_INCLINE))), "R"),
     source="Coulomb's law against the slip on the belt, integrated by hand")
 def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
-    """A block that slides down a belt is slowed by g (mu cos - sin) until it goes up with the belt."""
+    """A block that slides down a belt is slowed by g (mu cos - sin) until it goes up with the
+    belt."""
     a = G * (mu * math.cos(_INCLINE) - math.sin(_INCLINE))
     slid = np.minimum(t, (_DOWNHILL + belt) / a)
     s = _DOWNHILL * slid - a * slid**2 / 2 - belt * (t - slid)
@@ -152,13 +173,15 @@ def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
 
 @_case(
     "dry-joint",
-    "a mass on a spring and a slide with dry friction: each half swing is shorter by 2 F/k, then it sticks",
+    "a mass on a spring and a slide with dry friction: each half swing is shorter by 2 F/k, then "
+    "it sticks",
     sphere(), (), wrong={"friction 5 % too weak": {"dry": 0.95 * 4.0}, "none": {"dry": 0.0}},
     until=1.6, scales=(0.3, 3.0, math.inf), contacts=("S", 4 * math.pi / 10, "R"),
     source="m x'' = -k x -+ F: half circles in the phase plane about -+ F/k",
     spring=100.0, joint=(1.0, 0.0, 0.0), dry=4.0)
 def _swings(t: Array, dry: float = 4.0, stiffness: float = 100.0, start: float = 0.3) -> _Motion:
-    """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, until the spring is too weak."""
+    """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, until the spring is too
+    weak."""
     rate, shift = math.sqrt(stiffness), dry / stiffness
     half = np.floor(t * rate / math.pi)
     last = max(math.ceil((start / shift - 1) / 2), 0) if shift else math.inf
@@ -179,17 +202,20 @@ _KEPT = 1 - _ARM**2 / _MOMENT_OF_EDGE * (1 - math.cos(2 * _ALPHA))
 
 
 @_case(
-    "rocking-block", "a block rocks from edge to edge, and loses the same share of its speed at every blow",
+    "rocking-block", "a block rocks from edge to edge, and loses the same share of its speed at "
+                     "every blow",
     _ROCKING, (Surface("floor", 1.0),),
     wrong={"nothing is lost in a blow": {"kept": 1.0}, "inertia of a point": {"moment": _ARM**2}},
     until=0.8, scales=(0.2, 1.0, 1.0), contacts=("T",),
-    source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, momentum about the new edge")
+    source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, momentum about the "
+           "new edge")
 def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _Motion:
-    """A pendulum upside down about the edge it stands on: from rest at an angle to upright and, slower, beyond.
+    """A pendulum upside down about the edge it stands on: from rest at an angle to upright and,
+    slower, beyond.
 
-    With the angle psi of the centre from straight below the edge, psi = pi - alpha + lean, it is sin(psi/2) =
-    k sn(K - p t, k), p^2 = m g arm/moment. Each blow on the other edge leaves `kept` of the angular velocity.
-    """
+    With the angle psi of the centre from straight below the edge, psi = pi - alpha + lean, it is
+    sin(psi/2) = k sn(K - p t, k), p^2 = m g arm/moment. Each blow on the other edge leaves `kept`
+    of the angular velocity. """
     arm, alpha, lean = _ARM, _ALPHA, _LEANS
     p, side = math.sqrt(G * arm / moment), 1.0
     angle, rate, done = np.zeros_like(t), np.zeros_like(t), np.zeros(t.shape, bool)
@@ -218,7 +244,8 @@ def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _M
     "bounce", "a ball that falls on a floor leaves it with 0.7 of its speed, again and again",
     sphere(), (Surface("floor", 0.5, restitution=0.7),),
     wrong={"0.65 of it": {"share": 0.65}, "all of it": {"share": 1.0}},
-    until=2.0, scales=(1.0, 6.0, 10.0), contacts=("N",), source="Newton's law of restitution, parabolas between")
+    until=2.0, scales=(1.0, 6.0, 10.0), contacts=("N",), source="Newton's law of restitution, "
+                                                                "parabolas between")
 def _bounces(t: Array, share: float = 0.7, drop: float = 1.8) -> _Motion:
     """A ball falls and bounces in parabolas: each blow leaves `share` of the speed."""
     speed, begin = math.sqrt(2 * G * drop), math.sqrt(2 * drop / G)
@@ -247,13 +274,14 @@ _ACROSS = _RADIUS**2 / 4 + _THICK**2 / 3
     until=1.2, scales=(2.0, 1.0, 5.0), contacts=("T",),
     source="balances of momentum and angular momentum in axes that go round with the disc")
 def _rolls_round(t: Array, ring: float = 0.5, half: float = _THICK, share: float = 1.0) -> _Motion:
-    """Steady rolling on the rim, round a circle at the rate Omega, the disc's axis at `lean` from the vertical.
+    """Steady rolling on the rim, round a circle at the rate Omega, the disc's axis at `lean` from
+    the vertical.
 
-    The lowest point of the rim is at c = (c_r, c_z) from the centre, outwards and up. With the spin s about the
-    axis it is at rest if the centre goes round at rho = (w_r c_z - w_z c_r)/Omega, w = (s sin, Omega + s cos).
-    Weight and the force -m Omega^2 rho turn the angular momentum: Omega L_r = -c_r m g - c_z m Omega^2 rho. That is
-    linear in s. `ring` is the polar moment divided by m radius^2; with `share` 0 L_r would count for nothing.
-    """
+    The lowest point of the rim is at c = (c_r, c_z) from the centre, outwards and up. With the spin
+    s about the axis it is at rest if the centre goes round at rho = (w_r c_z - w_z c_r)/Omega, w =
+    (s sin, Omega + s cos). Weight and the force -m Omega^2 rho turn the angular momentum: Omega L_r
+    = -c_r m g - c_z m Omega^2 rho. That is linear in s. `ring` is the polar moment divided by m
+    radius^2; with `share` 0 L_r would count for nothing. """
     radius, turning, sin, cos = _RADIUS, 0.5, math.sin(_TILT), math.cos(_TILT)
     c_r, c_z = radius * cos - half * sin, -radius * sin - half * cos
     across, about = radius**2 / 4 + half**2 / 3, ring * radius**2

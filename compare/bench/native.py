@@ -1,8 +1,7 @@
 """MuJoCo in the league on the study's joints, and with contacts as a person's MJCF file has them.
 
-`mjsim.ContactSettings` holds what the study needs and refuses what can't work. `Native` is for settings of which nobody
-knows yet whether they work (`dualball league --settings`).
-"""
+`mjsim.ContactSettings` holds what the study needs and refuses what can't work. `Native` is for
+settings of which nobody knows yet whether they work (`dualball league --settings`)."""
 
 from __future__ import annotations
 
@@ -50,7 +49,8 @@ class Pair:
 
 @dataclass(frozen=True)
 class Native:
-    """Options of the engine, by their names in `OPTIONS`, and the two contacts, floor (A) and wall (B)."""
+    """Options of the engine, by their names in `OPTIONS`, and the two contacts, floor (A) and wall
+    (B)."""
 
     option: Mapping[str, float]
     A: Pair
@@ -59,7 +59,8 @@ class Native:
     """What the file that they were read from lacks, and what stands for it."""
 
     def tune(self, spec: Any, scene: Scene, timestep: float) -> None:
-        """Give a scene of free bodies these settings: to a wall those of the wall, to all else those of the floor."""
+        """Give a scene of free bodies these settings: to a wall those of the wall, to all else
+        those of the floor."""
         for name, value in {**self.option, "timestep": timestep}.items():
             setattr(spec.option, name, value)
         for surface, pair in pairs(spec, scene):
@@ -68,7 +69,8 @@ class Native:
 
 
 def entry(path: Path) -> Bodies:
-    """MuJoCo with the contact settings and time step of a file, as an engine of the league; errors as of `read`."""
+    """MuJoCo with the contact settings and time step of a file, as an engine of the league; errors
+    as of `read`."""
     settings = read(path)
     made = Bodies(path.stem, settings.note, tune=settings.tune)
     made.TIMESTEPS = (settings.option["timestep"],)
@@ -76,31 +78,37 @@ def entry(path: Path) -> Bodies:
 
 
 def read(path: Path) -> Native:
-    """Settings of a ball's contacts in an MJCF file: its option, and the attributes of pairs or geoms.
+    """Settings of a ball's contacts in an MJCF file: its option, and the attributes of pairs or
+    geoms.
 
-    The ball is the sphere that can move (the one named "ball" if there are more). Its floor is the first thing it can
-    touch that is below it, its wall the first one beside it. Where one is missing, the other stands for both, and the
-    `note` says so.
+    The ball is the sphere that can move (the one named "ball" if there are more). Its floor is the
+    first thing it can touch that is below it, its wall the first one beside it. Where one is
+    missing, the other stands for both, and the `note` says so.
 
     Raises
     ------
     StorageError
         If the file can't be read.
-    InputError
-        If it is no MJCF, lacks a ball or anything for it to pair, or has an option that is out of range.
+    InputError If it is no MJCF, lacks a ball or anything for it to pair, or has an option that is
+        out of range.
     """
     model, _ = load(path)
     moves = model.body_weldid[model.geom_bodyid] > 0
     spheres = np.flatnonzero(moves & (model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)).tolist()
     named = [geom for geom in spheres if model.geom(geom).name == "ball"]
     if not spheres:
-        raise InputError(f"{path}: there is no ball: it needs a geom of type sphere in a body with a joint")
+        raise InputError(
+            f"{path}: there is no ball: it needs a geom of type sphere in a body with a joint"
+        )
     if len(spheres) > 1 and not named:
-        raise InputError(f"{path}: there are {len(spheres)} spheres that move; name the one that counts 'ball'")
+        raise InputError(
+            f"{path}: there are {len(spheres)} spheres that move; name the one that counts 'ball'"
+        )
     floors, walls = _contacts(model, (named or spheres)[0])
     if not floors + walls:
         raise InputError(
-            f"{path}: the ball has no contacts: it needs a <pair> with something, or a geom whose contype and "
+            f"{path}: the ball has no contacts: it needs a <pair> with something, or a geom whose "
+            f"contype and "
             "conaffinity meet its own, and contacts switched on"
         )
     missing, other = ("floor", "wall") if walls else ("wall", "floor")
@@ -108,33 +116,43 @@ def read(path: Path) -> Native:
     option = {name: getattr(model.opt, name) for name in OPTIONS}
     for name, allowed in OPTIONS.items():
         check_number(f"{path}: {name}", option[name], "1", allowed)
-    return Native(option, (floors or walls)[0], (walls or floors)[0], "" if floors and walls else note)
+    return Native(
+        option, (floors or walls)[0], (walls or floors)[0], "" if floors and walls else note
+    )
 
 
 def _contacts(model: Any, ball: int) -> tuple[list[Pair], list[Pair]]:
-    """The contacts that the engine makes of the ball with what is below it and with what is beside it.
+    """The contacts that the engine makes of the ball with what is below it and with what is beside
+    it.
 
-    The ball is given a margin that reaches everything, so that the engine itself says what it can touch and how the
-    parameters of both are combined.
-    """
+    The ball is given a margin that reaches everything, so that the engine itself says what it can
+    touch and how the parameters of both are combined."""
     model.geom_margin[ball] += _FAR
     model.pair_margin[:] += _FAR
     model.opt.o_margin += _FAR
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # which knows of the margins in the file alone
+    model.opt.disableflags |= (
+        mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    )  # which knows of the margins in the file alone
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     pairs: tuple[list[Pair], list[Pair]] = [], []
     for contact in data.contact:
         if ball in contact.geom:
-            given = {name: tuple(getattr(contact, name).tolist()) for name in ("solref", "solreffriction", "solimp")}
+            given = {
+                name: tuple(getattr(contact, name).tolist())
+                for name in ("solref", "solreffriction", "solimp")
+            }
             down = -contact.frame[2] if contact.geom[0] == ball else contact.frame[2]
             # The margin is taken apart to the digits that it had in the sum.
-            pairs[int(down < _DOWN)].append(Pair(**given, margin=round(contact.includemargin - _FAR, 12)))
+            pairs[int(down < _DOWN)].append(
+                Pair(**given, margin=round(contact.includemargin - _FAR, 12))
+            )
     return pairs
 
 
 class PlainOnJoints(Bodies):
-    """The engine `mujoco-plain` for cases that have a `motion`; with the first step the whole of it is simulated."""
+    """The engine `mujoco-plain` for cases that have a `motion`; with the first step the whole of it
+    is simulated."""
 
     def build(self, case: Any, timestep: float) -> None:
         self._task: Task | None = None
@@ -144,7 +162,12 @@ class PlainOnJoints(Bodies):
         (p, x0), t_end = case.motion, timestep * math.ceil(case.times[-1] / timestep - 1e-9)
         settings, self._begin, self._at = PLAIN.at(timestep, p), np.array(case.body.position), 0
         self._task = Task(
-            engine=PLAIN.name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=timestep
+            engine=PLAIN.name,
+            parameters=p,
+            x0=x0,
+            t_end=t_end,
+            settings=settings,
+            sample_interval=timestep,
         )
 
     def step(self, n: int) -> None:
@@ -167,5 +190,6 @@ on_joints = PlainOnJoints(
     "mujoco-plain",
     "contacts soft enough for sliding let a ball that lands sink in and throw it back",
     tune=studied,
-    declared="the ball in the vessel on joints: azimuth, radius, height, spin; elliptic cone, settings of the study",
+    declared="the ball in the vessel on joints: azimuth, radius, height, spin; elliptic cone, "
+    "settings of the study",
 )

@@ -1,17 +1,19 @@
-"""An engine on exact cases, in a process of its own: what breaks, hangs or diverges loses a case, not the run.
+"""An engine on exact cases, in a process of its own: what breaks, hangs or diverges loses a case,
+not the run.
 
 An engine is anything with three functions, a module most simply:
 
 * ``build(case, timestep)`` makes the scene of a `Case` anew, its body at the start;
-* ``step(n)`` takes n steps of that length, setting ``case.force(t, position, velocity)`` before each where
-  ``case.forced``;
-* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and world axes, then
-  those of the one under it, if there is one.
+* ``step(n)`` takes n steps of that length, setting ``case.force(t, position, velocity)`` before
+  each where ``case.forced``;
+* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and
+  world axes, then those of the one under it, if there is one.
 
-``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It is not asked for
-cases that need what version 1 of them had not (`Case.needs`) unless its ``FEATURES`` name that. It may say of itself:
-``NAME``, ``PRECISION`` (``f64`` or ``f32``), ``DECLARED`` (in words, all that isn't a free body in plain geometry under
-the engine's own settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
+``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It
+is not asked for cases that need what version 1 of them had not (`Case.needs`) unless its
+``FEATURES`` name that. It may say of itself: ``NAME``, ``PRECISION`` (``f64`` or ``f32``),
+``DECLARED`` (in words, all that isn't a free body in plain geometry under the engine's own
+settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
 `TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``).
 """
 
@@ -102,7 +104,8 @@ class Result:
 
     @property
     def order(self) -> float:
-        """The power of the step with which the error falls; nan where it is round-off, or where a run failed."""
+        """The power of the step with which the error falls; nan where it is round-off, or where a
+        run failed."""
         errors, floor = np.array(self.errors), FLOORS.get(self.engine.precision, FLOORS["f64"])
         if len(errors) < 2 or not (errors > floor).all():
             return math.nan
@@ -114,12 +117,14 @@ class Result:
         return self.error <= TOLERANCE
 
 
-def run(case: Case, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT) -> Result:
-    """Run an engine on one case: ``engine`` is a module or its name, ``module:object``, or a picklable object.
+def run(
+    case: Case, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
+) -> Result:
+    """Run an engine on one case: ``engine`` is a module or its name, ``module:object``, or a
+    picklable object.
 
-    ``limit`` is the longest time for one step's run, s. Raises `InputError` if the engine can't be used, or for a step
-    that is none.
-    """
+    ``limit`` is the longest time for one step's run, s. Raises `InputError` if the engine can't be
+    used, or for a step that is none."""
     for step in steps or ():
         check_number("step", step, "s", POSITIVE)
     (result,) = run_all([case], engine, steps, limit)
@@ -131,7 +136,8 @@ def run(case: Case, engine: Any, steps: Sequence[float] | None = None, limit: fl
 def run_all(
     cases: Iterable[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
 ) -> Iterator[Result]:
-    """Run an engine on many cases, one after the other in one process, that is begun anew where it hangs or dies."""
+    """Run an engine on many cases, one after the other in one process, that is begun anew where it
+    hangs or dies."""
     with closing(EngineProcess(engine, limit)) as trial:
         for case in cases:
             yield trial.result(case, steps)
@@ -141,15 +147,24 @@ class EngineProcess:
     """A process with an engine in it."""
 
     def __init__(self, engine: Any, limit: float = LIMIT) -> None:
-        self._engine, self._limit = engine.__name__ if hasattr(engine, "__spec__") else engine, limit
+        self._engine, self._limit = (
+            engine.__name__ if hasattr(engine, "__spec__") else engine,
+            limit,
+        )
         self.about = self._start()
 
     def _start(self) -> About:
-        # Not by `multiprocessing`, which runs a person's script a second time unless that is guarded.
+        # Not by `multiprocessing`, which runs a person's script a second time unless that is
+        # guarded.
         self._pipe, far = multiprocessing.Pipe()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import serve_engine; serve_engine({far.fileno()})"],
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)},
+            [
+                sys.executable,
+                "-c",
+                f"from {__name__} import serve_engine; serve_engine({far.fileno()})",
+            ],
+            env=os.environ
+            | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)},
             pass_fds=[far.fileno()],
             stdin=subprocess.PIPE,  # ends when we do
             stdout=subprocess.DEVNULL,  # engines are talkative
@@ -178,12 +193,16 @@ class EngineProcess:
         self._pipe.close()
 
     def result(self, case: Case, steps: Sequence[float] | None = None) -> Result:
-        """The result of the engine on a case, at all steps; shorter ones are not tried where one hangs."""
+        """The result of the engine on a case, at all steps; shorter ones are not tried where one
+        hangs."""
         about, found = self.about, Result(case.name, self.about)
         if about.missing:
             return replace(found, skipped=about.missing)
         if lacking := ", ".join(need for need in case.needs if need not in about.features):
-            return replace(found, skipped=f"{about.name} doesn't say in FEATURES that it can do this: {lacking}")
+            return replace(
+                found,
+                skipped=f"{about.name} doesn't say in FEATURES that it can do this: {lacking}",
+            )
         runs: list[tuple[Array | None, float, str]] = []
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:
@@ -193,7 +212,9 @@ class EngineProcess:
             self._pipe.send((case, step))
             answer = self._answer(self._limit)
             if isinstance(answer, str):  # it hung or died
-                runs += [(None, math.nan, f"{answer} at a step of {1e3 * step:g} ms")] * (len(chosen) - len(runs))
+                runs += [(None, math.nan, f"{answer} at a step of {1e3 * step:g} ms")] * (
+                    len(chosen) - len(runs)
+                )
                 break
             if isinstance(answer, NotImplementedError):
                 return replace(found, skipped=str(answer))
@@ -202,7 +223,9 @@ class EngineProcess:
         found = replace(found, steps=chosen, costs=costs, failure=next(filter(None, failures), ""))
         if found.failure and "known to work" in about.version:
             found = replace(found, failure=f"{found.failure} ({about.version})")
-        found = replace(found, errors=tuple(math.nan if s is None else case.error(s) for s in states))
+        found = replace(
+            found, errors=tuple(math.nan if s is None else case.error(s) for s in states)
+        )
         if (last := states[-1]) is None:
             return found
         gaps, slips = case.touching(last)
@@ -210,12 +233,15 @@ class EngineProcess:
         return replace(
             found,
             creep=float(slips[sticks].mean()) if sticks.any() else math.nan,
-            lost=float((gaps[touches] > LIFTED * min(case.body.size)).mean()) if touches.any() else math.nan,
+            lost=float((gaps[touches] > LIFTED * min(case.body.size)).mean())
+            if touches.any()
+            else math.nan,
         )
 
 
 def _load(given: Any) -> tuple[Any, About]:
-    """An engine by name or as it is, and what it says of itself; `InputError` if it can't be had or lacks something."""
+    """An engine by name or as it is, and what it says of itself; `InputError` if it can't be had or
+    lacks something."""
     engine = given
     if isinstance(given, str):
         module, _, member = given.partition(":")
@@ -228,20 +254,34 @@ def _load(given: Any) -> tuple[Any, About]:
     name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
     lacking = [function for function in FUNCTIONS if not callable(getattr(engine, function, None))]
     if lacking:
-        raise InputError(f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}")
+        raise InputError(
+            f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}"
+        )
     check_choice("PRECISION", precision := getattr(engine, "PRECISION", "f64"), list(FLOORS))
-    declared, note, features = (getattr(engine, what, "") for what in ("DECLARED", "NOTE", "FEATURES"))
-    steps = (check_number("TIMESTEPS", step, "s", POSITIVE) for step in getattr(engine, "TIMESTEPS", TIME_STEPS))
-    return engine, About(name, precision, declared, note, _version(given, engine), tuple(steps), tuple(features))
+    declared, note, features = (
+        getattr(engine, what, "") for what in ("DECLARED", "NOTE", "FEATURES")
+    )
+    steps = (
+        check_number("TIMESTEPS", step, "s", POSITIVE)
+        for step in getattr(engine, "TIMESTEPS", TIME_STEPS)
+    )
+    return engine, About(
+        name, precision, declared, note, _version(given, engine), tuple(steps), tuple(features)
+    )
 
 
 def _version(given: Any, engine: Any) -> str:
-    """The version of an engine's package, and that with which it is known to work if that is another, as text."""
+    """The version of an engine's package, and that with which it is known to work if that is
+    another, as text."""
     _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
-    listed = (adapters.KNOWN.get(own) or adapters.KNOWN.get(own.partition(":")[0], "")) if ours else ""
+    listed = (
+        (adapters.KNOWN.get(own) or adapters.KNOWN.get(own.partition(":")[0], "")) if ours else ""
+    )
     package, _, known = getattr(engine, "KNOWN", listed).partition(" ")
     here = version(package) if package else ""
-    return f"{package} {here}".strip() + (f", known to work: {known}" if known and here != known else "")
+    return f"{package} {here}".strip() + (
+        f", known to work: {known}" if known and here != known else ""
+    )
 
 
 def _one_line(error: Exception) -> str:
@@ -249,7 +289,8 @@ def _one_line(error: Exception) -> str:
 
 
 def serve_engine(handle: int) -> None:
-    """Run in the process of an engine: receive the engine, then cases; send the states that it makes of each.
+    """Run in the process of an engine: receive the engine, then cases; send the states that it
+    makes of each.
 
     It ends with the process that started it.
     """
@@ -275,13 +316,16 @@ def serve_engine(handle: int) -> None:
 
 
 def _attempt(engine: Any, case: Case, step: float) -> Any:
-    """States (n, 9) or None, processor time divided by simulated time, and why there are no states."""
+    """States (n, 9) or None, processor time divided by simulated time, and why there are no
+    states."""
     states, spent, done = np.empty_like(case.exact), 0.0, 0
     try:
         engine.build(case, step)
         for k, t in enumerate(case.times.tolist()):
             near = math.floor(t / step + 1e-6)
-            for at in (near, near + 1) if t / step - near > 1e-6 else (near,):  # between two steps, along a line
+            for at in (
+                (near, near + 1) if t / step - near > 1e-6 else (near,)
+            ):  # between two steps, along a line
                 begin = time.process_time()
                 if at > done:
                     engine.step(at - done)
@@ -291,7 +335,11 @@ def _attempt(engine: Any, case: Case, step: float) -> Any:
                 shapes, count = [part.shape for part in parts], len(case.bodies)
                 if shapes != [(3,)] * 3 * count:
                     of = "" if count == 1 else " of both bodies"
-                    return None, math.nan, f"state() must return position, velocity and spin{of}, not shapes {shapes}"
+                    return (
+                        None,
+                        math.nan,
+                        f"state() must return position, velocity and spin{of}, not shapes {shapes}",
+                    )
                 now = np.concatenate(parts)
                 if not (np.abs(now) < 1e8).all():
                     return None, math.nan, f"diverged by t = {t:g} s at a step of {1e3 * step:g} ms"

@@ -1,4 +1,5 @@
-"""Any MuJoCo model brought to rest: what still moves, lies or sleeps then, what contacts bear, how fast they slip."""
+"""Any MuJoCo model brought to rest: what still moves, lies or sleeps then, what contacts bear, how
+fast they slip."""
 
 from __future__ import annotations
 
@@ -18,19 +19,23 @@ from model import InputError, StorageError
 from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
 
 Control = Callable[[Any, Any], None]
-"""Sets `data.ctrl`, or any force, of a model and its data before a step; it may be given copies of both."""
+"""Sets `data.ctrl`, or any force, of a model and its data before a step; it may be given copies of
+both."""
 Advance = Callable[[Any, Any, int], None]
 """Advances the data of a model by a number of steps, as `mujoco.mj_step` does."""
 STEADY, STILL = 2e-3, 1e-8
-"""A speed that changes by less than this share, or by this (m/s), from one window to the next has settled."""
+"""A speed that changes by less than this share, or by this (m/s), from one window to the next has
+settled."""
 NOISE = 1e-6
 """Speeds that are not told apart, m/s."""
 RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
-"""A body moves on if its speed changes by this share, or this (m/s), between windows, or if it turns by this, rad."""
+"""A body moves on if its speed changes by this share, or this (m/s), between windows, or if it
+turns by this, rad."""
 WINDOW, WINDOW_STEPS = 0.1, 50
 """A window is so long, s, and of so many steps."""
 BENT, SUNK = 0.3, 0.1
-"""A robot has collapsed if a driven joint has turned by this, rad, and it sank by this share of its size."""
+"""A robot has collapsed if a driven joint has turned by this, rad, and it sank by this share of its
+size."""
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
 """What the engine warns of when a model diverges."""
 
@@ -56,13 +61,16 @@ class Rest:
 def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     """A model and its state, at a keyframe by name or number.
 
-    Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it has no such keyframe, or its
-    time step is no positive number.
-    """
+    Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it has no
+    such keyframe, or its time step is no positive number."""
     if not path.is_file():
-        raise StorageError(f"cannot read {path}: {'it is a directory' if path.is_dir() else 'there is no such file'}")
+        raise StorageError(
+            f"cannot read {path}: "
+            f"{'it is a directory' if path.is_dir() else 'there is no such file'}"
+        )
     try:
-        # MuJoCo takes the bytes of a name as UTF-8, also where Python's file system has another encoding.
+        # MuJoCo takes the bytes of a name as UTF-8, also where Python's file system has another
+        # encoding.
         model = mujoco.MjModel.from_xml_path(os.fsencode(path).decode("utf-8", "surrogateescape"))
         check_number("timestep", model.opt.timestep, "s", POSITIVE)
     except InputError as error:
@@ -74,7 +82,9 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
         if keyframe not in names and keyframe not in map(str, range(model.nkey)):
             others = f", but {', '.join(names)}" if names else ""
             raise InputError(f"{path} has no keyframe {keyframe!r}{others}")
-        mujoco.mj_resetDataKeyframe(model, data, names.index(keyframe) if keyframe in names else int(keyframe))
+        mujoco.mj_resetDataKeyframe(
+            model, data, names.index(keyframe) if keyframe in names else int(keyframe)
+        )
     return model, data
 
 
@@ -84,16 +94,25 @@ def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
     Raises `InputError` for a name or a number that the model does not allow.
     """
     names = [model.actuator(k).name or str(k) for k in range(model.nu)]
-    given = [(name, text) if equals else ("", name) for name, equals, text in (v.rpartition("=") for v in values)]
+    given = [
+        (name, text) if equals else ("", name)
+        for name, equals, text in (v.rpartition("=") for v in values)
+    ]
     if not all(name for name, _ in given):
         if any(name for name, _ in given) or len(given) != model.nu:
-            raise InputError(f"--ctrl needs NAME=NUMBER, or as many numbers as there are actuators: {model.nu}")
+            raise InputError(
+                f"--ctrl needs NAME=NUMBER, or as many numbers as there are actuators: {model.nu}"
+            )
         given = list(zip(names, values, strict=True))
     for name, text in given:
         if name not in names:
-            raise InputError(f"--ctrl: there is no actuator {name!r}, but {few(names) or 'none at all'}")
+            raise InputError(
+                f"--ctrl: there is no actuator {name!r}, but {few(names) or 'none at all'}"
+            )
         k = names.index(name)
-        allowed = Range(*model.actuator_ctrlrange[k].tolist()) if model.actuator_ctrllimited[k] else ANY
+        allowed = (
+            Range(*model.actuator_ctrlrange[k].tolist()) if model.actuator_ctrllimited[k] else ANY
+        )
         data.ctrl[k] = parse_number(f"--ctrl: {name}", text, "1", allowed)
 
 
@@ -119,7 +138,13 @@ def awake(model: Any) -> Any:
     return model
 
 
-def settle(model: Any, data: Any, limit: float, control: Control | None = None, law: Advance = mujoco.mj_step) -> Rest:
+def settle(
+    model: Any,
+    data: Any,
+    limit: float,
+    control: Control | None = None,
+    law: Advance = mujoco.mj_step,
+) -> Rest:
     """Advance until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
 
     `law` steps in the place of `mj_step`. Raises `UnsettledError` if the model diverges.
@@ -133,18 +158,28 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
     speed, change = np.zeros((2, model.nbody))
     while data.time < begin + limit and calm < 2:
         start, velocity = data.time, mean_velocities(model, data, step)
-        speed, change = np.hypot.reduce(velocity * scale, 1), np.hypot.reduce((velocity - last) * scale, 1)
+        speed, change = (
+            np.hypot.reduce(velocity * scale, 1),
+            np.hypot.reduce((velocity - last) * scale, 1),
+        )
         turned, last = np.hypot.reduce(velocity[:, 3:], 1) * (data.time - start), velocity
         restless = (change > np.minimum(RESTLESS * speed, JOLT) + NOISE) | (turned > TURNING)
         restless[0] = False  # the world
-        calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0  # a speed may pass through a maximum
-    moving = {int(b): f"{_body_name(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
+        calm = (
+            calm + 1 if (change <= STEADY * speed + STILL).all() else 0
+        )  # a speed may pass through a maximum
+    moving = {
+        int(b): f"{_body_name(model, int(b))} at {speed[b]:.2g} m/s"
+        for b in np.flatnonzero(restless)
+    }
     steady, asleep = bool((change <= STEADY * speed + NOISE).all()), []
     if sleepy is not model:  # what it puts to sleep at once if it may
         state = copy.copy(data)
         step(sleepy, state, 2 * mujoco.mjMINAWAKE)
         trees = np.flatnonzero(state.tree_asleep >= 0)
-        asleep = [_body_name(model, int(np.flatnonzero(model.body_treeid == tree)[0])) for tree in trees]
+        asleep = [
+            _body_name(model, int(np.flatnonzero(model.body_treeid == tree)[0])) for tree in trees
+        ]
     return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(asleep))
 
 
@@ -154,20 +189,27 @@ def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
     mujoco.mj_differentiatePos(model, turned, 1, first.qpos, data.qpos)
     hinges = model.jnt_type[model.dof_jntid] != mujoco.mjtJoint.mjJNT_SLIDE
     bent = np.where(
-        hinges & np.isin(np.arange(model.nv), first.moment_colind[first.actuator_moment != 0]), abs(turned), 0
+        hinges & np.isin(np.arange(model.nv), first.moment_colind[first.actuator_moment != 0]),
+        abs(turned),
+        0,
     )
     for tree in range(model.ntree):
         own, bodies = model.dof_treeid == tree, np.flatnonzero(model.body_treeid == tree)
         root, joint = bodies[0], model.joint(model.dof_jntid[(bent * own).argmax()])
         size = np.hypot.reduce(first.xipos[bodies] - first.subtree_com[root], 1).max()
-        sunk = (data.subtree_com[root] - first.subtree_com[root]) @ gravity / (np.hypot.reduce(gravity) or 1)
+        sunk = (
+            (data.subtree_com[root] - first.subtree_com[root])
+            @ gravity
+            / (np.hypot.reduce(gravity) or 1)
+        )
         if bent[own].max() > BENT and sunk > SUNK * size:
             by = f"joint {joint.name or joint.id!r} by {bent[own].max():.2g} rad"
             yield f"{_body_name(model, root)} by {sunk:.2g} m, its {by}"
 
 
 def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array:
-    """Advance by a window; the mean velocities of bodies in it, (nbody, 6): of centres, m/s, and turning, rad/s.
+    """Advance by a window; the mean velocities of bodies in it, (nbody, 6): of centres, m/s, and
+    turning, rad/s.
 
     Raises `UnsettledError` if the model diverges.
     """
@@ -177,18 +219,23 @@ def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) 
     step(model, data, steps)
     if bad := [each for each in (data.warning[kind] for kind in BAD) if each.number]:
         body = _body_name(model, model.dof_bodyid[min(bad[0].lastinfo, model.nv - 1)])
-        raise UnsettledError(f"the model diverges before {begin + steps * model.opt.timestep:.3g} s, {body} first")
+        raise UnsettledError(
+            f"the model diverges before {begin + steps * model.opt.timestep:.3g} s, {body} first"
+        )
     mujoco.mj_forward(model, data)
     turn = data.xmat.reshape(-1, 3, 3) @ axes.transpose(0, 2, 1)
     axis = np.column_stack([turn[:, i, j] - turn[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]) / 2
     sine = np.hypot.reduce(axis, 1, keepdims=True).clip(1e-30)
     angle = np.arctan2(sine, (np.trace(turn, axis1=1, axis2=2)[:, None] - 1) / 2)
-    mean: Array = np.hstack([data.xipos - place, axis * angle / sine]) / (steps * model.opt.timestep)
+    mean: Array = np.hstack([data.xipos - place, axis * angle / sine]) / (
+        steps * model.opt.timestep
+    )
     return mean
 
 
 def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
-    """Advance to the moment of a window at which most pairs of geoms bear a load: what rattles comes and goes."""
+    """Advance to the moment of a window at which most pairs of geoms bear a load: what rattles
+    comes and goes."""
     most = 0
     for _ in range(WINDOW_STEPS):
         step(model, data, 1)
@@ -200,25 +247,40 @@ def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
 
 
 def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
-    """What each pair of geoms bears, summed over its contacts: load, N, depth, m, number, and friction (3), N."""
+    """What each pair of geoms bears, summed over its contacts: load, N, depth, m, number, and
+    friction (3), N."""
     found: dict[tuple[int, int], Array] = {}
     force = np.zeros(6)
-    for k, (geoms, depth) in enumerate(zip(data.contact.geom.tolist(), -data.contact.dist, strict=True)):
+    for k, (geoms, depth) in enumerate(
+        zip(data.contact.geom.tolist(), -data.contact.dist, strict=True)
+    ):
         mujoco.mj_contactForce(model, data, k, force)
         if force[0] > 0:
             friction = force[1:3] @ data.contact.frame[k, 3:].reshape(2, 3)
-            found[tuple(geoms)] = found.get(tuple(geoms), 0) + np.array([force[0], depth, 1, *friction])
+            found[tuple(geoms)] = found.get(tuple(geoms), 0) + np.array(
+                [force[0], depth, 1, *friction]
+            )
     return found
 
 
-def measured_slip(model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float) -> dict[str, Array]:
-    """How deep each contact is, and how fast its two bodies slip past each other and turn, in the mean of a window."""
+def measured_slip(
+    model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float
+) -> dict[str, Array]:
+    """How deep each contact is, and how fast its two bodies slip past each other and turn, in the
+    mean of a window."""
     found = data.contact
-    depth, drift, frames = -found.dist[number], found.surfacevel[number, :2], found.frame[number].reshape(-1, 3, 3)
+    depth, drift, frames = (
+        -found.dist[number],
+        found.surfacevel[number, :2],
+        found.frame[number].reshape(-1, 3, 3),
+    )
     bodies = model.geom_bodyid[c.geoms]
     lever = found.pos[number][:, None] - data.xipos[bodies]
     velocity = mean_velocities(model, data, step, time)[bodies]
-    (first, second), turning = np.moveaxis(velocity, 1, 0)[..., :3], np.diff(velocity[..., 3:], axis=1)[:, 0]
+    (first, second), turning = (
+        np.moveaxis(velocity, 1, 0)[..., :3],
+        np.diff(velocity[..., 3:], axis=1)[:, 0],
+    )
     arms = np.cross(velocity[..., 3:], lever)
     slip = np.einsum("nij,nj->ni", frames[:, 1:], second + arms[:, 1] - first - arms[:, 0]) + drift
     return {
@@ -229,7 +291,8 @@ def measured_slip(model: Any, data: Any, c: Contacts, number: Array, step: Advan
 
 
 def radii(model: Any) -> Array:
-    """The radius of each body, m, which is that of its largest geom; infinite where none has a size."""
+    """The radius of each body, m, which is that of its largest geom; infinite where none has a
+    size."""
     radius = np.zeros(model.nbody)
     np.maximum.at(radius, model.geom_bodyid, model.geom_rbound)
     return np.where(radius > 0, radius, np.inf)

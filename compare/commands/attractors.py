@@ -40,22 +40,44 @@ def run(args: argparse.Namespace) -> int:
 
     rows = []
     for p in grid(options.parameters(args), axes):
-        own = {} if args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p) else {"run": simulate}
+        own = (
+            {}
+            if args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p)
+            else {"run": simulate}
+        )
         attractors = analytic.attractors(p, starts, seed=args.seed, lasting=args.time, **own)
         orbits = [each.fate.orbit for each in attractors if each.fate.orbit]
-        branches = [orbit_branch.follow(orbit, name, *ends) for orbit in orbits for name, ends in ranges.items()]
+        branches = [
+            orbit_branch.follow(orbit, name, *ends)
+            for orbit in orbits
+            for name, ends in ranges.items()
+        ]
         row: dict[str, Any] = {axis.name: getattr(p, axis.name) for axis in axes}
-        row |= {"attractors": list(map(attractor_data, attractors)), "branches": list(map(branch_data, branches))}
+        row |= {
+            "attractors": list(map(attractor_data, attractors)),
+            "branches": list(map(branch_data, branches)),
+        }
         rows.append(row)
     data = plain({"engine": args.engine.name, "seed": args.seed, "sets": rows})
     table = _table(data)
     if args.page:
-        write_text(args.page, _page(args.page.stem.capitalize(), args.words, options.parameters(args), data, table))
+        write_text(
+            args.page,
+            _page(args.page.stem.capitalize(), args.words, options.parameters(args), data, table),
+        )
     title, lines = f"What balls come to ({args.engine.name})", []
     for branch in itertools.chain.from_iterable(each["branches"] for each in data["sets"]):
-        name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
-        lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
-        lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
+        name, values = (
+            branch["parameter"],
+            [orbit[branch["parameter"]] for orbit in branch["orbits"]],
+        )
+        lines.append(
+            f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:"
+        )
+        lines += [
+            f"  {place['kind']} at {place['value']:.7g} {place['reason']}"
+            for place in branch["places"]
+        ]
     options.show(data, args.json, pages.table(title, table, caption="\n".join(lines)))
     return 0
 
@@ -63,7 +85,11 @@ def run(args: argparse.Namespace) -> int:
 def attractor_data(of: Attractor) -> dict[str, Any]:
     """An attractor as JSON-able data, SI."""
     fate, run, orbit = of.fate, of.run, of.fate.orbit
-    states = {"mean": orbit.mean if orbit else run.x.mean(axis=0), "low": run.x.min(axis=0), "high": run.x.max(axis=0)}
+    states = {
+        "mean": orbit.mean if orbit else run.x.mean(axis=0),
+        "low": run.x.min(axis=0),
+        "high": run.x.max(axis=0),
+    }
     # Those of a period, or those of the last window in the order in which they first come up.
     cases = orbit.cases if orbit else dict.fromkeys(fate.last.cases)
     return {
@@ -84,7 +110,8 @@ def attractor_data(of: Attractor) -> dict[str, Any]:
 
 
 def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
-    """A branch of orbits as JSON-able data, SI; each bifurcation with the orbit there or nearest to it."""
+    """A branch of orbits as JSON-able data, SI; each bifurcation with the orbit there or nearest to
+    it."""
 
     def orbit_data(orbit: Orbit) -> dict[str, Any]:
         return {
@@ -97,25 +124,44 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
             "x": orbit.loop.x,
         }
 
-    places = [vars(place) | {"kind": place.kind.value, "orbit": orbit_data(place.orbit)} for place in branch.places]
-    return {"parameter": branch.name, "places": places, "orbits": list(map(orbit_data, branch.orbits))}
+    places = [
+        vars(place) | {"kind": place.kind.value, "orbit": orbit_data(place.orbit)}
+        for place in branch.places
+    ]
+    return {
+        "parameter": branch.name,
+        "places": places,
+        "orbits": list(map(orbit_data, branch.orbits)),
+    }
 
 
 def _table(data: dict[str, Any]) -> pages.Rows:
     """A table with a row for each attractor of each set."""
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
-    head = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
+    head = (
+        "motion",
+        "cases",
+        "starts (95 %)",
+        "period (s)",
+        "ω_c (rad/s)",
+        "y max (mm)",
+        "|multiplier|",
+        "theory",
+    )
     rows = [[*varied, *head]]
     for each in data["sets"]:
         for row in each["attractors"]:
             low, high = row["share_95"]
-            exponent = f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] is not None else "none"
+            exponent = (
+                f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] is not None else "none"
+            )
             cells = [
                 row["kind"],
                 " ".join(row["cases"]),
                 f"{row['count']}/{row['starts']} ({low:.2f}–{high:.2f})",
                 f"{row['period']:.6g}" if row["period"] else "-",
-                f"{row['mean']['omega_c']:.6g} ({row['low']['omega_c']:.5g}–{row['high']['omega_c']:.5g})",
+                f"{row['mean']['omega_c']:.6g} "
+                f"({row['low']['omega_c']:.5g}–{row['high']['omega_c']:.5g})",
                 f"{1e3 * row['high']['y']:.4g}",
                 f"{_largest(row):.4g}" if row["multipliers"] else "-",
                 row["theory"] or row["failure"] or exponent,
@@ -124,11 +170,16 @@ def _table(data: dict[str, Any]) -> pages.Rows:
     return rows
 
 
-def _page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any], table: pages.Rows) -> str:
-    """The table in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
+def _page(
+    title: str, words: Sequence[str], p: Parameters, data: dict[str, Any], table: pages.Rows
+) -> str:
+    """The table in Markdown, with the parameters, the command that writes it and the orbits of each
+    branch."""
     symbols = {f.name: f.metadata["symbol"] for f in p.quantities()}
     units = {f.name: pages.readable(f.metadata["unit"]) for f in p.quantities()}
-    given = ", ".join(f"{symbols[name]} = {getattr(p, name):.5g} {unit}".rstrip() for name, unit in units.items())
+    given = ", ".join(
+        f"{symbols[name]} = {getattr(p, name):.5g} {unit}".rstrip() for name, unit in units.items()
+    )
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
     lines += ["```sh", shlex.join(words), "```", "", pages.markdown(table)]
@@ -136,11 +187,33 @@ def _page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any],
         name = branch["parameter"]
         symbol = symbols[name]
         lines += ["", f"## Followed in {symbol}", ""]
-        lines += [*(f"* {p['kind']} at {symbol} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"])]
-        rows = [[symbol, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]]
+        lines += [
+            *(
+                f"* {p['kind']} at {symbol} = {p['value']:.6g} {p['reason']}".rstrip()
+                for p in branch["places"]
+            )
+        ]
+        rows = [
+            [
+                symbol,
+                "period (s)",
+                "mean ω_c (rad/s)",
+                "height (mm)",
+                "largest |multiplier|",
+                "stable",
+            ]
+        ]
         for orbit in branch["orbits"]:
-            numbers = orbit[name], orbit["period"], orbit["omega_c"], 1e3 * orbit["height"], _largest(orbit)
-            rows.append([*(f"{number:.7g}" for number in numbers), "yes" if orbit["stable"] else "no"])
+            numbers = (
+                orbit[name],
+                orbit["period"],
+                orbit["omega_c"],
+                1e3 * orbit["height"],
+                _largest(orbit),
+            )
+            rows.append(
+                [*(f"{number:.7g}" for number in numbers), "yes" if orbit["stable"] else "no"]
+            )
         lines += ["", pages.markdown(rows)]
     return "\n".join(lines) + "\n"
 
@@ -161,7 +234,9 @@ def run_basins(args: argparse.Namespace) -> int:
     with running.campaign(args, "basins") as campaign:
         mapped = basins(campaign, p, start._asdict(), (across, up), args.mujoco, args.timestep)
     if args.map and args.map.suffix.lower() in drawing.SUFFIXES:
-        from compare.subjects.attractors import figures  # here, because drawing takes a second to load
+        from compare.subjects.attractors import (
+            figures,
+        )  # here, because drawing takes a second to load
 
         drawing.save(figures.draw_basins(mapped), args.map)
     elif args.map:
@@ -171,7 +246,10 @@ def run_basins(args: argparse.Namespace) -> int:
     said = []
     for fate, (hits, of) in shares.items():
         low, high = interval(hits, of)
-        said.append(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
+        said.append(
+            f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to "
+            f"{100 * high:.1f} %)"
+        )
     where = f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
     data = {"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}
     options.show(data, args.json, *said, *([where] if args.mujoco else []))

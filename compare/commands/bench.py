@@ -1,4 +1,5 @@
-"""Contacts and engines: ``forecast`` of any MuJoCo model, ``league``, also with own settings, the exact ``cases``."""
+"""Contacts and engines: ``forecast`` of any MuJoCo model, ``league``, also with own settings, the
+exact ``cases``."""
 
 from __future__ import annotations
 
@@ -26,13 +27,22 @@ LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
 
 def run_league(args: argparse.Namespace) -> int:
     """Run engines on the exact cases, show the table, write JSON and page."""
-    from compare.bench import league, native  # here and below, because a list of the cases waits for no engine
+    from compare.bench import (
+        league,
+        native,
+    )  # here and below, because a list of the cases waits for no engine
     from compare.kit import progress
     from compare.kit.pictures import embedded, svg
 
-    usual = [name for name in league.ENTRIES if not args.settings or re.match(r"mujoco(-plain|-defaults)?$", name)]
+    usual = [
+        name
+        for name in league.ENTRIES
+        if not args.settings or re.match(r"mujoco(-plain|-defaults)?$", name)
+    ]
     chosen: dict[str, Any] = {name: league.ENTRIES.get(name, name) for name in args.engine or usual}
-    modules = {name for name in chosen if re.search(r"\w[.:]\w", name) or Path(f"{name}.py").exists()}
+    modules = {
+        name for name in chosen if re.search(r"\w[.:]\w", name) or Path(f"{name}.py").exists()
+    }
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
     if args.settings:
         chosen = {args.settings.stem: native.entry(args.settings)} | chosen
@@ -41,14 +51,22 @@ def run_league(args: argparse.Namespace) -> int:
     with progress.reporter(quiet=args.json or args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
     if all(result.skipped for results in found.values() for result in results):
-        raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")
+        raise InputError(
+            f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}"
+        )
     data = league.to_mapping(found)
     write_text(args.output / LEAGUE_JSON, json.dumps(data, indent=1))
-    summary, rows, columns = league.summary(found), league.rows(found), enumerate(league.ranked(found).values(), 1)
+    summary, rows, columns = (
+        league.summary(found),
+        league.rows(found),
+        enumerate(league.ranked(found).values(), 1),
+    )
     shown = {
         "summary": summary,
         "rows": rows,
-        "failed": {(r.case, k) for k, results in columns for r in results if not (r.skipped or r.passed)},
+        "failed": {
+            (r.case, k) for k, results in columns for r in results if not (r.skipped or r.passed)
+        },
         "about": league.declarations(found),
         "notes": list(league.notes(found)),
         "caption": league.CAPTION,
@@ -59,7 +77,9 @@ def run_league(args: argparse.Namespace) -> int:
     write_text(args.output / LEAGUE_PAGE, pages.render("compare.bench", "league.html", **shown))
     for what, why in league.notes(found):
         if what.endswith("all cases"):
-            print(f"dualball: {what.removesuffix(', all cases')} is left out: {why}", file=sys.stderr)
+            print(
+                f"dualball: {what.removesuffix(', all cases')} is left out: {why}", file=sys.stderr
+            )
     head = [name.replace("-", "- ") for name in rows[0]]  # which may be broken there
     tables = {"League": summary, "Errors by case": [head, *rows[1:]]}
     drawn = (pages.table(title, own, no_wrap=True, padding=0) for title, own in tables.items())
@@ -78,7 +98,9 @@ def run_forecast(args: argparse.Namespace) -> int:
 
     good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
     heard = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)  # it would write a log here; what it warns of is in the table
+    mujoco.set_mju_user_warning(
+        lambda _: None
+    )  # it would write a log here; what it warns of is in the table
     try:
         model, data = settled.load(args.file, args.keyframe)
         settled.set_controls(model, data, args.ctrl)
@@ -111,8 +133,12 @@ def run_forecast(args: argparse.Namespace) -> int:
 
 def run_cases(args: argparse.Namespace) -> int:
     """List the exact cases, show one, or write all."""
-    if not (args.name or args.json or args.output):  # as a file has them, since the cases are simulated
-        known = json.loads((resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8"))
+    if not (
+        args.name or args.json or args.output
+    ):  # as a file has them, since the cases are simulated
+        known = json.loads(
+            (resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8")
+        )
         options.show(None, False, _table(known["version"], known["cases"]))
         return 0
     if args.name and args.output:
@@ -134,16 +160,25 @@ def run_cases(args: argparse.Namespace) -> int:
             "case": chosen.name,
             "about": chosen.about,
             "body": _fields(chosen.body),
-            "under it": _fields(chosen.under) + f", between them {chosen.between:g}" if chosen.under else "",
+            "under it": _fields(chosen.under) + f", between them {chosen.between:g}"
+            if chosen.under
+            else "",
             "surfaces": "\n".join(map(_fields, chosen.surfaces)),
-            "joint": f"along {_numbers(chosen.joint)}, dry friction {chosen.dry:g} N" if chosen.joint else "",
-            "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull {_numbers(chosen.pull)} N, growth "
+            "joint": f"along {_numbers(chosen.joint)}, dry friction {chosen.dry:g} N"
+            if chosen.joint
+            else "",
+            "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull "
+            f"{_numbers(chosen.pull)} N, growth "
             f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s, "
             f"spring {chosen.spring:g} N/m",
-            "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); inf: not compared",
+            "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); "
+            f"inf: not compared",
             "source": f"{chosen.source}; error below {chosen.bound:g}",
-            "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),
-            "ends at": f"t = {chosen.times[-1]:g} s: position {_numbers(chosen.exact[-1, :3])} m, velocity "
+            "notices": "; ".join(
+                f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()
+            ),
+            "ends at": f"t = {chosen.times[-1]:g} s: position {_numbers(chosen.exact[-1, :3])} m, "
+            f"velocity "
             f"{_numbers(chosen.exact[-1, 3:6])} m/s, spin {_numbers(chosen.exact[-1, 6:9])} rad/s",
             "more": "all states, JSON, HDF5 and MJCF: dualball cases -o DIR",
         }
@@ -162,8 +197,14 @@ def _table(version: int, rows: list[list[str]]) -> Any:
 
 def _fields(item: Any) -> str:
     """The fields of a dataclass in a line, SI units."""
-    values = ((field.name, value) for field in dataclasses.fields(item) if (value := getattr(item, field.name)))
-    return ", ".join(f"{name} {value if isinstance(value, str) else _numbers(value)}" for name, value in values)
+    values = (
+        (field.name, value)
+        for field in dataclasses.fields(item)
+        if (value := getattr(item, field.name))
+    )
+    return ", ".join(
+        f"{name} {value if isinstance(value, str) else _numbers(value)}" for name, value in values
+    )
 
 
 def _numbers(values: Any) -> str:

@@ -1,8 +1,7 @@
 """The program ``dualball``: one command line for everything. Commands are declared in `parsers`.
 
-Exit codes: 0 done and as expected, 1 a verdict failed, a run broke down or a design doesn't reach its fastest flow,
-2 a mistake in what was asked, 130 interrupted by Ctrl-C, 143 by SIGTERM.
-"""
+Exit codes: 0 done and as expected, 1 a verdict failed, a run broke down or a design doesn't reach
+its fastest flow, 2 a mistake in what was asked, 130 interrupted by Ctrl-C, 143 by SIGTERM."""
 
 from __future__ import annotations
 
@@ -33,9 +32,12 @@ def program() -> NoReturn:
     codecs.register_error("spelled", pages.spell_out)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="spelled")
-    os.environ["MPLBACKEND"] = "agg"  # figures go into files: that of a notebook would be looked for here, too
+    os.environ["MPLBACKEND"] = (
+        "agg"  # figures go into files: that of a notebook would be looked for here, too
+    )
     if "--view" not in sys.argv and (sys.platform == "linux" or "render" not in sys.argv):
-        # MuJoCo would load a window library, by way of a Python of its own; `render` draws by what was chosen.
+        # MuJoCo would load a window library, by way of a Python of its own; `render` draws by what
+        # was chosen.
         os.environ["DUALBALL_GL"] = os.environ.get("MUJOCO_GL", "")
         os.environ["MUJOCO_GL"] = "disable"
     with signals.on_first_signal(signals.end):
@@ -48,7 +50,10 @@ def program() -> NoReturn:
         except OSError as error:  # nobody reads it, as with `| head`, or the disk is full
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             if code == 0 and not isinstance(error, BrokenPipeError):
-                print(f"dualball: error: cannot write to standard output: {error.strerror}", file=sys.stderr)
+                print(
+                    f"dualball: error: cannot write to standard output: {error.strerror}",
+                    file=sys.stderr,
+                )
                 code = 2
         if code >= 128:  # threads may still be at what nobody wants any more
             gc.collect()  # lets go of what workers shared
@@ -57,7 +62,8 @@ def program() -> NoReturn:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the program with the given arguments, the process's own for None; return its exit code."""
+    """Run the program with the given arguments, the process's own for None; return its exit
+    code."""
     args = argparse.Namespace(resumes=False)
     try:
         return _run(sys.argv[1:] if argv is None else argv, args)
@@ -76,7 +82,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt as error:
         there = args.resumes and args.output.is_dir()
-        kept = f"; what is done is kept in {args.output}, the same command goes on from there" if there else ""
+        kept = (
+            f"; what is done is kept in {args.output}, the same command goes on from there"
+            if there
+            else ""
+        )
         print(f"dualball: interrupted{kept}", file=sys.stderr)
         return error.code if isinstance(error, signals.Interrupted) else 130
 
@@ -85,7 +95,9 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     """Carry out a command, whose arguments are added to `args`."""
     # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
     words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in argv]
-    words = [re.sub(r"^--[\w-]+", lambda option: option[0].replace("_", "-"), word) for word in words]
+    words = [
+        re.sub(r"^--[\w-]+", lambda option: option[0].replace("_", "-"), word) for word in words
+    ]
     words = words or ["--help"]
     if words == ["--version"]:
         print(f"dualball {version('dualball')}")
@@ -95,6 +107,9 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     parsers.parser(words).parse_args(words, args)
     module, _, function = args.run.partition(".")
     run = getattr(importlib.import_module(f"compare.commands.{module}"), function)
-    args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
+    args.words = [
+        "dualball",
+        *(word.strip() for word in words),
+    ]  # a page says with what it was written
     with options.no_empty_directories(args), signals.raised():
         return int(run(args))

@@ -15,10 +15,22 @@ from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_n
 
 Kinds = Mapping[str, tuple[str, Range]]
 """Numbers by name: unit and allowed range."""
-_GIVEN: Kinds = {q.name: (q.metadata["unit"], q.metadata["allowed"]) for q in Parameters.quantities()}
-_BOUNDS: Kinds = {name: _GIVEN[name] for name in ("r", "R", "mu", "eta", "j")} | {"rho_b": ("kg m-3", POSITIVE)}
-_FLUID: Kinds = {"nu_f": ("m2 s-1", POSITIVE), "rho_f": ("kg m-3", POSITIVE), "gravity": ("m s-2", POSITIVE)}
-_FLOW: Kinds = {"slowest": ("rad s-1", NOT_NEGATIVE), "fastest": ("rad s-1", POSITIVE), "response": ("s", POSITIVE)}
+_GIVEN: Kinds = {
+    q.name: (q.metadata["unit"], q.metadata["allowed"]) for q in Parameters.quantities()
+}
+_BOUNDS: Kinds = {name: _GIVEN[name] for name in ("r", "R", "mu", "eta", "j")} | {
+    "rho_b": ("kg m-3", POSITIVE)
+}
+_FLUID: Kinds = {
+    "nu_f": ("m2 s-1", POSITIVE),
+    "rho_f": ("kg m-3", POSITIVE),
+    "gravity": ("m s-2", POSITIVE),
+}
+_FLOW: Kinds = {
+    "slowest": ("rad s-1", NOT_NEGATIVE),
+    "fastest": ("rad s-1", POSITIVE),
+    "response": ("s", POSITIVE),
+}
 _TOLERANCES: Kinds = dict.fromkeys(design.INEXACT, ("1", Range(0.0, 1.0, below=True)))
 _USUAL = {"gravity": 9.81, "j": (0.4, 0.4)}
 """What need not be given: the Earth, a uniform ball."""
@@ -40,53 +52,82 @@ def run(args: argparse.Namespace) -> int:
 
 
 def request(asked: Mapping[str, Any]) -> Request:
-    """The request for a meter that a TOML file makes; `InputError` names table, field, value, unit and range."""
+    """The request for a meter that a TOML file makes; `InputError` names table, field, value, unit
+    and range."""
     check_names(asked, ["fluid", "flow", "bounds", "material", "tolerances"], "table")
     fluid = _table(asked, "fluid", _FLUID, ["nu_f", "rho_f"], texts=("drag", "C_D"))
     flow = _table(asked, "flow", _FLOW, ["slowest", "fastest"])
     if flow["slowest"] >= flow["fastest"]:
         raise InputError(
-            f"flow.fastest = {flow['fastest']:g} rad s-1 is out of range: must be > flow.slowest = {flow['slowest']:g}"
+            f"flow.fastest = {flow['fastest']:g} rad s-1 is out of range: must be > flow.slowest = "
+            f"{flow['slowest']:g}"
         )
     if "drag" in fluid:
         parameters.check_choice("fluid.drag", fluid["drag"], drag.LAWS)
     if fluid.get("drag") == drag.QUADRATIC and "response" in flow:
-        raise InputError("flow.response can't be asked for with the quadratic law: it has no time constant")
+        raise InputError(
+            "flow.response can't be asked for with the quadratic law: it has no time constant"
+        )
     common = _table(asked, "bounds", {}, texts=tuple(_BOUNDS))
     materials = asked.get("material", [{"name": "ball"}])
-    if not (isinstance(materials, list) and materials and all(isinstance(each, Mapping) for each in materials)):
+    if not (
+        isinstance(materials, list)
+        and materials
+        and all(isinstance(each, Mapping) for each in materials)
+    ):
         raise InputError("material must be a list of tables, each under [[material]]")
     bounds: dict[str, dict[str, Interval]] = {}
     for each in materials:
         check_names(each, ["name", *_BOUNDS], "property of a material", ["name"])
-        own = {"j": _USUAL["j"]} | {**common, **each}  # a material's own bounds, and else those of all
+        own = {"j": _USUAL["j"]} | {
+            **common,
+            **each,
+        }  # a material's own bounds, and else those of all
         name = own.pop("name")
         if not isinstance(name, str) or name in bounds:
             raise InputError(f"material.name = {name!r} must be a text, and no other material's")
         check_names(own, [*_BOUNDS], f"bound of {name}:", _BOUNDS)
-        bounds[name] = {key: _interval(f"{name}: {key}", own[key], *kind) for key, kind in _BOUNDS.items()}
+        bounds[name] = {
+            key: _interval(f"{name}: {key}", own[key], *kind) for key, kind in _BOUNDS.items()
+        }
     tolerances = _table(asked, "tolerances", _TOLERANCES)
-    return Request(fluid={"gravity": _USUAL["gravity"]} | fluid, **flow, bounds=bounds, tolerances=tolerances)
+    return Request(
+        fluid={"gravity": _USUAL["gravity"]} | fluid, **flow, bounds=bounds, tolerances=tolerances
+    )
 
 
 def _interval(name: str, value: Any, unit: str, allowed: Range) -> Interval:
     """The interval that a number, or a list [lowest, highest], means, checked."""
     ends = value if isinstance(value, list | tuple) else (value, value)
     if len(ends) != 2:
-        raise InputError(f"{name} = {value!r} must be a number in {unit}, or the two between which it may be")
+        raise InputError(
+            f"{name} = {value!r} must be a number in {unit}, or the two between which it may be"
+        )
     low, high = (check_number(name, end, unit, allowed) for end in ends)
     if low > high:
-        raise InputError(f"{name} = [{low:g}, {high:g}] {unit} excludes everything: the lower bound must come first")
+        raise InputError(
+            f"{name} = [{low:g}, {high:g}] {unit} excludes everything: the lower bound must come "
+            f"first"
+        )
     return low, high
 
 
 def _table(
-    asked: Mapping[str, Any], name: str, kinds: Kinds, needed: Sequence[str] = (), texts: Sequence[str] = ()
+    asked: Mapping[str, Any],
+    name: str,
+    kinds: Kinds,
+    needed: Sequence[str] = (),
+    texts: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """A table of the file with its numbers checked; `texts` are entries that are checked elsewhere."""
+    """A table of the file with its numbers checked; `texts` are entries that are checked
+    elsewhere."""
     table = asked.get(name, {})
     if not isinstance(table, Mapping):
         raise InputError(f"{name} = {table!r} must be a table, [{name}]")
     check_names(table, [*kinds, *texts], f"entry of [{name}]", needed)
-    numbers = {key: check_number(f"{name}.{key}", x, *kinds[key]) for key, x in table.items() if key in kinds}
+    numbers = {
+        key: check_number(f"{name}.{key}", x, *kinds[key])
+        for key, x in table.items()
+        if key in kinds
+    }
     return {**table, **numbers}

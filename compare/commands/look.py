@@ -1,4 +1,5 @@
-"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``explore``, what theory says."""
+"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``explore``, what
+theory says."""
 
 from __future__ import annotations
 
@@ -58,7 +59,11 @@ def render(args: argparse.Namespace) -> int:
 
     asked = {name: getattr(args, name) for name in ("at", "time", "width", "speed", "rate")}
     force, slip = args.arrows
-    print(render.write(storage.load(args.file), args.output, **asked, force_arrow=force, slip_arrow=slip))
+    print(
+        render.write(
+            storage.load(args.file), args.output, **asked, force_arrow=force, slip_arrow=slip
+        )
+    )
     return 0
 
 

@@ -28,7 +28,8 @@ Commands = Any
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises `InputError`, one line, where argparse would print the usage and exit, and for an output that is read.
+    """Raises `InputError`, one line, where argparse would print the usage and exit, and for an
+    output that is read.
 
     Options are written in full.
     """
@@ -50,18 +51,30 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see '{self.prog} --help'")
 
     def parse_known_args(self, *given: Any) -> tuple[argparse.Namespace, list[str]]:  # type: ignore[override]
-        """As argparse does; no output may be a file that another argument names, or a link to one."""
+        """As argparse does; no output may be a file that another argument names, or a link to
+        one."""
         found, rest = super().parse_known_args(*given)
         for word in rest:
             if word.startswith("-"):
                 option = word.partition("=")[0]
-                self.error(f"there is no option {option!r}{suggestion(option, self._option_string_actions)}")
+                self.error(
+                    f"there is no option "
+                    f"{option!r}{suggestion(option, self._option_string_actions)}"
+                )
             self.error(f"{word!r} is one argument too many")
         known = self._option_string_actions
-        there = {known[word].option_strings[-1] for each in given[0] if (word := each.partition("=")[0]) in known}
+        there = {
+            known[word].option_strings[-1]
+            for each in given[0]
+            if (word := each.partition("=")[0]) in known
+        }
         for option, other, together in self.rules:
             if option in there and (other in there) != together:
-                self.error(f"{option} is for {other}" if together else f"{option} has no effect beside {other}")
+                self.error(
+                    f"{option} is for {other}"
+                    if together
+                    else f"{option} has no effect beside {other}"
+                )
         for action in (each for each in self._actions if isinstance(each.type, Output)):
             output: Path | None = getattr(found, action.dest, None)
             others = (value for name, value in vars(found).items() if name != action.dest)
@@ -96,8 +109,12 @@ class Number:
             raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number") from error
         if not math.isfinite(number) or number not in self.allowed:
             said = f"{number:g} {readable(self.unit)}".rstrip()
-            limits = ["finite"] * (not math.isfinite(number)) + [str(self.allowed)] * (self.allowed != ANY)
-            raise argparse.ArgumentTypeError(f"{said} is out of range: it must be {' and '.join(limits)}")
+            limits = ["finite"] * (not math.isfinite(number)) + [str(self.allowed)] * (
+                self.allowed != ANY
+            )
+            raise argparse.ArgumentTypeError(
+                f"{said} is out of range: it must be {' and '.join(limits)}"
+            )
         return int(number) if self.allowed.whole else number
 
     @property
@@ -124,8 +141,8 @@ speed = Number(allowed=Range(1e-3, 1e3))
 class Output:
     """A file to be written, for argparse: its name must promise what it holds.
 
-    One that can't be written is refused before a long run, not after; so is one that is also read (`Parser`).
-    """
+    One that can't be written is refused before a long run, not after; so is one that is also read
+    (`Parser`)."""
 
     what: str
     suffixes: tuple[str, ...]
@@ -133,7 +150,9 @@ class Output:
     def __call__(self, text: str) -> Path:
         if Path(text).suffix.lower() not in self.suffixes:
             ends = " or ".join(filter(None, [", ".join(self.suffixes[:-1]), self.suffixes[-1]]))
-            raise argparse.ArgumentTypeError(f"{text!r} would hold {self.what}: its name must end in {ends}")
+            raise argparse.ArgumentTypeError(
+                f"{text!r} would hold {self.what}: its name must end in {ends}"
+            )
         try:
             check_writable(text)
         except InputError as error:
@@ -152,9 +171,12 @@ ENDINGS = {suffix for each in (HDF5, MARKDOWN, PAGE, MAP, FILM) for suffix in ea
 
 
 def results(text: str) -> Path:
-    """The path of a directory to write to, for argparse; a name that ends like that of a file is refused."""
+    """The path of a directory to write to, for argparse; a name that ends like that of a file is
+    refused."""
     if Path(text).suffix.lower() in ENDINGS and not Path(text).is_dir():
-        raise argparse.ArgumentTypeError(f"{text!r} would be a directory, but its name is that of a file")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} would be a directory, but its name is that of a file"
+        )
     return Path(text)
 
 
@@ -169,7 +191,8 @@ def engine(name: str) -> Any:
 
 
 FOREIGN = "dart, drake, pybullet, rapier, sapien"
-"""Those that others have written, each as NAME and NAME-defaults: tests see to it that none is missing."""
+"""Those that others have written, each as NAME and NAME-defaults: tests see to it that none is
+missing."""
 PREFIX = "parameter_"
 """How the destinations of options begin that are parameters of the ball."""
 
@@ -186,19 +209,30 @@ class Help(argparse.HelpFormatter):
     _get_default_metavar_for_positional = _get_default_metavar_for_optional
 
     def add_argument(self, action: argparse.Action) -> None:
-        """As argparse, but for parameters of the ball, which `dualball parameters` lists for all commands."""
+        """As argparse, but for parameters of the ball, which `dualball parameters` lists for all
+        commands."""
         if not action.dest.startswith(PREFIX):
             super().add_argument(action)
 
     def add_usage(self, usage: str | None, actions: Iterable[argparse.Action], *more: Any) -> None:
-        super().add_usage(usage, [each for each in actions if not each.dest.startswith(PREFIX)], *more)
+        super().add_usage(
+            usage, [each for each in actions if not each.dest.startswith(PREFIX)], *more
+        )
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default, text = action.default, action.help or ""
-        if default is None or default is False or default == [] or default == argparse.SUPPRESS or "default" in text:
+        if (
+            default is None
+            or default is False
+            or default == []
+            or default == argparse.SUPPRESS
+            or "default" in text
+        ):
             return text
         if not isinstance(default, Path):
-            default = f"{default:g}" if isinstance(default, float) else getattr(default, "name", default)
+            default = (
+                f"{default:g}" if isinstance(default, float) else getattr(default, "name", default)
+            )
         return f"{text} (default {default})"
 
 
@@ -211,7 +245,8 @@ def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
 
 @contextmanager
 def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
-    """A context after which empty directories that a command made for its output are removed if it failed."""
+    """A context after which empty directories that a command made for its output are removed if it
+    failed."""
     output: Path | None = getattr(args, "output", None)
     new = [each for each in (output, *output.parents) if not each.exists()] if output else []
     try:
@@ -225,7 +260,8 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
 
 
 def terminal(**look: Any) -> Console:
-    """A console of rich that is wide enough for any table off a terminal, and lets a broken pipe be an error."""
+    """A console of rich that is wide enough for any table off a terminal, and lets a broken pipe be
+    an error."""
     from rich.console import Console  # here, because help needs none
 
     class Terminal(Console):
@@ -238,7 +274,8 @@ def terminal(**look: Any) -> Console:
 
 
 def show(data: Any, as_json: bool, *shown: Any) -> None:
-    """Print data as JSON, numbers that are not finite as null; or what is shown of it, tables and lines."""
+    """Print data as JSON, numbers that are not finite as null; or what is shown of it, tables and
+    lines."""
     if as_json:
         from compare.kit.statistics import plain  # here, because help needs no arrays
 
@@ -256,20 +293,29 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
 def add_own_set(parser: Parser) -> None:
     """Options for a parameter set: one of the study by its name, or a file of one's own."""
     own = parser.add_mutually_exclusive_group()
-    own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
+    own.add_argument(
+        "--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}"
+    )
     own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
 
 
-def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
-    """An option for ranges or lists of values (`compare.kit.sweep.Axis`), to be given once or more often."""
-    parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
+def add_axes(
+    parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any
+) -> None:
+    """An option for ranges or lists of values (`compare.kit.sweep.Axis`), to be given once or more
+    often."""
+    parser.add_argument(
+        option, action="append", metavar=form, help=meaning, **{"default": [], **more}
+    )
 
 
 def add_directory(parser: Parser, directory: str, *names: str) -> None:
     """Options of all commands that fill a directory: its name, and whether to show progress."""
     where = "directory of the results; what it holds already is not computed again"
     names = names or ("-o", "--output")
-    parser.add_argument(*names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where)
+    parser.add_argument(
+        *names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -282,7 +328,9 @@ def add_engine(parser: Parser, default: str = "mujoco") -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
     add_engine_name(group, default, f"analytic is event; default {default}")
-    group.add_argument("--timestep", type=seconds, help="time step (default: the engine's; event has none)")
+    group.add_argument(
+        "--timestep", type=seconds, help="time step (default: the engine's; event has none)"
+    )
     group.add_argument("--rtol", type=number, help="relative tolerance of event (default 1e-9)")
     restitution = "coefficient of restitution of event and time-stepping (default 0)"
     group.add_argument("--restitution", type=number, help=restitution)
@@ -291,25 +339,31 @@ def add_engine(parser: Parser, default: str = "mujoco") -> None:
 def add_engine_name(parser: argparse._ActionsContainer, default: str | None, usual: str) -> None:
     """The option that chooses an engine; `usual` says what is if none is named."""
     known = (
-        "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as it comes; others: "
-        f"mujoco-coulomb, event, time-stepping, siconos, and NAME or NAME-defaults of {FOREIGN} ({usual})"
+        "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as "
+        "it comes; others: "
+        f"mujoco-coulomb, event, time-stepping, siconos, and NAME or NAME-defaults of {FOREIGN} "
+        f"({usual})"
     )
     parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
 
 
 def add_workers(parser: Parser) -> None:
-    """Options that say where runs are carried out, of commands that go on where they were stopped."""
+    """Options that say where runs are carried out, of commands that go on where they were
+    stopped."""
     parser.set_defaults(resumes=True)
     group = parser.add_argument_group("workers")
     choice = group.add_mutually_exclusive_group()
     add_processes(choice)
-    choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
+    choice.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786"
+    )
     longest = "longest real time a run may take (default: no limit)"
     group.add_argument("--limit", type=seconds, default=math.inf, help=longest)
 
 
 def add_processes(parser: Any) -> None:
-    """The option that says how many processes of this machine take part, for a parser or a group of one."""
+    """The option that says how many processes of this machine take part, for a parser or a group of
+    one."""
     here, all_of_them = "processes of this machine; 0: this one", os.cpu_count() or 1
     parser.add_argument("--workers", type=processes, default=all_of_them, help=here)
 
@@ -331,7 +385,9 @@ def add_start(parser: Parser) -> None:
 
 def add_plot(parser: Parser, what: str) -> None:
     """The option --plot, to draw what is printed."""
-    parser.add_argument("--plot", type=FIGURE, help=f"draw {what}: png, svg or pdf (default: don't)")
+    parser.add_argument(
+        "--plot", type=FIGURE, help=f"draw {what}: png, svg or pdf (default: don't)"
+    )
 
 
 def add_verdicts(parser: Parser) -> None:
@@ -347,29 +403,43 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
     what = "a set, and values that replace its own, as --mu 0.3 --omega-0 25: 'dualball parameters' tells of each"
     group = parser.add_argument_group("parameters", what)
     source = group.add_mutually_exclusive_group()
-    source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
-    source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
+    source.add_argument(
+        "--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}"
+    )
+    source.add_argument(
+        "--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table"
+    )
     for field in Parameters.quantities():
         meta, option = field.metadata, f"--{field.name.replace('_', '-')}"
         text = meta["meaning"] + f", {meta['allowed']}".replace(", any", "")
         parse = Number(meta["unit"], meta["allowed"])
         group.add_argument(option, dest=f"{PREFIX}{field.name}", type=parse, help=text)
-    group.add_argument("--drag", dest=f"{PREFIX}drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}")
+    group.add_argument(
+        "--drag", dest=f"{PREFIX}drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}"
+    )
 
 
 def parameters(args: argparse.Namespace) -> Parameters:
-    """The parameters that the options of `add_parameters` name; `InputError` for one that ``--vary`` replaces."""
+    """The parameters that the options of `add_parameters` name; `InputError` for one that
+    ``--vary`` replaces."""
     for name in (text.partition("=")[0] for text in getattr(args, "vary", ())):
         if getattr(args, f"{PREFIX}{name}", None) is not None:
             raise InputError(f"--{name.replace('_', '-')} has no effect: {name} is varied")
     chosen = Parameters.load(args.parameters) if args.parameters else Parameters.named(args.set)
-    p = chosen.replace(**given_options(args, [field.name for field in dataclasses.fields(Parameters)], PREFIX))
+    p = chosen.replace(
+        **given_options(args, [field.name for field in dataclasses.fields(Parameters)], PREFIX)
+    )
     if max(p.r, p.R) > _LARGE:
-        print(f"dualball: warning: r = {p.r:g} m, R = {p.R:g} m: were millimetres meant?", file=sys.stderr)
+        print(
+            f"dualball: warning: r = {p.r:g} m, R = {p.R:g} m: were millimetres meant?",
+            file=sys.stderr,
+        )
     return p
 
 
-def given_options(args: argparse.Namespace, names: Iterable[str], prefix: str = "") -> dict[str, Any]:
+def given_options(
+    args: argparse.Namespace, names: Iterable[str], prefix: str = ""
+) -> dict[str, Any]:
     """The options of these names that were given, with their values."""
     values = {name: getattr(args, prefix + name) for name in names}
     return {name: value for name, value in values.items() if value is not None}

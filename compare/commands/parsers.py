@@ -1,4 +1,5 @@
-"""All commands: what runs each, what it is for, its options. Nothing here takes long to load, for help waits for it."""
+"""All commands: what runs each, what it is for, its options. Nothing here takes long to load, for
+help waits for it."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ class Command(NamedTuple):
 
     @property
     def about(self) -> tuple[str, str]:
-        """What the command is for, in words that follow its name in help, and what else its own help says."""
+        """What the command is for, in words that follow its name in help, and what else its own
+        help says."""
         text, _, more = cleandoc(self.declare.__doc__ or "").partition("\n\n")
         return text[:1].lower() + text[1:].rstrip("."), more
 
@@ -38,7 +40,8 @@ GROUPS: dict[str, dict[str, Command]] = {}
 
 
 def command(group: str, run: str, example: str) -> Callable[[Callable[[Parser], None]], None]:
-    """A decorator that makes a command of the function that declares its options, and has its name."""
+    """A decorator that makes a command of the function that declares its options, and has its
+    name."""
 
     def register(declare: Callable[[Parser], None]) -> None:
         GROUPS.setdefault(group, {})[declare.__name__] = Command(declare, run, example)
@@ -52,7 +55,14 @@ def validate(parser: Parser) -> None:
     level = parser.add_mutually_exclusive_group()
     for name, takes in (("quick", "a minute or two"), ("full", "an hour or more")):
         takes = f"{takes} (default: in between)"
-        level.add_argument(f"--{name}", dest="level", action="store_const", const=name, default="default", help=takes)
+        level.add_argument(
+            f"--{name}",
+            dest="level",
+            action="store_const",
+            const=name,
+            default="default",
+            help=takes,
+        )
     options.add_own_set(parser)
     options.add_engine_name(parser, None, "only this one is heard; default: the first three")
     parser.add_argument("--list", action="store_true", help="list the claims and stop")
@@ -66,7 +76,9 @@ def validate(parser: Parser) -> None:
 def judge(parser: Parser) -> None:
     """Judge the stored measurements of a validation again and write report.html anew."""
     of = "directory of a validation"
-    parser.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help=of)
+    parser.add_argument(
+        "output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help=of
+    )
     options.add_processes(parser)
     options.add_verdicts(parser)
 
@@ -75,12 +87,21 @@ def judge(parser: Parser) -> None:
 def figures(parser: Parser) -> None:
     """Draw the paper's figures, with measured points where there are results."""
     where = "directory to write to"
-    parser.add_argument("-o", "--output", type=options.results, default=Path("figures"), metavar="DIR", help=where)
+    parser.add_argument(
+        "-o", "--output", type=options.results, default=Path("figures"), metavar="DIR", help=where
+    )
     stored = "directory of a validation (default results, if it is there)"
     parser.add_argument("--results", type=Path, metavar="DIR", help=stored)
     options.add_own_set(parser)
-    parser.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
-    parser.excludes("--results", "--parameters", "--set")  # it shows what was measured, they what theory says of a set
+    parser.add_argument(
+        "--format",
+        action="append",
+        metavar="NAME",
+        help="svg (default), pdf or png; may be repeated",
+    )
+    parser.excludes(
+        "--results", "--parameters", "--set"
+    )  # it shows what was measured, they what theory says of a set
 
 
 @command("the ball", "predict.show_parameters", "--set steel-in-water")
@@ -102,13 +123,19 @@ def simulate(parser: Parser) -> None:
     """One run with any engine, into an HDF5 file, or live in MuJoCo's viewer."""
     options.add_engine(parser)
     options.add_parameters(parser)
-    group = parser.add_argument_group("flow", "omega_0 over time, in rad/s and s; steady if none is given")
+    group = parser.add_argument_group(
+        "flow", "omega_0 over time, in rad/s and s; steady if none is given"
+    )
     choice, number = group.add_mutually_exclusive_group(), options.number
     ramp = "rises or falls evenly within so many seconds, and stays"
-    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
+    choice.add_argument(
+        "--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp
+    )
     held, wave = "levels, each held HOLD s", "a mean with waves on it, frequencies in Hz"
     choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help=held)
-    choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
+    choice.add_argument(
+        "--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave
+    )
     choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
     longest = "longest time between lines of --flow (default: ten times the usual one)"
     group.add_argument("--longest-interval", type=options.seconds, help=longest)
@@ -118,7 +145,9 @@ def simulate(parser: Parser) -> None:
     parser.add_argument("-o", "--output", type=HDF5, help="HDF5 file to write (default: none)")
     live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
     parser.add_argument("--view", action="store_true", help=live)
-    parser.add_argument("--speed", type=options.speed, help="speed of --view (default 1, real time)")
+    parser.add_argument(
+        "--speed", type=options.speed, help="speed of --view (default 1, real time)"
+    )
     options.add_json(parser, "print the description as JSON")
     parser.needs("--longest-interval", "--flow")
     parser.needs("--speed", "--view")
@@ -149,9 +178,16 @@ def sweep(parser: Parser) -> None:
     options.add_parameters(parser)
     options.add_start(parser)
     options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
-    parser.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
-    parser.add_argument("--seed", type=options.seed, default=0, help="seed of the points of --random")
-    ways, meaning = ("held", "up", "down", "both"), "held: a run for each point; else one run, omega_0 in steps"
+    parser.add_argument(
+        "--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead"
+    )
+    parser.add_argument(
+        "--seed", type=options.seed, default=0, help="seed of the points of --random"
+    )
+    ways, meaning = (
+        ("held", "up", "down", "both"),
+        "held: a run for each point; else one run, omega_0 in steps",
+    )
     parser.add_argument("--direction", choices=ways, default="held", help=meaning)
     options.add_engine(parser)
     lasts = "duration of a run that is held, and else of each step"
@@ -160,7 +196,9 @@ def sweep(parser: Parser) -> None:
     means = "store what each run settles to, for collect, and not its samples"
     parser.add_argument("--means-only", action="store_true", help=means)
     options.add_workers(parser)
-    parser.add_argument("--batch", type=options.count, default=64, help="most runs that a process takes at once")
+    parser.add_argument(
+        "--batch", type=options.count, default=64, help="most runs that a process takes at once"
+    )
     options.add_directory(parser, "sweep")
     options.add_json(parser, "print a summary as JSON")
     parser.needs("--seed", "--random")
@@ -171,13 +209,14 @@ def sweep(parser: Parser) -> None:
 def collect(parser: Parser) -> None:
     """Gather the runs of a directory into one file for xarray.
 
-    Of each run the file holds the parameters, the mean over the last quarter and how sure that is, the last case, and
-    why it failed, if it did; no samples. The parameters that vary are its dimensions if the runs make a grid, else it
-    has the dimension run.
-    """
+    Of each run the file holds the parameters, the mean over the last quarter and how sure that is,
+    the last case, and why it failed, if it did; no samples. The parameters that vary are its
+    dimensions if the runs make a grid, else it has the dimension run."""
     of = "directory of a sweep, or any with files of runs in it"
     parser.add_argument("directory", type=Path, metavar="DIR", help=of)
-    parser.add_argument("-o", "--output", type=HDF5, default=Path("sweep.h5"), help="HDF5 file to write")
+    parser.add_argument(
+        "-o", "--output", type=HDF5, default=Path("sweep.h5"), help="HDF5 file to write"
+    )
     options.add_processes(parser)
 
 
@@ -190,7 +229,9 @@ def attractors(parser: Parser) -> None:
     unless = "N random starts, unless one is given by --start"
     parser.add_argument("--random", type=options.count, default=20, help=unless)
     parser.add_argument("--seed", type=options.seed, default=0, help="seed of the random starts")
-    parser.add_argument("--time", type=options.seconds, help="how long to follow a run at most (default 60/c)")
+    parser.add_argument(
+        "--time", type=options.seconds, help="how long to follow a run at most (default 60/c)"
+    )
     options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
     options.add_axes(parser, "--follow", follow, "NAME=FROM:TO")
@@ -200,17 +241,26 @@ def attractors(parser: Parser) -> None:
     parser.excludes("--start", "--random", "--seed")
 
 
-@command("the ball", "attractors.run_basins", "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21")
+@command(
+    "the ball",
+    "attractors.run_basins",
+    "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21",
+)
 def basins(parser: Parser) -> None:
-    """What becomes of the ball from each start of a plane of states; what MuJoCo has run is kept."""
+    """What becomes of the ball from each start of a plane of states; what MuJoCo has run is
+    kept."""
     options.add_parameters(parser)
     options.add_start(parser)
     for name in ("across", "up"):
         text = f"a state variable {name} the plane, and its range"
         parser.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
     points = "every N-th point along both axes by MuJoCo, too; 0: none"
-    parser.add_argument("--mujoco", type=Number(allowed=Range(0, 1e6, whole=True)), default=0, help=points)
-    parser.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
+    parser.add_argument(
+        "--mujoco", type=Number(allowed=Range(0, 1e6, whole=True)), default=0, help=points
+    )
+    parser.add_argument(
+        "--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo"
+    )
     options.add_workers(parser)
     drawn = "write the map: drawn as png, svg or pdf, or its data as json (default: don't)"
     parser.add_argument("-o", "--output", type=MAP, dest="map", help=drawn)
@@ -223,17 +273,22 @@ def basins(parser: Parser) -> None:
 def design(parser: Parser) -> None:
     """The best meter for a fluid and a range of flows, within bounds.
 
-    Best is the one whose operating range reaches farthest beyond the fastest flow, at the worst corner of the
-    tolerances. The exit code is 1 if it ends below that flow: then no meter within the bounds covers the flows.
-    """
+    Best is the one whose operating range reaches farthest beyond the fastest flow, at the worst
+    corner of the tolerances. The exit code is 1 if it ends below that flow: then no meter within
+    the bounds covers the flows."""
     tables = (
-        "TOML, SI units: [fluid] nu_f, rho_f (drag, C_D, gravity); [flow] slowest, fastest, rad/s (response, s); "
-        "[bounds] r, R, rho_b, mu, eta (j), each a number or [lowest, highest], or several [[material]] with a name "
-        "and bounds of their own; [tolerances] of mu, eta, r, R, relative; what is in round brackets may be left out"
+        "TOML, SI units: [fluid] nu_f, rho_f (drag, C_D, gravity); [flow] slowest, fastest, rad/s "
+        "(response, s); "
+        "[bounds] r, R, rho_b, mu, eta (j), each a number or [lowest, highest], or several "
+        "[[material]] with a name "
+        "and bounds of their own; [tolerances] of mu, eta, r, R, relative; what is in round "
+        "brackets may be left out"
     )
     parser.add_argument("file", type=Path, metavar="FILE.toml", help=tables)
     parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write (default: none)")
-    parser.add_argument("--seed", type=options.seed, default=0, help="seed of the random numbers of the search")
+    parser.add_argument(
+        "--seed", type=options.seed, default=0, help="seed of the random numbers of the search"
+    )
     options.add_json(parser, "print JSON instead of tables")
 
 
@@ -241,8 +296,17 @@ def design(parser: Parser) -> None:
 def render(parser: Parser) -> None:
     """A picture or film of a run: the scene, contact forces, slip, case."""
     parser.add_argument("file", type=Path, help="a run")
-    parser.add_argument("-o", "--output", type=FILM, required=True, help="picture.png, film.gif, film.mp4 or page.html")
-    pixels, rates = Number(allowed=Range(160, 1920, whole=True)), Number(allowed=Range(1, 1000, whole=True))
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=FILM,
+        required=True,
+        help="picture.png, film.gif, film.mp4 or page.html",
+    )
+    pixels, rates = (
+        Number(allowed=Range(160, 1920, whole=True)),
+        Number(allowed=Range(1, 1000, whole=True)),
+    )
     at = "time of the run: of a picture (default: the end), where a film or page begins"
     parser.add_argument("--at", type=options.moment, help=at)
     lasts = "duration of a film, at most (default: 6, of a page 60)"
@@ -250,10 +314,14 @@ def render(parser: Parser) -> None:
     speed = "speed of a film or page (default 0.25; 1 is real time)"
     parser.add_argument("--speed", type=options.speed, help=speed)
     parser.add_argument("--rate", type=rates, help="frames a second (default: 20, of a page 60)")
-    parser.add_argument("--width", type=pixels, help="pixels of a picture (default: 960) or film (640)")
+    parser.add_argument(
+        "--width", type=pixels, help="pixels of a picture (default: 960) or film (640)"
+    )
     radii, names = Number("radii", NOT_NEGATIVE), ("FORCE", "SLIP")
     lengths = "lengths of the arrows of a force m g and of the fastest slip (default 3 3)"
-    parser.add_argument("--arrows", nargs=2, type=radii, default=(3.0, 3.0), metavar=names, help=lengths)
+    parser.add_argument(
+        "--arrows", nargs=2, type=radii, default=(3.0, 3.0), metavar=names, help=lengths
+    )
 
 
 @command("the ball", "look.explore", "--set hopping --port 8081")
@@ -269,15 +337,21 @@ def explore(parser: Parser) -> None:
 def forecast(parser: Parser) -> None:
     """What the contacts of a MuJoCo model will do: depth, creep, hovering, largest step."""
     parser.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
-    parser.add_argument("--keyframe", metavar="NAME", help="begin with this keyframe, by name or number")
+    parser.add_argument(
+        "--keyframe", metavar="NAME", help="begin with this keyframe, by name or number"
+    )
     driven = "controls: a number for each actuator, or NAME=NUMBER for some"
     parser.add_argument("--ctrl", nargs="+", default=[], metavar="[NAME=]N", help=driven)
     longest = "longest time to wait until the model has settled; 0 takes the state as it stands"
     parser.add_argument("--settle", type=options.moment, default=10.0, help=longest)
     for name, unit, how in (("creep", "m s-1", "creeps faster"), ("depth", "m", "sinks in deeper")):
         limit = Number(unit, POSITIVE)
-        parser.add_argument(f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured")
-    parser.add_argument("--try", dest="tries", action="store_true", help="follow the advice and measure again")
+        parser.add_argument(
+            f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured"
+        )
+    parser.add_argument(
+        "--try", dest="tries", action="store_true", help="follow the advice and measure again"
+    )
     parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write")
     options.add_json(parser)
 
@@ -326,8 +400,10 @@ MOVED = {
 GONE = {
     "report": "'dualball judge' writes report.html anew, too",
     "search": "it is 'python -m docs.studies.search' in a clone",
-    "view": "'dualball simulate --view' opens the viewer, 'dualball explore' a page with the motion in 3-D",
-    "grade": "'dualball league --settings FILE.xml' puts settings on the exact cases, 'dualball forecast' any model",
+    "view": "'dualball simulate --view' opens the viewer, 'dualball explore' a page with the "
+    "motion in 3-D",
+    "grade": "'dualball league --settings FILE.xml' puts settings on the exact cases, 'dualball "
+    "forecast' any model",
 }
 """Commands of earlier versions, and what to use now."""
 
@@ -348,10 +424,13 @@ def parser(words: Sequence[str]) -> Parser:
     parser = Parser(
         prog="dualball",
         usage="dualball [-h] [--version] COMMAND ...",
-        description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
+        description="A physics engine on trial: the dual-point contact ball, in closed form and in "
+        "MuJoCo.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    commands = parser.add_subparsers(metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS)
+    commands = parser.add_subparsers(
+        metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS
+    )
     if words[0] == "--print-completion":
         _complete(parser, commands, words[1:])
     for old in (f"{words[0]} {word.partition('=')[0]}" for word in words):
@@ -363,20 +442,32 @@ def parser(words: Sequence[str]) -> Parser:
     if words[0] in GONE:
         raise InputError(f"there is no command {words[0]!r} any more: {GONE[words[0]]}")
     if not words[0].startswith("-"):
-        raise InputError(f"there is no command {words[0]!r}{suggestion(words[0], COMMANDS)}; see 'dualball --help'")
+        raise InputError(
+            f"there is no command {words[0]!r}{suggestion(words[0], COMMANDS)}; see 'dualball "
+            f"--help'"
+        )
     if words[0] not in ("-h", "--help", "--version"):
-        raise InputError(f"there is no option {words[0]!r}{suggestion(words[0], ['--help', '--version'])}")
+        raise InputError(
+            f"there is no option {words[0]!r}{suggestion(words[0], ['--help', '--version'])}"
+        )
     listed = []
     for title, group in GROUPS.items():
         listed.append(f"\n{title.capitalize()}:")
         for name, command in group.items():
             commands.add_parser(name)
             listed.append(
-                textwrap.fill(command.about[0], 100, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14)
+                textwrap.fill(
+                    command.about[0],
+                    100,
+                    initial_indent=f"  {name:<12}",
+                    subsequent_indent=" " * 14,
+                )
             )
     parser.add_argument("--version", action="store_true", help="show the version")
     parser.add_argument(
-        "--print-completion", metavar="SHELL", help="print what bash, zsh, fish or tcsh complete words by"
+        "--print-completion",
+        metavar="SHELL",
+        help="print what bash, zsh, fish or tcsh complete words by",
     )
     parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
     return parser
@@ -387,7 +478,9 @@ def _complete(parser: Parser, commands: options.Commands, shell: Sequence[str]) 
     try:
         import shtab  # here, because it is optional
     except ImportError as error:
-        raise InputError("--print-completion needs shtab: pip install 'dualball[completion]'") from error
+        raise InputError(
+            "--print-completion needs shtab: pip install 'dualball[completion]'"
+        ) from error
     if tuple(shell) not in {(each,) for each in shtab.SUPPORTED_SHELLS}:
         raise InputError(f"--print-completion takes one of {', '.join(shtab.SUPPORTED_SHELLS)}")
     for name in COMMANDS:

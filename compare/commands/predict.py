@@ -1,4 +1,5 @@
-"""``dualball predict``: what theory says about one set of parameters; ``parameters``: what a set is."""
+"""``dualball predict``: what theory says about one set of parameters; ``parameters``: what a set
+is."""
 
 from __future__ import annotations
 
@@ -26,21 +27,43 @@ from model.kinematics import UNITS, VARIABLES
 
 
 def show_parameters(args: argparse.Namespace) -> int:
-    """Show every parameter, with its value in the set that was asked for, and the names of all sets."""
+    """Show every parameter, with its value in the set that was asked for, and the names of all
+    sets."""
     p, rows = options.parameters(args), []
     for field in Parameters.quantities():
         meta, value = field.metadata, getattr(p, field.name)
         allowed = str(meta["allowed"]).replace("any", "")
-        row = {"option": f"--{field.name.replace('_', '-')}", "symbol": meta["symbol"], "value": value}
-        rows.append({"name": field.name} | row | {"unit": meta["unit"], "range": allowed, "meaning": meta["meaning"]})
+        row = {
+            "option": f"--{field.name.replace('_', '-')}",
+            "symbol": meta["symbol"],
+            "value": value,
+        }
+        rows.append(
+            {"name": field.name}
+            | row
+            | {"unit": meta["unit"], "range": allowed, "meaning": meta["meaning"]}
+        )
     table = Table("option", "value", "unit", "range", "meaning", box=None)
     for row in rows:
-        table.add_row(row["option"], f"{row['value']:.6g}", readable(row["unit"]), row["range"], row["meaning"])
+        table.add_row(
+            row["option"],
+            f"{row['value']:.6g}",
+            readable(row["unit"]),
+            row["range"],
+            row["meaning"],
+        )
     table.add_row("--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}")
     others = [name for name in Parameters.names() if args.parameters or name != args.set]
     own = f"Values of {args.parameters or args.set}; other sets: {', '.join(others)}."
     toml = "A file of your own for --parameters: TOML, a line NAME = value each, named as in the options (omega_0)."
-    options.show({"parameters": rows, "drag": p.drag, "sets": Parameters.names()}, args.json, table, "", own, toml)
+    options.show(
+        {"parameters": rows, "drag": p.drag, "sets": Parameters.names()},
+        args.json,
+        table,
+        "",
+        own,
+        toml,
+    )
     return 0
 
 
@@ -71,7 +94,9 @@ def described(p: Parameters) -> dict[str, Any]:
         "parameters": p,
         "model_holds": off <= real_fluid.LIMIT if p.nu_f else None,
         "model_error": off,
-        "fluid_torque": {by: real_fluid.rolling(p, by == "boundary layer") for by in ("Stokes", "boundary layer")},
+        "fluid_torque": {
+            by: real_fluid.rolling(p, by == "boundary layer") for by in ("Stokes", "boundary layer")
+        },
         "groups": {"kappa": p.kappa, "Omega_0": p.Omega_0},
         "thresholds": dataclasses.asdict(analytic.thresholds(p)),
         "operating_range": limit.omega_0,
@@ -89,7 +114,9 @@ def reading(p: Parameters) -> str:
     cases = list(dict.fromkeys(solution.case for solution in attractors))
     if not cases:
         return "no stationary motion attracts the ball"
-    if all(math.isclose(s.state.omega_c, p.omega_0, rel_tol=1e-12, abs_tol=1e-300) for s in attractors):
+    if all(
+        math.isclose(s.state.omega_c, p.omega_0, rel_tol=1e-12, abs_tol=1e-300) for s in attractors
+    ):
         return f"the ball goes round with the fluid ({' or '.join(case.name for case in cases)})"
     if len(cases) == 1 and cases[0] not in (Case.SR, Case.NR):
         lag = 1 - attractors[0].state.omega_c / p.omega_0
@@ -98,7 +125,8 @@ def reading(p: Parameters) -> str:
 
 
 def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
-    """What `described` says of p: thresholds, solutions, the reading and what to mind, for the terminal.
+    """What `described` says of p: thresholds, solutions, the reading and what to mind, for the
+    terminal.
 
     Where the model is off for a real fluid that comes first, and the numbers have three digits.
     """
@@ -120,12 +148,18 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
         limits.append(
-            [symbol, "does not exist" if math.isnan(value) else f"{to_digits(value, 12)}{unit}", meter.MEANING[name]]
+            [
+                symbol,
+                "does not exist" if math.isnan(value) else f"{to_digits(value, 12)}{unit}",
+                meter.MEANING[name],
+            ]
         )
 
     solutions = data["solutions"]
     rows = [
-        [label, *(show(s, to_digits) for s in solutions)] for label, show in _ROWS.items() if label != "Re" or p.nu_f
+        [label, *(show(s, to_digits) for s in solutions)]
+        for label, show in _ROWS.items()
+        if label != "Re" or p.nu_f
     ]
     shown = pages.table("Stationary solutions", [["", *(s["case"] for s in solutions)], *rows])
     attracting = {s.case.name for s in analytic.stable_solutions(p)}
@@ -152,17 +186,29 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         )
         inertia = "Left out is the fluid's inertia (added mass, pressure gradient)"
         remarks += [f"{inertia}: it would shift {shifts}; not ω₀₃.", meter.AT_WALLS]
-    outside = [f"{s['Re']:.3g} in {s['case']}" for s in solutions if s["exists"] and s["drag_law_covers_Re"] is False]
+    outside = [
+        f"{s['Re']:.3g} in {s['case']}"
+        for s in solutions
+        if s["exists"] and s["drag_law_covers_Re"] is False
+    ]
     if outside:
         (low, high), (_, most) = REYNOLDS[p.drag], REYNOLDS[SCHILLER_NAUMANN]
         hint = f" (--drag {SCHILLER_NAUMANN}: up to {most:g})" if p.drag != SCHILLER_NAUMANN else ""
         law = f"the law {p.drag!r} is meant for {low:g} to {high:g}{hint}"
         remarks.append(Text(f"Warning: Re = {', '.join(outside)}, but {law}.", "yellow"))
-    return [*first, head, groups, pages.table("Thresholds", limits, justify="left"), shown, *remarks]
+    return [
+        *first,
+        head,
+        groups,
+        pages.table("Thresholds", limits, justify="left"),
+        shown,
+        *remarks,
+    ]
 
 
 def _complex(value: complex, largest: float, shown: Callable[[float, int], str]) -> str:
-    """A complex number and its conjugate; a real part that is round-off of the largest value is 0."""
+    """A complex number and its conjugate; a real part that is round-off of the largest value is
+    0."""
     real = value.real if abs(value.real) > 1e-12 * largest else 0.0
     return shown(real, 4) + (f" ± {shown(abs(value.imag), 4)}i" if value.imag else "")
 

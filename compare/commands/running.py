@@ -30,13 +30,19 @@ def flow(args: argparse.Namespace) -> Flow | None:
     if args.sine:
         mean, *waves = args.sine
         if not waves or len(waves) % 2:
-            raise InputError("--sine needs a mean in rad/s, then each wave's amplitude in rad/s and frequency in Hz")
-        return Flow.sines(mean, zip(waves[::2], waves[1::2], [0.0] * (len(waves) // 2), strict=True))
+            raise InputError(
+                "--sine needs a mean in rad/s, then each wave's amplitude in rad/s and frequency "
+                "in Hz"
+            )
+        return Flow.sines(
+            mean, zip(waves[::2], waves[1::2], [0.0] * (len(waves) // 2), strict=True)
+        )
     return Flow.from_csv(args.flow, args.longest_interval) if args.flow else None
 
 
 def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
-    """Settings of the engine that the options of `add_engine` choose, for a ball; `InputError` for one of others."""
+    """Settings of the engine that the options of `add_engine` choose, for a ball; `InputError` for
+    one of others."""
     chosen: engines.Engine = args.engine
     given = given_options(args, ("timestep", "rtol", "restitution"))
     for name in given:
@@ -47,14 +53,17 @@ def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
 
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
-    """The run of a ball that the options of `add_engine`, `add_start`, `add_samples` and ``--time`` describe."""
+    """The run of a ball that the options of `add_engine`, `add_start`, `add_samples` and ``--time``
+    describe."""
     chosen = settings(args, p)
     step = getattr(chosen, "timestep", None) or 0.0
     check_number("time", args.time or step, "s", Range(step), "to hold a time step it")
     given = {"x0": start(args), "t_end": args.time, "settings": chosen} | more
     if interval := getattr(args, "sample_interval", None):
         within = Range(step, given["t_end"])
-        given["sample_interval"] = check_number("sample_interval", interval, "s", within, "within this run it")
+        given["sample_interval"] = check_number(
+            "sample_interval", interval, "s", within, "within this run it"
+        )
     return Task(engine=args.engine.name, parameters=p, **given)
 
 
@@ -65,10 +74,13 @@ def workers(args: argparse.Namespace) -> Workers:
 
 @contextmanager
 def campaign(args: argparse.Namespace, doing: str, **more: Any) -> Iterator[Campaign]:
-    """A campaign in a directory of ``--output`` by the workers that are named, whose progress is shown."""
+    """A campaign in a directory of ``--output`` by the workers that are named, whose progress is
+    shown."""
     with (
         progress.reporter(args.quiet or args.json, counted=True) as show,
-        Campaign(args.output, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
+        Campaign(
+            args.output, workers(args), limit=args.limit, report=show, doing=doing, **more
+        ) as made,
     ):
         yield made
 

@@ -1,4 +1,5 @@
-"""Ctrl-C, and SIGTERM as clusters send it: both end a command with one line, and what is done is kept."""
+"""Ctrl-C, and SIGTERM as clusters send it: both end a command with one line, and what is done is
+kept."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ _BOTH = (signal.SIGINT, signal.SIGTERM)
 _PATIENCE = 2.0
 """Of what is to stop by itself, s."""
 _WAITS = 200
-"""How often a signal waits for an import, .01 s at a time: a user's own engine may be one that never ends."""
+"""How often a signal waits for an import, .01 s at a time: a user's own engine may be one that
+never ends."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -29,14 +31,18 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def on_first_signal(answer: Callable[[int, FrameType | None], object]) -> Iterator[Callable[[], None]]:
-    """A context in which the first signal calls `answer` with its number and frame; later ones act as they did before.
+def on_first_signal(
+    answer: Callable[[int, FrameType | None], object],
+) -> Iterator[Callable[[], None]]:
+    """A context in which the first signal calls `answer` with its number and frame; later ones act
+    as they did before.
 
-    Yields how to listen again. Signals that are ignored stay so, as in what a shell runs in the background; and all in
-    a thread, which gets none.
-    """
+    Yields how to listen again. Signals that are ignored stay so, as in what a shell runs in the
+    background; and all in a thread, which gets none."""
     here = _BOTH if threading.current_thread() is threading.main_thread() else ()
-    before = {each: handler for each in here if (handler := signal.getsignal(each)) is not signal.SIG_IGN}
+    before = {
+        each: handler for each in here if (handler := signal.getsignal(each)) is not signal.SIG_IGN
+    }
 
     def restore() -> None:
         for each, handler in before.items():
@@ -59,7 +65,8 @@ def on_first_signal(answer: Callable[[int, FrameType | None], object]) -> Iterat
 
 @contextmanager
 def noted() -> Iterator[list[int]]:
-    """A context in which the first signal is only appended to the yielded list; it is sent again after some seconds."""
+    """A context in which the first signal is only appended to the yielded list; it is sent again
+    after some seconds."""
     heard, sent = list[int](), list[threading.Timer]()
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -84,11 +91,12 @@ def _send_later(number: int, seconds: float) -> threading.Timer:
 
 @contextmanager
 def raised() -> Iterator[None]:
-    """A context in which the first signal raises `Interrupted`, also where a library makes another error of it.
+    """A context in which the first signal raises `Interrupted`, also where a library makes another
+    error of it.
 
-    It comes again a little later while something is imported, since half an import would spoil the next ones; and where
-    Python lost what it raised, as when an object ends. At the end of the context it waits no longer.
-    """
+    It comes again a little later while something is imported, since half an import would spoil the
+    next ones; and where Python lost what it raised, as when an object ends. At the end of the
+    context it waits no longer."""
     heard, sent, usual = list[int](), list[threading.Timer](), sys.unraisablehook
 
     def send_again(number: int) -> None:

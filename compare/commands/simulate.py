@@ -1,4 +1,5 @@
-"""``dualball simulate``, ``sweep``, ``collect``: a run, many over ranges of parameters, and one file of all of them."""
+"""``dualball simulate``, ``sweep``, ``collect``: a run, many over ranges of parameters, and one
+file of all of them."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ _TOLD_APART = ("vary", "random", "seed", "direction", "start", "time", "timestep
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate one run, store it as far as it came, and describe it; or let MuJoCo's viewer show it."""
+    """Simulate one run, store it as far as it came, and describe it; or let MuJoCo's viewer show
+    it."""
     p, flow = options.parameters(args), running.flow(args)
     if args.view:
         from compare.view import viewer  # here, because nothing else needs it
@@ -33,7 +35,9 @@ def run(args: argparse.Namespace) -> int:
         settings = running.settings(args, p)
         if not isinstance(settings, ContactSettings):
             raise InputError(f"--view shows MuJoCo, not {args.engine.name}")
-        viewer.view(p, running.start(args), flow or Flow.steady(p.omega_0), settings, args.speed or 1.0)
+        viewer.view(
+            p, running.start(args), flow or Flow.steady(p.omega_0), settings, args.speed or 1.0
+        )
         return 0
     args.time = args.time or DURATION
     task = running.task(args, p, flow=flow)
@@ -48,7 +52,10 @@ def run(args: argparse.Namespace) -> int:
         if failure:
             kept = "nothing is kept without --output"
             if args.output:
-                kept, journal = f"its samples so far are kept in {failed_path(path)}", journal_path(task, path)
+                kept, journal = (
+                    f"its samples so far are kept in {failed_path(path)}",
+                    journal_path(task, path),
+                )
                 if journal.exists():
                     kept += f", and the same command goes on from what {journal} holds"
             print(f"dualball: the simulation {failure}; {kept}", file=sys.stderr)
@@ -67,17 +74,29 @@ def run_sweep(args: argparse.Namespace) -> int:
         flow, lasts = Flow.staircase(omegas, args.time), args.time * len(omegas)
         tasks = [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
     else:
-        sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
+        sets = (
+            sweep.grid(p, axes)
+            if args.random is None
+            else sweep.random(p, axes, args.random, args.seed)
+        )
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
     save = collection.save_means if args.means_only else storage.save_batch
     with running.campaign(args, "sweep", batch=args.batch, save=save) as work:
         asked = (
-            {name: getattr(args, name) for name in _TOLD_APART} | {"engine": args.engine.name} | dataclasses.asdict(p)
+            {name: getattr(args, name) for name in _TOLD_APART}
+            | {"engine": args.engine.name}
+            | dataclasses.asdict(p)
         )
-        if (path := args.output / "sweep.json").exists():  # `collect` would mix another one with this
+        if (
+            path := args.output / "sweep.json"
+        ).exists():  # `collect` would mix another one with this
             with reading_json(path, "sweep") as held:
                 held = asked | held  # one of an earlier version lacks some
-                differ = [f"{name} = {held[name]}, not {value}" for name, value in asked.items() if held[name] != value]
+                differ = [
+                    f"{name} = {held[name]}, not {value}"
+                    for name, value in asked.items()
+                    if held[name] != value
+                ]
             if differ:
                 other = f"{args.output} holds another sweep ({'; '.join(differ)})"
                 raise InputError(f"{other}: choose another directory with --output")
@@ -86,9 +105,13 @@ def run_sweep(args: argparse.Namespace) -> int:
     whole = len(tasks) - len(failures)
     if args.json:
         summary = {"directory": str(args.output), "runs": len(tasks), "whole": whole}
-        options.show(summary | {"failures": [failure.described() for failure in failures]}, args.json)
+        options.show(
+            summary | {"failures": [failure.described() for failure in failures]}, args.json
+        )
     else:
-        print(f"{whole} of {len(tasks)} runs are whole, in {args.output}; gather them with: ", end="")
+        print(
+            f"{whole} of {len(tasks)} runs are whole, in {args.output}; gather them with: ", end=""
+        )
         print(f"dualball collect {args.output}")
         for failure in failures:
             print(f"failed: {failure.task.key}: {failure.reason}", file=sys.stderr)

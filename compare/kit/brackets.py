@@ -19,7 +19,8 @@ Answer = Callable[[Trajectory], bool | None]
 
 @dataclass(frozen=True)
 class Attempt:
-    """How the run of a question is done: `time` times as long, with the time step divided by `refine`."""
+    """How the run of a question is done: `time` times as long, with the time step divided by
+    `refine`."""
 
     time: int = 1
     refine: int = 1
@@ -56,7 +57,9 @@ class Bracket:
     @property
     def place(self) -> Measured:
         """The middle, with the uncertainty of a uniform distribution and the shift."""
-        return Measured((self.low + self.high) / 2, math.hypot(self.width / math.sqrt(12), self.shift))
+        return Measured(
+            (self.low + self.high) / 2, math.hypot(self.width / math.sqrt(12), self.shift)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,28 +88,43 @@ class Reply:
 
 
 def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
-    """Narrow every search down to its width, or as far as runs show it, all of them together, round by round.
+    """Narrow every search down to its width, or as far as runs show it, all of them together, round
+    by round.
 
-    A round asks inside every bracket, and once more, for longer, where the run doesn't show the answer; one that breaks
-    down shows none. The new bracket is from the last yes before the first no to the first no beyond which runs show all
-    answers. An end that was taken for granted, and is still one, is asked in the end; if it was wrong it has no run. An
-    engine beside the one on trial, which looks where that one found something, takes it for granted.
+    A round asks inside every bracket, and once more, for longer, where the run doesn't show the
+    answer; one that breaks down shows none. The new bracket is from the last yes before the first
+    no to the first no beyond which runs show all answers. An end that was taken for granted, and is
+    still one, is asked in the end; if it was wrong it has no run. An engine beside the one on
+    trial, which looks where that one found something, takes it for granted.
 
-    With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
-    uncertain as the bracket before it was wide, see `Bracket.shift`.
-    """
+    With `careful` the ends of the brackets are asked once more with half the time step: one that
+    doesn't hold is as uncertain as the bracket before it was wide, see `Bracket.shift`."""
     failures, sections = dict[Search, str](), lab.effort.sections
     brackets = [search.bracket for search in searches]
     before, todo = list(brackets), list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].width > searches[k].width]:
-        inside = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist()[1:-1] for k in todo}
-        replies = _answers(lab, [(searches[k], value, brackets[k]) for k in todo for value in inside[k]], failures)
+        inside = {
+            k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist()[1:-1]
+            for k in todo
+        }
+        replies = _answers(
+            lab, [(searches[k], value, brackets[k]) for k in todo for value in inside[k]], failures
+        )
         for n, k in enumerate(todo):
             before[k] = brackets[k]
-            brackets[k] = _narrowed(brackets[k], inside[k], replies[n * sections : (n + 1) * sections])
+            brackets[k] = _narrowed(
+                brackets[k], inside[k], replies[n * sections : (n + 1) * sections]
+            )
         todo = [k for k in todo if brackets[k].width < 0.51 * before[k].width]
-    granted = [(k, end) for k, b in enumerate(brackets) for end in (0, 1) if not (b.runs[end] or lab.effort.granted)]
-    replies = _answers(lab, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures)
+    granted = [
+        (k, end)
+        for k, b in enumerate(brackets)
+        for end in (0, 1)
+        if not (b.runs[end] or lab.effort.granted)
+    ]
+    replies = _answers(
+        lab, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures
+    )
     for (k, end), reply in zip(granted, replies, strict=True):
         if reply.answer is (end == 0):
             yes, no = brackets[k].runs
@@ -117,11 +135,17 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
         for k, (low, high) in enumerate(zip(replies[::2], replies[1::2], strict=True)):
             if low.answer is False or high.answer is True or not (low.run and high.run):
                 brackets[k] = replace(brackets[k], shift=before[k].width)
-    return [replace(b, failure=failures.get(search, "")) for search, b in zip(searches, brackets, strict=True)]
+    return [
+        replace(b, failure=failures.get(search, ""))
+        for search, b in zip(searches, brackets, strict=True)
+    ]
 
 
-def _answers(lab: Lab, questions: Sequence[Question], failures: dict[Search, str], how: Attempt = USUAL) -> list[Reply]:
-    """Carry out a run for each question: its answer, those without one run anew for longer; errors into `failures`."""
+def _answers(
+    lab: Lab, questions: Sequence[Question], failures: dict[Search, str], how: Attempt = USUAL
+) -> list[Reply]:
+    """Carry out a run for each question: its answer, those without one run anew for longer; errors
+    into `failures`."""
     tasks, replies = [search.task(value, bracket, how) for search, value, bracket in questions], []
     for (search, *_), task, run in zip(questions, tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
@@ -143,7 +167,9 @@ def _narrowed(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply
     places, said = [bracket.low, *values, bracket.high], [True, *answers, False]
     shown = [bracket.runs[0], *runs, bracket.runs[1]]
     yes = max(n for n in range(said.index(False)) if said[n])
-    undecided = [n for n, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run]
+    undecided = [
+        n for n, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run
+    ]
     no = said.index(False, max(undecided, default=yes))
     by = tuple(reply.task for reply in replies[max(yes - 1, 0) : no])
     all_said = *bracket.said, *zip(values, answers, strict=True)

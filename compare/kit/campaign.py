@@ -1,10 +1,11 @@
-"""Many runs on an executor: each task is carried out once; results do not depend on order or number of workers.
+"""Many runs on an executor: each task is carried out once; results do not depend on order or number
+of workers.
 
-The runs of a batch are one file, ``LABEL-ID.h5``, in which the name of each is `Task.key`, the hash of all that
-determines it. A file appears only when it is whole, so the directory itself is the record of what is done: whatever
-stops a campaign, starting it again does the rest. A run too long for memory has a file of its own, ``LABEL-KEY.h5``,
-and so has one that broke down, ``LABEL-KEY.failed.h5``, with the samples it has and the reason.
-"""
+The runs of a batch are one file, ``LABEL-ID.h5``, in which the name of each is `Task.key`, the hash
+of all that determines it. A file appears only when it is whole, so the directory itself is the
+record of what is done: whatever stops a campaign, starting it again does the rest. A run too long
+for memory has a file of its own, ``LABEL-KEY.h5``, and so has one that broke down,
+``LABEL-KEY.failed.h5``, with the samples it has and the reason."""
 
 from __future__ import annotations
 
@@ -36,15 +37,19 @@ from model.versions import current_versions
 BATCH = 64
 """Most runs that a process takes at once, and stores in one file."""
 HELD = 2**16
-"""Most samples of a batch, some 11 MB, three times that while it is stored; a run with more is written as it comes."""
+"""Most samples of a batch, some 11 MB, three times that while it is stored; a run with more is
+written as it comes."""
 READ = 2**18
-"""Samples of runs read last, or not stored, that are held in memory, some 45 MB: most are looked at soon after."""
+"""Samples of runs read last, or not stored, that are held in memory, some 45 MB: most are looked at
+soon after."""
 SOON_DONE = 10.0
-"""Processor time of a batch, s, that isn't worth a file where runs are removed as soon as they are measured."""
+"""Processor time of a batch, s, that isn't worth a file where runs are removed as soon as they are
+measured."""
 FAILURES = "failures.json"
 Save = Callable[[Mapping[str, Trajectory], Path], None]
 Ended = tuple[str, Path | None, Trajectory | None]
-"""Why a run is not whole, empty if it is; the file of what there is of it, if any; the run, if it has no file."""
+"""Why a run is not whole, empty if it is; the file of what there is of it, if any; the run, if it
+has no file."""
 _BROKEN = ".failed.h5"
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
@@ -63,7 +68,10 @@ class Storing:
 
     def store(self, runs: Mapping[str, Trajectory]) -> Path:
         """Write whole runs, by key, into a file named by all of them."""
-        path = self.directory / f"{self.label}-{hashlib.sha256(' '.join(runs).encode()).hexdigest()[:24]}.h5"
+        path = (
+            self.directory
+            / f"{self.label}-{hashlib.sha256(' '.join(runs).encode()).hexdigest()[:24]}.h5"
+        )
         self.save(runs, path)
         return path
 
@@ -82,7 +90,8 @@ class Failure:
 
 @dataclass
 class Campaign:
-    """A directory of runs, locked against other programs, and the workers that fill it; a context manager.
+    """A directory of runs, locked against other programs, and the workers that fill it; a context
+    manager.
 
     Parameters
     ----------
@@ -94,8 +103,8 @@ class Campaign:
     doing : what the campaign is about
     label : what the names of new files begin with, see `reduce`
     save : writes the whole runs of a batch, by key, to a file
-    passing : whether `reduce` removes most: batches of less than `SOON_DONE` are then stored only if memory is short
-    """
+    passing : whether `reduce` removes most: batches of less than `SOON_DONE` are then stored only
+    if memory is short"""
 
     directory: Path
     workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)
@@ -121,7 +130,8 @@ class Campaign:
         self._failed: dict[str, Failure] = {}
         self._lock = threading.Lock()
         self._read: dict[str, Trajectory] = {}
-        # A file that was cut or changed is set aside; those of other versions of the program are left alone.
+        # A file that was cut or changed is set aside; those of other versions of the program are
+        # left alone.
         others, ours = 0, current_versions()["dualball"]
         for file in sorted(self.directory.glob("*.h5")):
             if not (name := _NAME.fullmatch(file.name)):
@@ -130,7 +140,10 @@ class Campaign:
                 version, keys = storage.contents(file) if name[1] else ("", [])
             except StorageError as error:
                 file.replace(file.with_suffix(".damaged"))
-                print(f"dualball: {error}; it is set aside, its runs are carried out again", file=sys.stderr)
+                print(
+                    f"dualball: {error}; it is set aside, its runs are carried out again",
+                    file=sys.stderr,
+                )
                 continue
             others += version != ours
             if version == ours:
@@ -150,21 +163,26 @@ class Campaign:
             self.directory.rmdir()
 
     def part(self, label: str, doing: str) -> Campaign:
-        """A part of the campaign with a label and runs of its own, which another thread may carry out."""
+        """A part of the campaign with a label and runs of its own, which another thread may carry
+        out."""
         part = copy.copy(self)
         part.label, part.doing, part._read = label, doing, {}
-        part._files = {key: f for key, f in self._files.items() if label in (f.stem, f.name.rpartition("-")[0])}
+        part._files = {
+            key: f for key, f in self._files.items() if label in (f.stem, f.name.rpartition("-")[0])
+        }
         return part
 
     def load(self, key: str) -> Trajectory:
-        """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
+        """The run of a task that was carried out, by its key; raises `StorageError` if it can't be
+        read."""
         if key not in self._read:
             runs = storage.load_runs(self._files[key])
             self._keep_in_memory(runs if key in runs else {key: runs[""]})
         return self._read[key]
 
     def _keep_in_memory(self, runs: Mapping[str, Trajectory]) -> None:
-        """Keep runs in memory, and forget the earliest of the others while there are more than `READ` samples.
+        """Keep runs in memory, and forget the earliest of the others while there are more than
+        `READ` samples.
 
         What isn't stored is before it is forgotten, all at once.
         """
@@ -186,9 +204,8 @@ class Campaign:
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
 
-        Raises `SimulationError` for the first task that failed, `InputError` if it could not even start: use
-        `complete` where failures are expected.
-        """
+        Raises `SimulationError` for the first task that failed, `InputError` if it could not even
+        start: use `complete` where failures are expected."""
         for failure in self.complete(tasks):
             key = failure.task.key
             if key in self._files:
@@ -202,8 +219,12 @@ class Campaign:
         The directory's `FAILURES` lists all that have failed in this campaign, for programs.
         """
         unique = {task.key: task for task in tasks}
-        todo = [task for key, task in unique.items() if key not in self._files and key not in self._read]
-        earlier = [key for key in unique if key in self._files and self._files[key].name.endswith(_BROKEN)]
+        todo = [
+            task for key, task in unique.items() if key not in self._files and key not in self._read
+        ]
+        earlier = [
+            key for key in unique if key in self._files and self._files[key].name.endswith(_BROKEN)
+        ]
         failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
@@ -213,24 +234,32 @@ class Campaign:
                 done += not reason
                 if file:
                     self._files[task.key] = file
-            self._keep_in_memory({task.key: run for task, (*_, run) in zip(batch, outcomes, strict=True) if run})
+            self._keep_in_memory(
+                {task.key: run for task, (*_, run) in zip(batch, outcomes, strict=True) if run}
+            )
             self.report(self.doing, done, len(unique), len(failures))
         with self._lock:  # the parts of a campaign share the list
-            if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
+            if new := {
+                failure.task.key: failure
+                for failure in failures
+                if failure.task.key not in self._failed
+            }:
                 self._failed |= new
                 failed = [failure.described() for failure in self._failed.values()]
                 write_text(self.directory / FAILURES, json.dumps(failed, indent=1))
         return failures
 
     def keep(self, keys: Collection[str]) -> None:
-        """Store these runs of the label in a file of their own, ``LABEL.h5``, which `reduce` leaves."""
+        """Store these runs of the label in a file of their own, ``LABEL.h5``, which `reduce`
+        leaves."""
         file = self.directory / f"{self.label}.h5"
         if keys:
             storage.save_batch({key: self.load(key) for key in sorted(keys)}, file)
             self._files |= dict.fromkeys(keys, file)
 
     def reduce(self) -> None:
-        """Remove all runs of the label but those kept and those that broke down: what was measured is stored."""
+        """Remove all runs of the label but those kept and those that broke down: what was measured
+        is stored."""
         own = {file for file in self._files.values() if file.name.rpartition("-")[0] == self.label}
         gone = {file for file in own if not file.name.endswith(_BROKEN)}
         for file in gone:
@@ -241,16 +270,17 @@ class Campaign:
     def _carry_out(self, todo: Sequence[Task]) -> Iterator[tuple[list[Task], list[Ended]]]:
         """Yield each batch of tasks that ends, with what became of them.
 
-        Tasks are shared out evenly among the workers, the longest first: then all end together.
-        A worker that dies takes all batches under way with it. Their tasks are tried again at the end, one at a time;
-        one that then loses its worker twice has failed.
-        """
+        Tasks are shared out evenly among the workers, the longest first: then all end together. A
+        worker that dies takes all batches under way with it. Their tasks are tried again at the
+        end, one at a time; one that then loses its worker twice has failed."""
         fresh, share = deque[list[Task]](), sum(task.steps for task in todo) / self.fleet.count
         steps, samples = 0.0, 0.0  # of the batch that grows: the sum, and the most of a run
         for task in sorted(todo, key=lambda task: -task.steps):
             steps, samples = steps + task.steps, max(samples, task.samples)
             last = fresh[-1] if fresh else []
-            full = len(last) == self.batch or (len(last) + 1) * samples > HELD or steps > 1.001 * share
+            full = (
+                len(last) == self.batch or (len(last) + 1) * samples > HELD or steps > 1.001 * share
+            )
             if not last or last[0].long or full:
                 fresh.append([])
                 steps, samples = task.steps, task.samples
@@ -259,7 +289,8 @@ class Campaign:
         again: deque[Task] = deque()
         died: Counter[str] = Counter()
         while True:
-            # No more than a few batches wait at the executor, so that memory stays flat however long the list.
+            # No more than a few batches wait at the executor, so that memory stays flat however
+            # long the list.
             alone = not fresh and not pending
             if alone:
                 if not again:
@@ -268,7 +299,9 @@ class Campaign:
             while fresh and len(pending) < 2 * self.fleet.count:
                 batch = fresh.popleft()
                 pending[self.fleet.submit(run_batch, batch, self._storing, self.limit)] = batch
-            if not any(future.done() for future in pending):  # `wait` waits for cancelled ones that nobody told of it
+            if not any(
+                future.done() for future in pending
+            ):  # `wait` waits for cancelled ones that nobody told of it
                 wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)
@@ -287,7 +320,8 @@ class Campaign:
 
 
 def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[Ended]:
-    """Carry out tasks, each within so many s, and store their runs; raises `StorageError` if that can't be done."""
+    """Carry out tasks, each within so many s, and store their runs; raises `StorageError` if that
+    can't be done."""
     begun, whole, ended = time.process_time(), dict[str, Trajectory](), dict[str, Ended]()
     for task in tasks:
         path = storing.directory / f"{storing.label}-{task.key}.h5"

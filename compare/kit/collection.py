@@ -1,9 +1,9 @@
 """What many runs settled to, in one file.
 
-`collect` writes of each run its parameters, the mean over its last quarter, how sure that is, and its last case. The
-file opens in xarray. The parameters that vary are the dimensions of a grid, if the runs are one, each point once; else
-coordinates along the dimension ``run``. `save_means` writes the same of a batch whose samples nobody wants.
-"""
+`collect` writes of each run its parameters, the mean over its last quarter, how sure that is, and
+its last case. The file opens in xarray. The parameters that vary are the dimensions of a grid, if
+the runs are one, each point once; else coordinates along the dimension ``run``. `save_means` writes
+the same of a batch whose samples nobody wants."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ NAMED = 5
 SHARE = 16
 """Files that a process gathers at a time."""
 Columns = dict[str, npt.NDArray[Any]]
-"""By name, an entry a run. Beside those of a collection: whether the flow is `steady`, a digest of all that determines
-the run, its `identity`, and one of its `numbers`."""
+"""By name, an entry a run. Beside those of a collection: whether the flow is `steady`, a digest of
+all that determines the run, its `identity`, and one of its `numbers`."""
 _HELD = "steady", "identity", "numbers"
 
 
 def collect(directory: Path, output: Path, workers: int = 0) -> int:
-    """Gather all runs of a directory, whole ones and failed ones, ordered by what varies; return their number.
+    """Gather all runs of a directory, whole ones and failed ones, ordered by what varies; return
+    their number.
 
     One that is stored twice is taken once. So many processes read the files; 0 is this one.
 
-    Raises `StorageError` if there are none, the output can't be written, or, with their names, some can't be read or
-    hold the same run twice.
-    """
+    Raises `StorageError` if there are none, the output can't be written, or, with their names, some
+    can't be read or hold the same run twice."""
     check_writable(output)
     if not directory.is_dir():
         why = "it is no directory" if directory.exists() else "there is no such directory"
@@ -63,7 +63,9 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     files = []
     for file in sorted(directory.rglob("*.h5")):
         if output.exists() and file.samefile(output):
-            with reading(output) as before:  # what is to be overwritten must be the collection of the last time
+            with reading(
+                output
+            ) as before:  # what is to be overwritten must be the collection of the last time
                 if before.attrs.get("schema") != SCHEMA:
                     raise StorageError("it holds runs to be gathered, and can't be the output, too")
         elif file.parent.suffix != ".journal":  # of a run that goes on
@@ -74,13 +76,18 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
         for found, unread in work.map(partial(_columns_of_files, directory), shares):
             parts += [found] if found else []
             problems += unread
-    table = {name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0] if parts else ())}
+    table = {
+        name: np.concatenate([part.pop(name) for part in parts])
+        for name in list(parts[0] if parts else ())
+    }
     rows = np.arange(len(table["run"]) if table else 0)
     if table:  # the first of each identity, and the numbers of that
         _, first, which = np.unique(table["identity"], return_index=True, return_inverse=True)
         for k in np.flatnonzero(table["numbers"] != table["numbers"][first[which]]).tolist():
             those = (directory / table["run"][i] for i in (first[which[k]], k))
-            problems.append(f"{' and '.join(map(str, those))} hold the same run with different numbers")
+            problems.append(
+                f"{' and '.join(map(str, those))} hold the same run with different numbers"
+            )
         rows = np.sort(first)
     if problems:
         more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
@@ -95,12 +102,18 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     shape = [len(values) for values in axes.values()]
     if axes and math.prod(shape) == len(rows):
         places = [np.searchsorted(values, collected[name]) for name, values in axes.items()]
-        if np.array_equal(np.ravel_multi_index(places, shape), np.arange(len(rows))):  # each point of a grid once
+        if np.array_equal(
+            np.ravel_multi_index(places, shape), np.arange(len(rows))
+        ):  # each point of a grid once
             dimensions = coordinates
-            collected = axes | {name: v.reshape(shape) for name, v in collected.items() if name not in axes}
+            collected = axes | {
+                name: v.reshape(shape) for name, v in collected.items() if name not in axes
+            }
     with WholeFile(output) as whole:
         title = f"What {len(rows)} balls settled to, measured over the last part of each run"
-        whole.file.attrs.update(Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION)
+        whole.file.attrs.update(
+            Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION
+        )
         for name, stored in write_columns(whole.file, collected, *dimensions).items():
             stored.attrs.update(about[name])
             if dimensions == ["run"] and coordinates and name not in ("run", *coordinates):
@@ -110,14 +123,17 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
 
 
 def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
-    """The columns of all runs of some files, named by their paths in the directory; and errors of unreadable files."""
+    """The columns of all runs of some files, named by their paths in the directory; and errors of
+    unreadable files."""
     parts, problems = [], []
     for file in files:
         try:
             parts.append(_rows(file, file.relative_to(directory)))
         except StorageError as error:
             problems.append(str(error))
-    return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}, problems
+    return {
+        name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())
+    }, problems
 
 
 def _rows(path: Path, shown: Path) -> Columns:
@@ -126,13 +142,19 @@ def _rows(path: Path, shown: Path) -> Columns:
         if file.attrs.get("schema") != MEANS:
             found = None
         elif file.attrs.get("schema_version") != MEANS_VERSION:
-            raise StorageError(f"it holds means of another version; this program reads {MEANS_VERSION}")
+            raise StorageError(
+                f"it holds means of another version; this program reads {MEANS_VERSION}"
+            )
         else:
             found = {name: column(dataset(file, name)) for name in file}
-            found = {name: values.astype(str) if values.dtype.kind == "O" else values for name, values in found.items()}
+            found = {
+                name: values.astype(str) if values.dtype.kind == "O" else values
+                for name, values in found.items()
+            }
     found = found or _means(storage.load_runs(path))
     of = [
-        dict(zip(found, row, strict=True)) for row in zip(*(values.tolist() for values in found.values()), strict=True)
+        dict(zip(found, row, strict=True))
+        for row in zip(*(values.tolist() for values in found.values()), strict=True)
     ]
     theory = np.full((len(VARIABLES), len(of)), math.nan)
     for k, row in enumerate(of):
@@ -147,26 +169,42 @@ def _rows(path: Path, shown: Path) -> Columns:
 
 
 def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
-    """Write what runs settled to, by name, without their samples; raises `StorageError` if that can't be done."""
+    """Write what runs settled to, by name, without their samples; raises `StorageError` if that
+    can't be done."""
     with WholeFile(path) as whole:
         whole.file.attrs.update(
-            schema=MEANS, schema_version=MEANS_VERSION, versions=json.dumps(dict(current_versions()))
+            schema=MEANS,
+            schema_version=MEANS_VERSION,
+            versions=json.dumps(dict(current_versions())),
         )
         write_columns(whole.file, _means(runs), "run")
         whole.finish()
 
 
 def _means(runs: Mapping[str, Trajectory]) -> Columns:
-    """Parameters, means over the last quarter with uncertainties by drift, last case of runs; nan and -1 if short."""
+    """Parameters, means over the last quarter with uncertainties by drift, last case of runs; nan
+    and -1 if short."""
     rows = []
     for name, run in runs.items():
-        row: dict[str, Any] = {"run": name, "engine": run.header.engine} | dataclasses.asdict(run.header.parameters)
-        row |= {"duration": float(run.time[-1]) if len(run.time) else 0.0, "failure": run.header.failure}
+        row: dict[str, Any] = {"run": name, "engine": run.header.engine} | dataclasses.asdict(
+            run.header.parameters
+        )
+        row |= {
+            "duration": float(run.time[-1]) if len(run.time) else 0.0,
+            "failure": run.header.failure,
+        }
         length = len(run.time) // 4
-        means = steady_mean(run.x.T, length) if length >= FEWEST else np.full((2, len(VARIABLES)), math.nan)
+        means = (
+            steady_mean(run.x.T, length)
+            if length >= FEWEST
+            else np.full((2, len(VARIABLES)), math.nan)
+        )
         for variable, mean, drift in zip(VARIABLES, *np.array(means).tolist(), strict=True):
             row |= {variable: mean, f"{variable}_uncertainty": drift}
-        row |= {"case": int(settled_case(run)) if len(run.case) else -1, "steady": run.header.flow.is_steady}
+        row |= {
+            "case": int(settled_case(run)) if len(run.case) else -1,
+            "steady": run.header.flow.is_steady,
+        }
         about = run.header.attributes() | {"mjcf": run.header.mjcf, "created": "", "failure": ""}
         row["identity"] = _digest(json.dumps(about, sort_keys=True).encode())
         row["numbers"] = _digest(*(getattr(run, each).tobytes() for each in columns(Trajectory)))
@@ -185,57 +223,91 @@ def _digest(*parts: bytes) -> str:
 def _attributes() -> dict[str, dict[str, Any]]:
     """Of each column of a collection: units, long_name, and of the case its flags."""
     about: dict[str, dict[str, Any]] = {
-        f.name: {"units": f.metadata["unit"], "long_name": f.metadata["meaning"]} for f in Parameters.quantities()
+        f.name: {"units": f.metadata["unit"], "long_name": f.metadata["meaning"]}
+        for f in Parameters.quantities()
     }
     texts = {"run": "file and name of the run", "engine": "engine", "drag": "law of drag"}
-    about |= {name: {"long_name": text} for name, text in (texts | {"failure": "why it broke down"}).items()}
+    about |= {
+        name: {"long_name": text}
+        for name, text in (texts | {"failure": "why it broke down"}).items()
+    }
     about["duration"] = {"units": "s", "long_name": "duration of the run"}
     stored = columns(Trajectory)
     for name in VARIABLES:
         units, meaning = (stored[name][key] for key in ("units", "long_name"))
         about[name] = {"units": units, "long_name": f"{meaning}, mean"}
-        about[f"{name}_uncertainty"] = {"units": units, "long_name": f"{meaning}, uncertainty of the mean"}
-        about[f"{name}_theory"] = {"units": units, "long_name": f"{meaning}, stationary solution of the case"}
+        about[f"{name}_uncertainty"] = {
+            "units": units,
+            "long_name": f"{meaning}, uncertainty of the mean",
+        }
+        about[f"{name}_theory"] = {
+            "units": units,
+            "long_name": f"{meaning}, stationary solution of the case",
+        }
     about["case"] = attributes(stored["case"])  # -1: none prevails
     return about
 
 
 def varied_parameters(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
-    """Names of the parameters that have several values in the columns; older files have no law of drag."""
-    return [f.name for f in dataclasses.fields(Parameters) if f.name in of and len(np.unique(of[f.name])) > 1]
+    """Names of the parameters that have several values in the columns; older files have no law of
+    drag."""
+    return [
+        f.name
+        for f in dataclasses.fields(Parameters)
+        if f.name in of and len(np.unique(of[f.name])) > 1
+    ]
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """What a collection or batch holds: names of runs, engines, failures, the range of every column, JSON-able.
+    """What a collection or batch holds: names of runs, engines, failures, the range of every
+    column, JSON-able.
 
-    Empty for a file that holds a single run. Raises `StorageError` for one that is not whole or of a newer version.
-    """
+    Empty for a file that holds a single run. Raises `StorageError` for one that is not whole or of
+    a newer version."""
     if path.parent.is_file():  # one run of a batch
         return {}
     with reading(path) as file:
         schema, version = (file.attrs.get(name) for name in ("schema", "schema_version"))
         if schema == SCHEMA:
             if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
-                raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
+                raise StorageError(
+                    f"it is a collection of version {version!r}; this program reads "
+                    f"{SCHEMA_VERSION}"
+                )
             of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
             if not run.is_scale:  # a grid
                 names = [next(iter(dimension.keys())) for dimension in run.dims]
-                of |= dict(zip(names, np.meshgrid(*(of[name] for name in names), indexing="ij"), strict=True))
+                of |= dict(
+                    zip(
+                        names,
+                        np.meshgrid(*(of[name] for name in names), indexing="ij"),
+                        strict=True,
+                    )
+                )
             return described({name: values.ravel() for name, values in of.items()})
     if schema not in (MEANS, storage.BATCH):
         return {}
-    return described({name: values for name, values in _rows(path, path).items() if name not in _HELD})
+    return described(
+        {name: values for name, values in _rows(path, path).items() if name not in _HELD}
+    )
 
 
 def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
-    """What the columns of a collection hold, as `describe` gives it; `drag` is missing in older ones."""
+    """What the columns of a collection hold, as `describe` gives it; `drag` is missing in older
+    ones."""
     codes, counts = np.unique(of["case"], return_counts=True)
-    finite = {name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"}
+    finite = {
+        name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"
+    }
     return {
         "runs": len(of["run"]),
         "names": of["run"].tolist(),
         "engines": sorted(set(of["engine"].tolist())),
-        "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
+        "cases": {
+            Case(code).name: int(count)
+            for code, count in zip(codes, counts, strict=True)
+            if code >= 0
+        },
         "failures": [text for text in of["failure"].tolist() if text],
         "drag": sorted(set(of["drag"].tolist())) if "drag" in of else [],
         "varied": varied_parameters(of),
@@ -251,7 +323,9 @@ def table(about: dict[str, Any]) -> Table:
         "runs": f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed",
         "named": "\n".join(names[:NAMED]) + more,
         "cases": ", ".join(f"{name}: {count}" for name, count in about["cases"].items()),
-        "varied": "\n".join("{} {:g} … {:g}".format(n, *ranges[n]) for n in about["varied"] if n != "drag"),
+        "varied": "\n".join(
+            "{} {:g} … {:g}".format(n, *ranges[n]) for n in about["varied"] if n != "drag"
+        ),
         "drag": ", ".join(about["drag"]),
         "omega_c": "{:.9g} … {:.9g} rad s-1".format(*ranges.get("omega_c", [np.nan, np.nan])),
     }

@@ -19,7 +19,8 @@ if TYPE_CHECKING:  # it takes half a second to load, and much that hands it over
 
 @dataclass(frozen=True)
 class Motion:
-    """A trajectory handed to a figure, by a name that stands for its content; it is read only to be drawn."""
+    """A trajectory handed to a figure, by a name that stands for its content; it is read only to be
+    drawn."""
 
     name: str
     engine: str
@@ -29,7 +30,8 @@ class Motion:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a validation leaves for figures to show: judged numbers, measurements, run files; all may be none."""
+    """What a validation leaves for figures to show: judged numbers, measurements, run files; all
+    may be none."""
 
     checks: Mapping[str, Sequence[Check]] = field(default_factory=dict)
     """By the id of the claim on which they bear."""
@@ -40,7 +42,8 @@ class Evidence:
     """What other engines measured at steps that users take."""
 
     def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
-        """Measurements of a quantity, by all engines, among whose conditions are those of these names."""
+        """Measurements of a quantity, by all engines, among whose conditions are those of these
+        names."""
         named = set(conditions)
         measured = (*self.records.measurements, *self.others.measurements)
         return (m for m in measured if m.quantity == quantity and named <= m.conditions.keys())
@@ -48,12 +51,16 @@ class Evidence:
     def motions(self, m: Measurement) -> list[Motion]:
         """The runs of a measurement whose files are there."""
         there = [name for name in m.runs if storage.exists(self.directory / name)]
-        return [Motion(name, m.engine, m.parameters, partial(storage.load, self.directory / name)) for name in there]
+        return [
+            Motion(name, m.engine, m.parameters, partial(storage.load, self.directory / name))
+            for name in there
+        ]
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """What most figures show, by the name of the figure: a parameter set, what was measured with it, and its runs."""
+    """What most figures show, by the name of the figure: a parameter set, what was measured with
+    it, and its runs."""
 
     figure: str
     p: Parameters
@@ -78,13 +85,15 @@ class Drawing:
 
     title: str
     select: Callable[[Evidence], Any]
-    """All that is drawn, as data whose repr tells it apart; raises `GapError` where results are missing."""
+    """All that is drawn, as data whose repr tells it apart; raises `GapError` where results are
+    missing."""
     draw: Callable[[Any], tuple[Figure, str]]
     """The figure, and its caption: what is shown, with the parameters."""
     claims: tuple[str, ...] = ()
     """The claims beside which it stands."""
     of_set: Callable[[Parameters], Any] | None = None
-    """The same of another set, by theory alone: `draw` raises `GapError` where the set has no such thing."""
+    """The same of another set, by theory alone: `draw` raises `GapError` where the set has no such
+    thing."""
 
 
 _Rows = Callable[[Evidence], Iterable[Measurement]]
@@ -99,14 +108,22 @@ def diagram(
     claims: tuple[str, ...],
     measured: _Rows | None = None,
 ) -> Drawing:
-    """The figure of a `Diagram`: of one set with what was measured with it, or of any other set without."""
-    return Drawing(title, partial(select, name, set, measured), draw, claims, partial(Diagram, name))
+    """The figure of a `Diagram`: of one set with what was measured with it, or of any other set
+    without."""
+    return Drawing(
+        title, partial(select, name, set, measured), draw, claims, partial(Diagram, name)
+    )
 
 
 def select(name: str, set: str, measured: _Rows | None, evidence: Evidence) -> Diagram:
     """What a figure shows of one set: what was measured with it, and the runs that are there."""
     states = tuple(m for m in measured(evidence) if m.set == set) if measured else ()
-    return Diagram(name, Parameters.named(set), states, tuple(run for m in states for run in evidence.motions(m)))
+    return Diagram(
+        name,
+        Parameters.named(set),
+        states,
+        tuple(run for m in states for run in evidence.motions(m)),
+    )
 
 
 SUFFIXES = (".svg", ".pdf", ".png")
@@ -114,7 +131,8 @@ SUFFIXES = (".svg", ".pdf", ".png")
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure to a file, in the format that its name says, one of `SUFFIXES`; equal figures make equal files.
+    """Write a figure to a file, in the format that its name says, one of `SUFFIXES`; equal figures
+    make equal files.
 
     Raises `StorageError` if it can't be written.
     """

@@ -1,8 +1,8 @@
-"""What a long run has done so far, on disk: killed at any moment, it goes on from there, to the bit.
+"""What a long run has done so far, on disk: killed at any moment, it goes on from there, to the
+bit.
 
-A journal is a directory of segments. Each holds the samples since the one before and everything that the run carries
-on; it is a whole HDF5 file or not there at all.
-"""
+A journal is a directory of segments. Each holds the samples since the one before and everything
+that the run carries on; it is a whole HDF5 file or not there at all."""
 
 from __future__ import annotations
 

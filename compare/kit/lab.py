@@ -1,4 +1,5 @@
-"""What a protocol works with: an engine, a campaign that keeps its runs, and how much is to be measured."""
+"""What a protocol works with: an engine, a campaign that keeps its runs, and how much is to be
+measured."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from model.drag import STOKES
 
 @dataclass(frozen=True)
 class Lab:
-    """Where protocols run what they need: every run is carried out once and read from its file afterwards."""
+    """Where protocols run what they need: every run is carried out once and read from its file
+    afterwards."""
 
     campaign: Campaign
     engine: Engine
@@ -37,7 +39,8 @@ class Lab:
 
     @property
     def is_witness(self) -> bool:
-        """Whether the engine is heard beside the one on trial, or in its place, with time steps of its own."""
+        """Whether the engine is heard beside the one on trial, or in its place, with time steps of
+        its own."""
         return self.engine.refine != (1,)
 
     def task(
@@ -52,10 +55,12 @@ class Lab:
     ) -> Task:
         """The task of a run by the lab's engine with a time step in s, in the studies' settings.
 
-        One that goes on from another begins on floor and wall, into which contacts may have let it sink.
-        """
+        One that goes on from another begins on floor and wall, into which contacts may have let it
+        sink."""
         x = np.array(x0, float)
-        x[[0, 6][: len(x) // 4]] = np.maximum(x[[0, 6][: len(x) // 4]], 0.0)  # y, and h where it is given
+        x[[0, 6][: len(x) // 4]] = np.maximum(
+            x[[0, 6][: len(x) // 4]], 0.0
+        )  # y, and h where it is given
         return Task(
             engine=self.engine.name,
             parameters=p,
@@ -67,11 +72,14 @@ class Lab:
         )
 
     def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
-        """The trajectories of each group, or why one failed: carried out together, not held in memory together."""
+        """The trajectories of each group, or why one failed: carried out together, not held in
+        memory together."""
         failures = self.campaign.complete([task for group in groups for task in group])
         failed = {failure.task.key: failure.reason for failure in failures}
         for group in groups:
-            yield next((failed[task.key] for task in group if task.key in failed), "") or self.campaign.run(group)
+            yield next(
+                (failed[task.key] for task in group if task.key in failed), ""
+            ) or self.campaign.run(group)
 
     def each(self, tasks: Sequence[Task]) -> Iterator[Trajectory | str]:
         """The trajectory of every task, one after the other, or why it failed."""
@@ -85,14 +93,16 @@ def time_unit(p: Parameters) -> float:
 
 
 def dragged_speed(p: Parameters) -> float:
-    """A speed relative to the fluid, m s-1, at which drag is about as large as the weight, or larger.
+    """A speed relative to the fluid, m s-1, at which drag is about as large as the weight, or
+    larger.
 
-    By Stokes' law g/c. In thin fluids with another law that is far too fast: no more than 20 sqrt(g R) then.
-    """
+    By Stokes' law g/c. In thin fluids with another law that is far too fast: no more than 20 sqrt(g
+    R) then."""
     return p.g / p.c if p.drag == STOKES else min(p.g / p.c, 20 * math.sqrt(p.g * p.R))
 
 
 def coarse_step(p: Parameters) -> float:
-    """A time step in s, a power of two of 1 ms: a twentieth of `time_unit` or so, and no more than 1/(4 omega_0)."""
+    """A time step in s, a power of two of 1 ms: a twentieth of `time_unit` or so, and no more than
+    1/(4 omega_0)."""
     finest = math.floor(math.log2(250 / abs(p.omega_0))) if p.omega_0 else math.inf
     return float(1e-3 * 2.0 ** min(round(math.log2(time_unit(p) / 20e-3)), finest))

@@ -1,12 +1,13 @@
-"""How much each level measures: which parameter sets, and of every protocol step counts, durations and grids; by whom.
+"""How much each level measures: which parameter sets, and of every protocol step counts, durations
+and grids; by whom.
 
-An engine other than the one on trial, with time steps of its own, measures as much as the quick level at every level,
-but for what `WITNESS` says, and looks where the one on trial found something.
+An engine other than the one on trial, with time steps of its own, measures as much as the quick
+level at every level, but for what `WITNESS` says, and looks where the one on trial found something.
 
-A few sets are chosen by hand, and a design fills a box evenly. Friction is greater on the floor in some, on the wall in
-others, and the wall's is below and above the inertia j; drag is weak in some and strong in others. Two have another law
-of drag, at Reynolds numbers of hundreds. Each protocol chooses omega_0 itself: that of a set is not used.
-"""
+A few sets are chosen by hand, and a design fills a box evenly. Friction is greater on the floor in
+some, on the wall in others, and the wall's is below and above the inertia j; drag is weak in some
+and strong in others. Two have another law of drag, at Reynolds numbers of hundreds. Each protocol
+chooses omega_0 itself: that of a set is not used."""
 
 from __future__ import annotations
 
@@ -44,20 +45,28 @@ class Effort:
     """How much is measured: a number a line, with its value at the quick level, by protocol."""
 
     halves: tuple[int, int] = (1, 2)  # what the time step of a pair of runs is divided by
-    sections: int = 1  # flows inside a bracket in each round, by which it shrinks to a half or an eighth
-    granted: bool = False  # whether the ends between which something is looked for are taken for granted
+    sections: int = (
+        1  # flows inside a bracket in each round, by which it shrinks to a half or an eighth
+    )
+    granted: bool = (
+        False  # whether the ends between which something is looked for are taken for granted
+    )
     slow: bool = True  # whether that is measured that takes long: sinking next to the least flow that holds, folds
 
-    # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are longer, because a ball on
-    # the wall that goes on from its mean swings again, if less, and that has to die out, too.
+    # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are
+    # longer, because a ball on the wall that goes on from its mean swings again, if less, and that
+    # has to die out, too.
     settling_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)
     settling_steps: int = 2048  # a round is a multiple of so many coarse time steps
 
-    # settled: flows omega_0 sqrt(R/g) for every kind of start, the first one that which comes to slip
+    # settled: flows omega_0 sqrt(R/g) for every kind of start, the first one that which comes to
+    # slip
     settled_starts: tuple[tuple[str, Flows], ...] = tuple((how, _FEW) for how in _STARTS)
     settled_sharp: float = 1.0  # share of the drift limit down to which a state goes on
     settled_loose: float = 1.0  # and the multiple of it up to which it counts
-    settled_refine: int = 2  # parts of the time step with which a state is measured once more; 1: it isn't
+    settled_refine: int = (
+        2  # parts of the time step with which a state is measured once more; 1: it isn't
+    )
 
     thresholds_width: float = 5e-5  # relative width of the last brackets
     thresholds_fold: float = 1.2e-3  # and of those about a fold
@@ -77,27 +86,34 @@ class Effort:
     unsteady_lasts: float = 48.0  # time after a jump in units of 1/c
     unsteady_refine: tuple[int, int] = (2, 4)  # its time steps in a coarse one
     unsteady_ramps: tuple[int, int] = (1, 2)  # those of ramps
-    unsteady_rates: tuple[float, ...] = (1e-2,)  # of ramps, in c times the range of flows in which the ball slips
+    unsteady_rates: tuple[float, ...] = (
+        1e-2,
+    )  # of ramps, in c times the range of flows in which the ball slips
     pulsation_octaves: tuple[int, ...] = (3, 6)  # of the frequencies, above c/(4 pi)
     pulsation_steps: int = 512  # least number of time steps in a period
     pulsation_samples: int = 256  # in a period
     pulsation_refine: int = 2  # parts of the time step in the last of successive runs
-    pulsation_reach: float = 1.1  # largest amplitude tried, in units of what would end rolling in a slow pulsation
+    pulsation_reach: float = (
+        1.1  # largest amplitude tried, in units of what would end rolling in a slow pulsation
+    )
     pulsation_width: float = 1e-3  # relative width to which the onset of slip is bracketed
     unloading_refine: tuple[int, int] = (16, 32)  # time steps in a coarse one where the ball lands
 
     recurrent_flows: Flows = (1.0,)  # of the staircase in units of that of the set
     choice_sets: int = 1  # the contacts of the second hover for long
 
-    # Parts of a step of `trials.REFINED`. Contacts with much friction answer more slowly: with whole steps the slope of
-    # gamma was too coarse on 11 of the 24 sets of the default level.
+    # Parts of a step of `trials.REFINED`. Contacts with much friction answer more slowly: with
+    # whole steps the slope of gamma was too coarse on 11 of the 24 sets of the default level.
     bounds_refined: int = 1
     growth_more: int = 1  # multiples of the numbers of directions in growth.PUSHES
     steepest_states: int = 1  # random states of every set out of which slip is pushed all round
     field_starts: int = 4  # random starts for every case and set
     field_kept: int = 4  # most states measured for every case and set
     rates_refined: tuple[int, int] = (8, 16)  # the two time steps, in parts of the coarse step
-    rates_leaning: tuple[int, int] = (8, 16)  # in SR: with shorter ones an almost unloaded floor carries more or none
+    rates_leaning: tuple[int, int] = (
+        8,
+        16,
+    )  # in SR: with shorter ones an almost unloaded floor carries more or none
     rates_more: float = 1  # multiples of the numbers of states in rates.STATES
     laws_refined: tuple[int, int] = (4, 8)  # the two time steps, in parts of the coarse step
     motions_pieces: int = 6  # of a motion
@@ -161,7 +177,9 @@ WITNESS = replace(
     field_starts=2, field_kept=2,
 )
 # fmt: on
-WITNESS_ABOVE_QUICK = replace(WITNESS, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0)
+WITNESS_ABOVE_QUICK = replace(
+    WITNESS, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0
+)
 """At the levels above quick, on whose rarer sets motions die out more slowly."""
 
 
@@ -172,13 +190,78 @@ HIGH = {"mu": 1.0, "eta": 1.0, "j": 0.66, "r/R": 0.4, "kappa": 0.4, "R": 0.08, "
 """Ranges of the design; lengths in m, masses in kg, g in m s-2."""
 
 _CHOSEN = {
-    "rough-floor": {"m": 0.02, "r": 0.012, "R": 0.06, "j": 0.3, "mu": 0.45, "eta": 0.15, "g": 9.81, "c": 2.0},
-    "rough-wall": {"m": 0.05, "r": 0.015, "R": 0.05, "j": 0.55, "mu": 0.15, "eta": 0.35, "g": 8.0, "c": 1.5},
-    "thick-fluid": {"m": 0.03, "r": 0.008, "R": 0.04, "j": 0.45, "mu": 0.25, "eta": 0.1, "g": 9.0, "c": 5.0},
-    "heavy-core": {"m": 0.01, "r": 0.02, "R": 0.07, "j": 0.25, "mu": 0.7, "eta": 0.5, "g": 9.5, "c": 2.5},
-    "wake": {"m": 0.02, "r": 0.012, "R": 0.06, "j": 0.42, "mu": 0.5, "eta": 0.2, "g": 9.0, "c": 1.4, "nu_f": 8e-5},
-    "blunt": {"m": 0.03, "r": 0.01, "R": 0.05, "j": 0.4, "mu": 0.5, "eta": 0.2, "g": 8.5, "c": 1.2, "nu_f": 4e-5},
-    "rubber-wall": {"m": 0.04, "r": 0.01, "R": 0.055, "j": 0.35, "mu": 0.3, "eta": 0.8, "g": 7.0, "c": 3.0},
+    "rough-floor": {
+        "m": 0.02,
+        "r": 0.012,
+        "R": 0.06,
+        "j": 0.3,
+        "mu": 0.45,
+        "eta": 0.15,
+        "g": 9.81,
+        "c": 2.0,
+    },
+    "rough-wall": {
+        "m": 0.05,
+        "r": 0.015,
+        "R": 0.05,
+        "j": 0.55,
+        "mu": 0.15,
+        "eta": 0.35,
+        "g": 8.0,
+        "c": 1.5,
+    },
+    "thick-fluid": {
+        "m": 0.03,
+        "r": 0.008,
+        "R": 0.04,
+        "j": 0.45,
+        "mu": 0.25,
+        "eta": 0.1,
+        "g": 9.0,
+        "c": 5.0,
+    },
+    "heavy-core": {
+        "m": 0.01,
+        "r": 0.02,
+        "R": 0.07,
+        "j": 0.25,
+        "mu": 0.7,
+        "eta": 0.5,
+        "g": 9.5,
+        "c": 2.5,
+    },
+    "wake": {
+        "m": 0.02,
+        "r": 0.012,
+        "R": 0.06,
+        "j": 0.42,
+        "mu": 0.5,
+        "eta": 0.2,
+        "g": 9.0,
+        "c": 1.4,
+        "nu_f": 8e-5,
+    },
+    "blunt": {
+        "m": 0.03,
+        "r": 0.01,
+        "R": 0.05,
+        "j": 0.4,
+        "mu": 0.5,
+        "eta": 0.2,
+        "g": 8.5,
+        "c": 1.2,
+        "nu_f": 4e-5,
+    },
+    "rubber-wall": {
+        "m": 0.04,
+        "r": 0.01,
+        "R": 0.055,
+        "j": 0.35,
+        "mu": 0.3,
+        "eta": 0.8,
+        "g": 7.0,
+        "c": 3.0,
+    },
 }
 _DRAG = {"wake": SCHILLER_NAUMANN, "blunt": QUADRATIC}
 """The laws of those that have another than Stokes'."""
@@ -187,7 +270,10 @@ _DRAG = {"wake": SCHILLER_NAUMANN, "blunt": QUADRATIC}
 def sets(level: Level) -> dict[str, Parameters]:
     """The sets of a level by name."""
     named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
-    chosen = {name: Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES)) for name, values in _CHOSEN.items()}
+    chosen = {
+        name: Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES))
+        for name, values in _CHOSEN.items()
+    }
     sets = named | chosen
     if level > Level.QUICK:  # a scrambled Sobol sequence fills the box evenly
         low, high = np.array(list(LOW.values())), np.array(list(HIGH.values()))
@@ -207,12 +293,13 @@ ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
 DRAG_LAWS = (*ONE_BALL, "wake", "blunt")
 """One for each law of drag."""
 WITNESSED = (*ENDS_OF_ROLLING, "rough-floor", "wake")
-"""Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at one flow, a law of
-drag."""
+"""Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at
+one flow, a law of drag."""
 VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
-"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride the wall at one flow;
-drag so strong that nothing folds; two other laws of drag; friction of the wall above that of the floor and the inertia.
-On them all wrong theories are noticed that are noticed on all nine sets chosen by hand."""
+"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride
+the wall at one flow; drag so strong that nothing folds; two other laws of drag; friction of the
+wall above that of the floor and the inertia. On them all wrong theories are noticed that are
+noticed on all nine sets chosen by hand."""
 MOST_WITNESSED = 12
 """Sets, at most, that engines in the limit of no time step measure above the quick level."""
 
@@ -224,8 +311,8 @@ class Assignment:
     quick: tuple[str, ...] = VARIED
     """By the engine on trial at the quick level; at the others all of them."""
     limit: tuple[str, ...] = ()
-    """By engines in the limit of no time step at the quick level. At the others these measure `MOST_WITNESSED`, and
-    `reference` where none is named here."""
+    """By engines in the limit of no time step at the quick level. At the others these measure
+    `MOST_WITNESSED`, and `reference` where none is named here."""
     steps: tuple[int, int] = (3, 3)
     """With how many of their time steps, the coarsest first: at the quick level, and above."""
     as_it_comes: tuple[str, ...] = ()

@@ -1,10 +1,11 @@
-"""Figures as SVG that a page can play with: series switched on and off, values under the pointer, zoom.
+"""Figures as SVG that a page can play with: series switched on and off, values under the pointer,
+zoom.
 
-matplotlib draws the figure, once. What bears a label is written as a series of that name, and axes say how a place in
-the picture becomes a value; `templates/figure.js` reads both. Where no script runs, the picture is there all the same.
-Plotly or Bokeh would need a second description of each figure, and 1 to 5 MB a page; Panzoom, the library, has 10 kB.
-A label that begins with an underscore names a series that no legend lists, as is matplotlib's rule.
-"""
+matplotlib draws the figure, once. What bears a label is written as a series of that name, and axes
+say how a place in the picture becomes a value; `templates/figure.js` reads both. Where no script
+runs, the picture is there all the same. Plotly or Bokeh would need a second description of each
+figure, and 1 to 5 MB a page; Panzoom, the library, has 10 kB. A label that begins with an
+underscore names a series that no legend lists, as is matplotlib's rule."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ _TEX = {r"\omega": "ω", r"\Omega": "Ω", r"\eta": "η", r"\mu": "μ", r"\rho": 
 _TEX |= {r"\Delta": "Δ", r"\sqrt{R/g}": "√(R/g)", r"^0": "⁰"}
 _textpath: Any = textpath
 _textpath.MathTextParser = functools.cache(MathTextParser)
-"""One for all figures, which remembers formulas: matplotlib makes one for each, and parses its labels anew."""
+"""One for all figures, which remembers formulas: matplotlib makes one for each, and parses its
+labels anew."""
 for _prefix, _uri in (("", _SVG), ("xlink", _XLINK)):
     ElementTree.register_namespace(_prefix, _uri[1:-1])
 
@@ -47,7 +49,9 @@ def svg(figure: Figure) -> str:
     parts: dict[str, tuple[Artist, str]] = {}
     for axes in figure.axes:
         boxes = [each for each in axes.containers if isinstance(each, Container)]
-        artists: list[tuple[Any, Any]] = [(part, box.get_label()) for box in boxes for part in box.get_children()]
+        artists: list[tuple[Any, Any]] = [
+            (part, box.get_label()) for box in boxes for part in box.get_children()
+        ]
         artists += [(each, each.get_label()) for each in axes.get_children()]
         parts[f"part-{len(parts)}"] = axes, ""
         for artist, label in artists:
@@ -59,7 +63,9 @@ def svg(figure: Figure) -> str:
     renderer: Any = RendererSVG
     for second in (each for axes in figure.axes for each in axes.child_axes):
         second.draw(renderer(1, 1, io.StringIO()))  # it knows its limits only once it was drawn
-    canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
+    canvas: Any = FigureCanvasSVG(
+        figure
+    )  # draws once; `Figure.savefig` would do so twice, for the layout
     canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
     root = ElementTree.fromstring(re.sub(rb">\s+<", b"><", out.getvalue()))
     for group in root.iter(f"{_SVG}g"):
@@ -75,43 +81,66 @@ def svg(figure: Figure) -> str:
     # Places rounded to hundredths of a point, and no superfluous spaces: half as long.
     short = functools.partial(re.sub, r" +(?=[ \"])|(?<=\.\d\d)\d+", "")
     text = re.sub(r' (?:d|x|y)="[^"]*"|translate\([^)]*\)', lambda places: short(places[0]), text)
-    return re.sub(r' style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
+    return re.sub(
+        r' style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text
+    )
 
 
 def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
-    """SVG pictures by name as parts of one page, and an SVG of the letters that they share, to stand before them."""
+    """SVG pictures by name as parts of one page, and an SVG of the letters that they share, to
+    stand before them."""
     letters: dict[str, str] = {}
     made = {}
     for k, (name, picture) in enumerate(pictures.items()):
         letter = r'<path id="(\w+-[\w-]+)"[^>]*/>'
         letters |= {found[1]: found[0] for found in re.finditer(letter, picture)}
         text = re.sub(letter, "", picture).replace("<defs></defs>", "")
-        text = re.sub(r"<style.*?</style>", "", text)  # for all lines of a picture: pages have it, too
-        text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace("xlink:href", "href")
+        text = re.sub(
+            r"<style.*?</style>", "", text
+        )  # for all lines of a picture: pages have it, too
+        text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace(
+            "xlink:href", "href"
+        )
         start = re.match(r'<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', text)
         assert start
-        least = 0.64 * float(start[2])  # letters of 10 points are at least 6.4 pixels high on a phone
-        made[name] = f'<svg {start[1]} role="img" style="--least:{least:.0f}px">' + text[start.end() :]
-    return made, f'<svg width="0" height="0" style="position:absolute"><defs>{"".join(letters.values())}</defs></svg>'
+        least = 0.64 * float(
+            start[2]
+        )  # letters of 10 points are at least 6.4 pixels high on a phone
+        made[name] = (
+            f'<svg {start[1]} role="img" style="--least:{least:.0f}px">' + text[start.end() :]
+        )
+    return (
+        made,
+        f'<svg width="0" height="0" '
+        f'style="position:absolute"><defs>{"".join(letters.values())}</defs></svg>',
+    )
 
 
 def plain(label: str) -> str:
     """A label of matplotlib without TeX: "$\\omega_c$ (rad/s)" is "ω_c (rad/s)"."""
     for tex, text in _TEX.items():
         label = label.replace(tex, text)
-    label = re.sub(r"\\tilde(?:\{(\w)\}| ?(\w))", lambda found: f"{found[1] or found[2]}\u0303", label)
+    label = re.sub(
+        r"\\tilde(?:\{(\w)\}| ?(\w))", lambda found: f"{found[1] or found[2]}\u0303", label
+    )
     return re.sub(r"[${}]|\\", "", label).replace("\n", " ")
 
 
 def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
-    """The box of axes, and of each axis its label, its kind, and (a, b): panels in a row or column share one label.
+    """The box of axes, and of each axis its label, its kind, and (a, b): panels in a row or column
+    share one label.
 
     a + b times the place is the value, or its logarithm.
     """
     width, height = 72 * figure.get_size_inches()
     box = axes.get_position()
-    places = {"x": (box.x0 * width, box.x1 * width), "y": (height * (1 - box.y0), height * (1 - box.y1))}
-    scales: dict[str, Any] = {"box": [round(float(v), 2) for v in (*places["x"], *reversed(places["y"]))]}
+    places = {
+        "x": (box.x0 * width, box.x1 * width),
+        "y": (height * (1 - box.y0), height * (1 - box.y1)),
+    }
+    scales: dict[str, Any] = {
+        "box": [round(float(v), 2) for v in (*places["x"], *reversed(places["y"]))]
+    }
     for name, (first, last) in places.items():
         axis, limits = getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")()
         alike = axes, *getattr(axes, f"get_shared_{name}_axes")().get_siblings(axes)
@@ -127,13 +156,24 @@ def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
 
 
 def _join_marks(group: ElementTree.Element) -> None:
-    """Replace marks that look alike by one path with a mark at each of its points, which is a tenth as long."""
-    looks = {(mark.tag, mark.get(f"{_XLINK}href"), mark.get("style"), *sorted(mark.keys())) for mark in group}
-    if len(group) < _FEW or len(looks) > 1 or group[0].tag != f"{_SVG}use" or {"x", "y"} - {*group[0].keys()}:
+    """Replace marks that look alike by one path with a mark at each of its points, which is a tenth
+    as long."""
+    looks = {
+        (mark.tag, mark.get(f"{_XLINK}href"), mark.get("style"), *sorted(mark.keys()))
+        for mark in group
+    }
+    if (
+        len(group) < _FEW
+        or len(looks) > 1
+        or group[0].tag != f"{_SVG}use"
+        or {"x", "y"} - {*group[0].keys()}
+    ):
         return
     first = group[0]
     name = f"{first.attrib[f'{_XLINK}href'][1:]}marks"
-    shape = ElementTree.Element(f"{_SVG}marker", {"id": name, "overflow": "visible", "markerUnits": "userSpaceOnUse"})
+    shape = ElementTree.Element(
+        f"{_SVG}marker", {"id": name, "overflow": "visible", "markerUnits": "userSpaceOnUse"}
+    )
     look = {key: first.attrib[key] for key in (f"{_XLINK}href", "style") if key in first.attrib}
     ElementTree.SubElement(shape, f"{_SVG}use", look)
     way = "M " + " ".join(f"{mark.get('x')} {mark.get('y')}" for mark in group)
@@ -141,7 +181,9 @@ def _join_marks(group: ElementTree.Element) -> None:
     for mark in list(group):
         group.remove(mark)
     group.append(shape)
-    ElementTree.SubElement(group, f"{_SVG}path", {"d": way, "fill": "none", "stroke": "none", **ends})
+    ElementTree.SubElement(
+        group, f"{_SVG}path", {"d": way, "fill": "none", "stroke": "none", **ends}
+    )
 
 
 def _renumber(root: ElementTree.Element) -> None:
@@ -149,10 +191,19 @@ def _renumber(root: ElementTree.Element) -> None:
     names: dict[str, str] = {}
 
     def new_name(found: re.Match[str]) -> str:
-        return found[1] + (found[2] if "-" in found[2] else names.setdefault(found[2], f"n{len(names)}"))
+        return found[1] + (
+            found[2] if "-" in found[2] else names.setdefault(found[2], f"n{len(names)}")
+        )
 
     for each in root.iter():
-        for attribute in (f"{_XLINK}href", "clip-path", "style", "marker-start", "marker-mid", "marker-end"):
+        for attribute in (
+            f"{_XLINK}href",
+            "clip-path",
+            "style",
+            "marker-start",
+            "marker-mid",
+            "marker-end",
+        ):
             if "#" in (text := each.get(attribute, "")):
                 each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", new_name, text))
     for each in root.iter():

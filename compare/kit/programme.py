@@ -1,8 +1,8 @@
 """How protocols are carried out, and where their measurements are kept.
 
-A protocol is a function of a lab, the parameter sets, and what was measured before it; it yields measurements, and what
-it could not measure. To add one, write such a function and add a line to the `PROTOCOLS` of its subject.
-"""
+A protocol is a function of a lab, the parameter sets, and what was measured before it; it yields
+measurements, and what it could not measure. To add one, write such a function and add a line to the
+`PROTOCOLS` of its subject."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from model.files import make_directory
 DIRECTORY = "measurements"
 UNDAMPED = "without drag (c = 0 s-1) no motion settles, and nothing can be measured"
 LONGEST_WAIT = 3e4
-"""Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or more at a time; and
-contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as
-`omega_c` may be off in a state that counts as settled."""
+"""Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or
+more at a time; and contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c
+is three times that: as much as `omega_c` may be off in a state that counts as settled."""
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
 
 
@@ -43,9 +43,11 @@ class Protocol:
     """Protocols whose measurements it goes out from."""
     _: KW_ONLY
     cost: float = 1.0
-    """Processor time at the quick level, s on some machine: its part of the whole, and the most costly begin first."""
+    """Processor time at the quick level, s on some machine: its part of the whole, and the most
+    costly begin first."""
     first: bool = False
-    """Whether it is a single long run, which begins first: beside it there is work for the other workers."""
+    """Whether it is a single long run, which begins first: beside it there is work for the other
+    workers."""
     waits: bool = True
     """Whether it waits for motions to settle."""
     alone: str = ""
@@ -55,7 +57,8 @@ class Protocol:
     follows: bool = False
     """Whether an engine beside the one on trial looks where that one found something."""
     drawn: Callable[[Measurement], bool] = lambda m: False
-    """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is stored."""
+    """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is
+    stored."""
 
     @property
     def assignment(self) -> Assignment:
@@ -63,7 +66,8 @@ class Protocol:
         return ASSIGNMENTS.get(self.name, Assignment())
 
     def measures(self, lab: Lab) -> dict[str, Parameters]:
-        """The parameter sets that it measures at the level and with the engine of a lab, by name."""
+        """The parameter sets that it measures at the level and with the engine of a lab, by
+        name."""
         known, assignment, above = sets(lab.level), self.assignment, lab.level > Level.QUICK
         names: Iterable[str] = known if above else assignment.quick
         if lab.engine.role is Role.AS_IT_COMES:
@@ -73,7 +77,11 @@ class Protocol:
             names = tuple(known)[:most] if above else assignment.limit
             if lab.refine not in lab.engine.refine[: assignment.steps[above]]:
                 names = ()
-        return {name: p for name, p in known.items() if name in names and not (lab.is_witness and self.engine)}
+        return {
+            name: p
+            for name, p in known.items()
+            if name in names and not (lab.is_witness and self.engine)
+        }
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,8 @@ class Job:
 
     @property
     def name(self) -> str:
-        """The name of the protocol, and of the engine and its step where these are not those on trial."""
+        """The name of the protocol, and of the engine and its step where these are not those on
+        trial."""
         return self.beside(self.protocol.name) if self.lab.is_witness else self.protocol.name
 
     def beside(self, protocol: str) -> str:
@@ -107,11 +116,17 @@ class Job:
         if not self.lab.is_witness:
             return self.protocol.cost
         asked = len(self.protocol.measures(replace(self.lab, level=Level.QUICK)))
-        return self.protocol.cost * asked / max(len(self.protocol.assignment.quick), 1) * self.lab.refine
+        return (
+            self.protocol.cost
+            * asked
+            / max(len(self.protocol.assignment.quick), 1)
+            * self.lab.refine
+        )
 
     @property
     def file(self) -> Path:
-        """Where its measurements are kept: elsewhere for each engine, step, level, choice of sets, and program."""
+        """Where its measurements are kept: elsewhere for each engine, step, level, choice of sets,
+        and program."""
         engine = self.protocol.engine or self.lab.engine
         subject, measure, _ = self.protocol.measure.__module__.partition(".measure")
         identity = [
@@ -138,19 +153,24 @@ def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Pro
 
 
 def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
-    """Carry out protocols, some at once if they need nothing of each other; yield each as it ends, with its records.
+    """Carry out protocols, some at once if they need nothing of each other; yield each as it ends,
+    with its records.
 
-    A protocol that breaks down comes with its exception, and so do those that need it: what they measured without it
-    would be kept, and taken for whole the next time. Raises `StorageError` where files can't be read or written.
-    """
+    A protocol that breaks down comes with its exception, and so do those that need it: what they
+    measured without it would be kept, and taken for whole the next time. Raises `StorageError`
+    where files can't be read or written."""
     if not jobs:
         return
     known = {job.name: job for job in jobs}
     needs = {}
     for name, job in known.items():
-        needs[name] = [other if other in known else job.beside(other) for other in job.protocol.needs]
+        needs[name] = [
+            other if other in known else job.beside(other) for other in job.protocol.needs
+        ]
         needs[name] += [job.protocol.name] * (job.protocol.follows and name != job.protocol.name)
-    order = TopologicalSorter({name: [each for each in those if each in known] for name, those in needs.items()})
+    order = TopologicalSorter(
+        {name: [each for each in those if each in known] for name, those in needs.items()}
+    )
     order.prepare()
     found: dict[str, Records] = {}
     broken: dict[str, Exception] = {}
@@ -166,7 +186,9 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
                         future = Future[Records]()
                         future.set_exception(lost[0])
                     else:
-                        before = sum((found[other] for other in needs[job.name] if other in found), Records())
+                        before = sum(
+                            (found[other] for other in needs[job.name] if other in found), Records()
+                        )
                         future = pool.submit(carry_out, job, before)
                     running[future] = job.name
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -181,14 +203,17 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
                         broken[name] = error
                         yield known[name], error
         except BaseException:
-            workers.close(at_once=True)  # else the threads would wait for runs that nobody wants any more
+            workers.close(
+                at_once=True
+            )  # else the threads would wait for runs that nobody wants any more
             raise
 
 
 def carry_out(job: Job, before: Records) -> Records:
     """What a protocol measures after others; what is kept is not measured again.
 
-    Its measurement file is the record of what is done: once it is there, only the runs that a figure draws are kept.
+    Its measurement file is the record of what is done: once it is there, only the runs that a
+    figure draws are kept.
 
     Raises `StorageError` where measurements can't be read or written.
     """
@@ -211,13 +236,20 @@ def carry_out(job: Job, before: Records) -> Records:
         else:
             rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(path.parent)
-        about = {"protocol": protocol.name, "engine": lab.engine.name, "step": lab.refine, "level": lab.level.name}
+        about = {
+            "protocol": protocol.name,
+            "engine": lab.engine.name,
+            "step": lab.refine,
+            "level": lab.level.name,
+        }
         place = f"{campaign.directory.name}/{label}.h5"
         for k, row in enumerate(rows):
             if isinstance(row, Measurement) and protocol.drawn(row) and not lab.is_witness:
                 rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         records = Records.of(rows)
-        campaign.keep({run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
+        campaign.keep(
+            {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run}
+        )
         record.save(records, path, about)
     campaign.reduce()
     return record.load(path)

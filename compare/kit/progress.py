@@ -1,4 +1,5 @@
-"""How far a program is: one live line on a terminal, a plain line every ten seconds elsewhere, nothing when quiet."""
+"""How far a program is: one live line on a terminal, a plain line every ten seconds elsewhere,
+nothing when quiet."""
 
 from __future__ import annotations
 
@@ -11,7 +12,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from compare.kit.workers import Spread
 
@@ -20,7 +28,8 @@ INTERVAL = 10.0
 DRAWING = 0.1
 """Share of a validation's time that drawing its figures takes, about."""
 Show = Callable[[str, int, int, int], None]
-"""Called with what is being done, in words, how much of it is done, of how much in all, and how much failed."""
+"""Called with what is being done, in words, how much of it is done, of how much in all, and how
+much failed."""
 
 
 def show_nothing(what: str, done: int, total: int, failed: int) -> None:
@@ -29,7 +38,8 @@ def show_nothing(what: str, done: int, total: int, failed: int) -> None:
 
 @contextmanager
 def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
-    """Yield a function that shows progress on standard error, which is never silent for longer than `INTERVAL`.
+    """Yield a function that shows progress on standard error, which is never silent for longer than
+    `INTERVAL`.
 
     `counted` if what is done are runs, whose number is to be shown, too.
     """
@@ -37,7 +47,9 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         yield show_nothing
     elif counted:
         with reporter() as show:
-            yield lambda what, done, total, failed: show(f"{what}: {done} of {total} runs", done, total, failed)
+            yield lambda what, done, total, failed: show(
+                f"{what}: {done} of {total} runs", done, total, failed
+            )
     elif sys.stderr.isatty():
         times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
         columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), *times
@@ -64,10 +76,16 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
             while not ended.wait(INTERVAL):
                 what, done, total, failed = last
                 rate = (time.monotonic() - began) / (done - before) if done > before >= 0 else 0.0
-                left = f", about {rate * (total - done):.0f} s to go" if rate and total > done else ""
+                left = (
+                    f", about {rate * (total - done):.0f} s to go" if rate and total > done else ""
+                )
                 share = f", {done / total:.0%}" if total else ""
                 bad = f", {failed} failed" if failed else ""
-                print(f"{time.monotonic() - began:.0f} s: {what}{share}{bad}{left}", file=sys.stderr, flush=True)
+                print(
+                    f"{time.monotonic() - began:.0f} s: {what}{share}{bad}{left}",
+                    file=sys.stderr,
+                    flush=True,
+                )
 
         thread = threading.Thread(target=print_progress, daemon=True)
         thread.start()
@@ -92,7 +110,8 @@ class ValidationProgress:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def measuring(self, protocol: str, done: int, total: int, failed: int) -> None:
-        """Note how many runs of a protocol are done, how many are known so far, and how many failed."""
+        """Note how many runs of a protocol are done, how many are known so far, and how many
+        failed."""
         with self._lock:
             self._under_way[protocol] = done, total, failed
             self._tell()
@@ -117,7 +136,9 @@ class ValidationProgress:
             todo = list(items)
             for k, result in enumerate(over(one, todo)):
                 left = DRAWING * (1 - (k + 1) / len(todo))
-                self.show(f"drawing figures: {k + 1} of {len(todo)}", round(1000 * (1 - left)), 1000, 0)
+                self.show(
+                    f"drawing figures: {k + 1} of {len(todo)}", round(1000 * (1 - left)), 1000, 0
+                )
                 yield result
 
         self.show("drawing figures", round(1000 * (1 - DRAWING)), 1000, 0)
@@ -128,4 +149,9 @@ class ValidationProgress:
         runs = [f"{name} {done}/{total}" for name, (done, total, _) in self._under_way.items()]
         what = f"{self._judged} of {self.claims} claims judged; measuring {', '.join(runs)}"
         all_, done = sum(self.costs.values()), (1 - DRAWING) * self._measured
-        self.show(what, round(1000 * done / (all_ or 1.0)), 1000, sum(bad for *_, bad in self._under_way.values()))
+        self.show(
+            what,
+            round(1000 * done / (all_ or 1.0)),
+            1000,
+            sum(bad for *_, bad in self._under_way.values()),
+        )

@@ -1,34 +1,43 @@
-"""What is measured: every quantity with its symbol, unit, and the resolving power that a check of it must have.
+"""What is measured: every quantity with its symbol, unit, and the resolving power that a check of
+it must have.
 
-A check resolves r if it would notice a prediction that is off by r times the quantity's scale, see `compare.claim`. A
-check that resolves less than `Quantity.resolves` is inconclusive, however well the numbers agree. These ceilings follow
-from the errors of each protocol at its quick level:
+A check resolves r if it would notice a prediction that is off by r times the quantity's scale, see
+`compare.claim`. A check that resolves less than `Quantity.resolves` is inconclusive, however well
+the numbers agree. These ceilings follow from the errors of each protocol at its quick level:
 
-* settled states don't depend on the time step: what is left is their drift, which is waited for down to 1e-8. A slip is
-  a difference of spins ten times its size, a force one of accelerations;
-* a threshold is bracketed, or extrapolated from settled states as near to it as their settling allows;
-* on the edge between two attractors the oscillation has died out to 1e-4 of the spin, three times which is to be
-  resolved; a ball that is pushed leaves the floor within a time step, seen from its height of tenths of a millimetre;
-* the direction of friction is that of the slip somewhere within a step, and the speed of a landing is uncertain by the
-  fall within a step: about a thousandth of either;
-* hops have errors of second order in the step h, (omega_0 h)^2/24 = 5e-5 for the coarser one, three quarters of which
-  is its difference from the finer. A disturbance shrinks by a tenth a hop, so that errors add up to ten times as much:
-  4e-4. A step of the flow by 4e-2 has shrunk to a hundredth when hops are measured: 4e-4. Three times both are 1.7e-3
-  of omega_c; sixteen times as much, 2.7e-2, of the height, since hops are lowest at a sixteenth of a flow above their
-  onset; half as much as that of the period, which goes with the root of the height. A multiplier comes from the ten
-  hops in which a disturbance is neither too large nor lost in errors. It rises by half of the relative change of eta:
-  known to 4e-3, it gives the eta at which it is 1 to 8e-3, three times which is to be resolved;
-* motions to their ends are compared at two time steps, to a thousandth of what gravity does in the unit of time;
-* pulsations and jumps are compared at two time steps, to a thousandth. The onset of slip is bracketed to that, and slip
-  begins within a time step, a few hundredths of a period, near a maximum; the mean reading and the flow by which a ramp
-  passes a fold are small differences of flows;
-* a contact rolls once friction can stop its slip within a step: at g h, 1/160 of sqrt(g R) at quick;
-* rates and growths come from short records and carry the error of a time step, a few tenths of a percent.
+* settled states don't depend on the time step: what is left is their drift, which is waited for
+  down to 1e-8. A slip is a difference of spins ten times its size, a force one of accelerations;
+* a threshold is bracketed, or extrapolated from settled states as near to it as their settling
+  allows;
+* on the edge between two attractors the oscillation has died out to 1e-4 of the spin, three times
+  which is to be resolved; a ball that is pushed leaves the floor within a time step, seen from its
+  height of tenths of a millimetre;
+* the direction of friction is that of the slip somewhere within a step, and the speed of a landing
+  is uncertain by the fall within a step: about a thousandth of either;
+* hops have errors of second order in the step h, (omega_0 h)^2/24 = 5e-5 for the coarser one, three
+  quarters of which is its difference from the finer. A disturbance shrinks by a tenth a hop, so
+  that errors add up to ten times as much: 4e-4. A step of the flow by 4e-2 has shrunk to a
+  hundredth when hops are measured: 4e-4. Three times both are 1.7e-3 of omega_c; sixteen times as
+  much, 2.7e-2, of the height, since hops are lowest at a sixteenth of a flow above their onset;
+  half as much as that of the period, which goes with the root of the height. A multiplier comes
+  from the ten hops in which a disturbance is neither too large nor lost in errors. It rises by half
+  of the relative change of eta: known to 4e-3, it gives the eta at which it is 1 to 8e-3, three
+  times which is to be resolved;
+* motions to their ends are compared at two time steps, to a thousandth of what gravity does in the
+  unit of time;
+* pulsations and jumps are compared at two time steps, to a thousandth. The onset of slip is
+  bracketed to that, and slip begins within a time step, a few hundredths of a period, near a
+  maximum; the mean reading and the flow by which a ramp passes a fold are small differences of
+  flows;
+* a contact rolls once friction can stop its slip within a step: at g h, 1/160 of sqrt(g R) at
+  quick;
+* rates and growths come from short records and carry the error of a time step, a few tenths of a
+  percent.
 
-Moved after results had been seen, with the reasons above found then: those of hops, four times in a day (their period
-2e-2, 4e-2, 2e-3, 2e-2, 1.5e-2; omega_c 2e-2, 4e-2, 2e-3, 2e-2, 2e-3; height 2e-1, 2e-2, 3e-2; multiplier 0.1, 0.25);
-and that of laws in motion, 1e-3 of the median sample, now 6e-3 of the worst.
-"""
+Moved after results had been seen, with the reasons above found then: those of hops, four times in a
+day (their period 2e-2, 4e-2, 2e-3, 2e-2, 1.5e-2; omega_c 2e-2, 4e-2, 2e-3, 2e-2, 2e-3; height 2e-1,
+2e-2, 3e-2; multiplier 0.1, 0.25); and that of laws in motion, 1e-3 of the median sample, now 6e-3
+of the worst."""
 
 from __future__ import annotations
 
@@ -47,22 +56,35 @@ class Quantity:
     unit: str
     """SI, as in the HDF5 files."""
     resolves: float
-    """Largest error of a prediction, divided by the scale of the quantity, that a check may overlook."""
+    """Largest error of a prediction, divided by the scale of the quantity, that a check may
+    overlook."""
 
 
 _TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
-_RATES = [(name, name, "m s-1") for name in ("v_y", "v_h")] + [(*turn, "rad s-1") for turn in _TURNS.items()]
+_RATES = [(name, name, "m s-1") for name in ("v_y", "v_h")] + [
+    (*turn, "rad s-1") for turn in _TURNS.items()
+]
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
-_FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}  # determined where both contacts roll
+_FORCES |= {
+    "Ax-By": "A_x − B_y",
+    "Ay+By": "A_y + B_y",
+    "Bx+By": "B_x + B_y",
+}  # determined where both contacts roll
 _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),
-    *(Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6) for n, symbol in _TURNS.items()),
+    *(
+        Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6)
+        for n, symbol in _TURNS.items()
+    ),
     Quantity("wall_spin", "ω_x⁰", "rad s-1", 1e-6),
     Quantity("v_y", "v_y", "m s-1", 1e-6),
     Quantity("y", "y", "m", 1e-2),
     *(Quantity(f"force_{name}", symbol, "N", 1e-5) for name, symbol in _FORCES.items()),
-    *(Quantity(f"moving_force_{name}", f"{symbol} in motion", "N", 5e-3) for name, symbol in _FORCES.items()),
+    *(
+        Quantity(f"moving_force_{name}", f"{symbol} in motion", "N", 5e-3)
+        for name, symbol in _FORCES.items()
+    ),
     Quantity("decay_rate", "−Re λ", "s-1", 2e-2),
     Quantity("slowest_decay", "slowest −Re λ < 0", "s-1", 2e-2),
     Quantity("frequency", "Im λ", "rad s-1", 2e-2),
@@ -75,11 +97,20 @@ _ALL = (
     Quantity("gamma_slope", "dγ/dω₀", "s-1", 2e-2),
     Quantity("gamma_zero_square", "ω₀² at γ = 0", "rad2 s-2", 2e-2),
     Quantity("gamma_slope_square", "dγ/d(ω₀²)", "rad-1", 2e-2),
-    *(Quantity(f"rate_{name}", f"d{symbol}/dt", unit.replace("-1", "-2"), 5e-3) for name, symbol, unit in _RATES),
+    *(
+        Quantity(f"rate_{name}", f"d{symbol}/dt", unit.replace("-1", "-2"), 5e-3)
+        for name, symbol, unit in _RATES
+    ),
     *(Quantity(f"after_{name}", f"{symbol} after", unit, 5e-2) for name, symbol, unit in _RATES),
     Quantity("rebounds", "landings that rebound", "1", 0.0),
-    *(Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4) for k in range(1, 5)),
-    *(Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3) for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()),
+    *(
+        Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4)
+        for k in range(1, 5)
+    ),
+    *(
+        Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3)
+        for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()
+    ),
     Quantity("lifts", "leaves the floor", "1", 0.0),
     Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),
     Quantity("critical_drag", "c at η = η_cr", "s-1", 4e-3),
@@ -91,7 +122,10 @@ _ALL = (
     Quantity("time", "t", "s", 1e-2),
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
-    *(Quantity(f"end_{n}", f"{s} at the end", u, 5e-3) for n, s, u in (("y", "y", "m"), ("h", "h", "m"), *_RATES)),
+    *(
+        Quantity(f"end_{n}", f"{s} at the end", u, 5e-3)
+        for n, s, u in (("y", "y", "m"), ("h", "h", "m"), *_RATES)
+    ),
     Quantity("orbit_period", "period", "s", 1.5e-2),
     Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-3),
     Quantity("orbit_height", "height of the hops", "m", 3e-2),

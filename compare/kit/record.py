@@ -1,10 +1,10 @@
 """Measurements as data, the file that keeps them, and a measured number beside a predicted one.
 
-A measurement is a number with its standard uncertainty and all that it belongs to: what was measured, by which engine,
-with which parameters, under which named conditions, in which runs. Labels and sentences are made from it and never
-read back. A file holds the measurements of one protocol as columns, one row a measurement: it opens with
-``xarray.open_dataset(path, engine="h5netcdf").to_dataframe()``.
-"""
+A measurement is a number with its standard uncertainty and all that it belongs to: what was
+measured, by which engine, with which parameters, under which named conditions, in which runs.
+Labels and sentences are made from it and never read back. A file holds the measurements of one
+protocol as columns, one row a measurement: it opens with ``xarray.open_dataset(path,
+engine="h5netcdf").to_dataframe()``."""
 
 from __future__ import annotations
 
@@ -57,7 +57,10 @@ class Measurement:
 
     def __post_init__(self) -> None:
         quantity(self.quantity)
-        for name in ("value", "uncertainty"):  # whole numbers and numpy's come back from a file as floats
+        for name in (
+            "value",
+            "uncertainty",
+        ):  # whole numbers and numpy's come back from a file as floats
             object.__setattr__(self, name, float(getattr(self, name)))
 
     def at(self, name: str) -> float:
@@ -96,8 +99,13 @@ def measurement(
 
 
 def if_found(row: Measurement, why: str) -> Measurement | Missing:
-    """The measurement if it has a finite number, however coarse; else a `Missing` with the reason."""
-    return row if np.isfinite([row.value, row.uncertainty]).all() else Missing(row.protocol, row.set, why)
+    """The measurement if it has a finite number, however coarse; else a `Missing` with the
+    reason."""
+    return (
+        row
+        if np.isfinite([row.value, row.uncertainty]).all()
+        else Missing(row.protocol, row.set, why)
+    )
 
 
 def state_of(x: Array) -> dict[str, float]:
@@ -144,7 +152,8 @@ class Check:
 
     @property
     def share(self) -> float:
-        """Size of the deviation divided by the tolerance; inf without tolerance, or where theory has no such state."""
+        """Size of the deviation divided by the tolerance; inf without tolerance, or where theory
+        has no such state."""
         if self.deviation == 0:
             return 0.0
         share = abs(self.deviation / self.tolerance) if self.tolerance else math.inf
@@ -152,7 +161,8 @@ class Check:
 
     @property
     def resolves(self) -> float:
-        """The smallest relative error of the prediction that this check would notice: its resolving power."""
+        """The smallest relative error of the prediction that this check would notice: its resolving
+        power."""
         return self.tolerance / self.scale if self.scale else math.inf
 
     @property
@@ -163,7 +173,9 @@ class Check:
     @property
     def conclusive(self) -> bool:
         """Whether the check resolves as much as its quantity asks for."""
-        ceiling = quantity(self.measurement.quantity).resolves if self.ceiling is None else self.ceiling
+        ceiling = (
+            quantity(self.measurement.quantity).resolves if self.ceiling is None else self.ceiling
+        )
         return self.resolves <= ceiling
 
 
@@ -204,28 +216,35 @@ class Records:
         return (*self.measurements, *self.missing)
 
     def select(
-        self, protocol: str, quantity: str | None = None, where: Callable[[Measurement], bool] = lambda m: True
+        self,
+        protocol: str,
+        quantity: str | None = None,
+        where: Callable[[Measurement], bool] = lambda m: True,
     ) -> Iterator[Measurement]:
-        """The measurements of a protocol, of one quantity if it is named, for which `where` holds."""
+        """The measurements of a protocol, of one quantity if it is named, for which `where`
+        holds."""
         for m in self.measurements:
             if m.protocol == protocol and quantity in (None, m.quantity) and where(m):
                 yield m
 
     def threshold(self, set: str, quantity: str) -> Measured | None:
-        """The least uncertain measured value of a threshold of a set; None if it was not measured."""
+        """The least uncertain measured value of a threshold of a set; None if it was not
+        measured."""
         measured = self.select("thresholds", quantity, lambda m: m.set == set)
         best = min(measured, key=lambda m: m.uncertainty, default=None)
         return Measured(best.value, best.uncertainty) if best else None
 
 
 RecordsByEngine = Mapping[str, Mapping[int, Records]]
-"""What was measured by each engine, by name, the one on trial first; by time steps in one that a protocol asks for."""
+"""What was measured by each engine, by name, the one on trial first; by time steps in one that a
+protocol asks for."""
 _OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set")
 _PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
 
 
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
-    """Write records, whole or not at all; `about` says what they are (JSON-able). Raises `StorageError`.
+    """Write records, whole or not at all; `about` says what they are (JSON-able). Raises
+    `StorageError`.
 
     A condition that a row doesn't have is nan, or empty where it is text.
     """
@@ -254,21 +273,31 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
 def load(path: Path) -> Records:
     """Read what `save` wrote.
 
-    Raises `StorageError`, naming the file, if it is missing, damaged, cut, changed, or of another version.
-    """
+    Raises `StorageError`, naming the file, if it is missing, damaged, cut, changed, or of another
+    version."""
     with reading(path) as file:
         if file.attrs.get("schema") != SCHEMA or file.attrs.get("schema_version") != SCHEMA_VERSION:
             raise StorageError("it does not hold measurements in this program's format")
         columns = {name: column(dataset(file, name)).tolist() for name in file}
-        parameters = functools.cache(lambda *values: Parameters(**dict(zip(_PARAMETERS, values, strict=True))))
+        parameters = functools.cache(
+            lambda *values: Parameters(**dict(zip(_PARAMETERS, values, strict=True)))
+        )
         rows = []
         for k in range(len(columns["value"])):
-            conditions = {name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")}
+            conditions = {
+                name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")
+            }
             row = Measurement(
                 **{name: columns[name][k] for name in _OWN if name != "unit"},
                 runs=tuple(columns["runs"][k].split()),
                 parameters=parameters(*(columns[name][k] for name in _PARAMETERS)),
-                conditions={name: value for name, value in conditions.items() if value != "" and value == value},
+                conditions={
+                    name: value
+                    for name, value in conditions.items()
+                    if value != "" and value == value
+                },
             )
             rows.append(row)
-        return Records(tuple(rows), tuple(Missing(**each) for each in json.loads(file.attrs["missing"])))
+        return Records(
+            tuple(rows), tuple(Missing(**each) for each in json.loads(file.attrs["missing"]))
+        )

@@ -1,8 +1,8 @@
-"""Runs until they are settled, by their own drift; what a settled state is, and how sure each of its numbers is.
+"""Runs until they are settled, by their own drift; what a settled state is, and how sure each of
+its numbers is.
 
-The oscillation of a ball on the wall dies out slowly or, while it sinks, not at all; a mean over a tapered window is
-free of it. Three overlapping windows show how far the mean still drifts.
-"""
+The oscillation of a ball on the wall dies out slowly or, while it sinks, not at all; a mean over a
+tapered window is free of it. Three overlapping windows show how far the mean still drifts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from model.arrays import Array
 from model.drag import STOKES
 
 PRESSES = 0.05
-"""Normal force divided by the weight above which friction is looked at: a contact that carries less may hover."""
+"""Normal force divided by the weight above which friction is looked at: a contact that carries less
+may hover."""
 SPIN = 1.0
 """Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
 SPAN = 40.0
@@ -31,17 +32,26 @@ SPAN = 40.0
 LONGEST = 2.0
 """Length of the longest round in units of `SPAN`."""
 SHORT = (1 / 64, 1 / 8)
-"""Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle sooner. The drift
-limit of such a round is reduced in proportion to its length."""
+"""Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle
+sooner. The drift limit of such a round is reduced in proportion to its length."""
 STEPS_A_SAMPLE = 8
-"""A coarse time step is a twentieth of sqrt(R/g) or so, and the ball goes round in more than that."""
+"""A coarse time step is a twentieth of sqrt(R/g) or so, and the ball goes round in more than
+that."""
 SOLVED = 1e-12
-"""Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a time 1/c."""
+"""Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a
+time 1/c."""
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
-"""What mechanics determine of the forces where both contacts roll: the rest is a family of one parameter."""
-ERROR_GROUPS = (("omega_c",), ("slip_x", "slip_y", "slip_z", "wall_spin"), ("v_y",), (*FORCES, *SUMS[2:]))
-"""Quantities whose errors have the same causes, and are taken to be as large as the largest of them."""
+"""What mechanics determine of the forces where both contacts roll: the rest is a family of one
+parameter."""
+ERROR_GROUPS = (
+    ("omega_c",),
+    ("slip_x", "slip_y", "slip_z", "wall_spin"),
+    ("v_y",),
+    (*FORCES, *SUMS[2:]),
+)
+"""Quantities whose errors have the same causes, and are taken to be as large as the largest of
+them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +78,8 @@ class Patience:
     span: float = SPAN
     """Length of a round in units of 1/c."""
     loose: float = 1.0
-    """A settled state may drift and swing up to so many times the limit for values that are compared with theory."""
+    """A settled state may drift and swing up to so many times the limit for values that are
+    compared with theory."""
     sharp: float = math.inf
     """As long as there are rounds, one that exceeds so many times that limit goes on."""
     rounds: Sequence[float] = ()
@@ -78,10 +89,9 @@ class Patience:
 def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -> list[Settled]:
     """Run the ball from each start until it is settled; the states, in order.
 
-    Of an engine as it comes every state counts, for what it is when time is up.
-    What isn't settled goes on from its mean, but at the height from which it started: the motion of a ball on the wall
-    alone does not depend on its height, and one that sinks must not land.
-    """
+    Of an engine as it comes every state counts, for what it is when time is up. What isn't settled
+    goes on from its mean, but at the height from which it started: the motion of a ball on the wall
+    alone does not depend on its height, and one that sinks must not land."""
     span, loose = patience.span, math.inf if lab.engine.allowance else patience.loose
     rounds, steps = patience.rounds or lab.effort.settling_rounds, lab.effort.settling_steps
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
@@ -92,7 +102,9 @@ def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -
         for n, start in todo.items():
             step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0), steps)
             samples = round(t_end / (STEPS_A_SAMPLE * step))
-            tasks.append(lab.task(start.p, start.x0, t_end, step / patience.refine, samples=samples))
+            tasks.append(
+                lab.task(start.p, start.x0, t_end, step / patience.refine, samples=samples)
+            )
         under_way, todo = list(todo), {}
         for n, task, run in zip(under_way, tasks, lab.each(tasks), strict=True):
             start = starts[n]
@@ -102,7 +114,8 @@ def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -
             state = states[n] = judge_run(start, task, run, loose)
             part = task.t_end / duration(start.p, span, steps)
             if left[n] and state.excess > min(part, 1.0) * min(loose, patience.sharp):
-                # A part of a round may end on the way to where the ball settles: it goes on as it is.
+                # A part of a round may end on the way to where the ball settles: it goes on as it
+                # is.
                 x = State.of(run.x[-1] if part < 1 else state.mean)
                 if part >= 1 and state.case.A is Contact.N:
                     x = x._replace(y=max(State.of(start.x0).y, 0.0))
@@ -123,14 +136,16 @@ def settle_groups(
 def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
     """The state to which a run has settled, or why it has not; `loose` as in `Patience`.
 
-    A run is settled once its drift lets each check resolve twice as much as it should, with no quantity swinging by
-    more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows the one that
-    drifts less counts: half of the run for what oscillates, an eighth for what only decays.
-    """
+    A run is settled once its drift lets each check resolve twice as much as it should, with no
+    quantity swinging by more than a thousandth of its scale, in a window with 98 % of its samples
+    in one case. Of two windows the one that drifts less counts: half of the run for what
+    oscillates, an eighth for what only decays."""
     p = start.p
     series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
     series["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
-    series |= {f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()}
+    series |= {
+        f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()
+    }
     rows = np.stack([*series.values(), *run.x.T])
     solved = SOLVED / (p.c * coarse_step(p))
     states = []
@@ -139,16 +154,22 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
         case = Case(int(counts.argmax()))
         means, drifts = steady_mean(rows, length)
         mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
-        # Where both contacts roll only sums of forces are determined; nothing but the wall turns a ball about the
-        # vertical.
+        # Where both contacts roll only sums of forces are determined; nothing but the wall turns a
+        # ball about the vertical.
         free = {"slip_y"} if case.B is Contact.N else set[str]()
         free |= set(FORCES) - set(SUMS) if case is Case.RR else set(SUMS) - set(FORCES)
         groups = [[q for q in group if q not in free] for group in ERROR_GROUPS]
-        worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
+        worst = {
+            q: max(drift[each] / scale(each, p) for each in group)
+            for group in groups
+            for q in group
+        }
         values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
         swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
         drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
-        solving = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
+        solving = max(
+            COVERAGE * solved / quantity(q).resolves for q in worst
+        )  # the same however long a run is
         excess, failure = max(drifting, swings / 1e-3), ""
         if counts.max() < 0.98 * length and loose < math.inf:
             excess = math.inf
@@ -160,7 +181,9 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
     return min(states, key=lambda state: state.excess)
 
 
-def settled_readings(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterator[Measurement | Missing]:
+def settled_readings(
+    lab: Lab, protocol: str, starts: Sequence[Start]
+) -> Iterator[Measurement | Missing]:
     """Case and omega_c to which the ball settles from each start."""
     for start, settled in zip(starts, settle(lab, starts), strict=True):
         if settled.failure:
@@ -171,10 +194,11 @@ def settled_readings(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterat
 
 
 def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
-    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the wall swings.
+    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the
+    wall swings.
 
-    A whole multiple of so many coarse time steps: chosen when alike runs shared a batch, as is `rounded_duration`.
-    """
+    A whole multiple of so many coarse time steps: chosen when alike runs shared a batch, as is
+    `rounded_duration`."""
     unit = steps * coarse_step(p)
     turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
     return unit * math.ceil(max(span / p.c, turns) / unit)
@@ -191,9 +215,15 @@ def rounded_duration(p: Parameters, units: float) -> float:
 
 
 def named_start(set: str, p: Parameters, how: str) -> Start:
-    """A start at the flow of p by its name: from rest, with the fluid or half as fast, or so high up on the wall."""
+    """A start at the flow of p by its name: from rest, with the fluid or half as fast, or so high
+    up on the wall."""
     orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
-    return Start(set, p, how, State(y=safe_height(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked())
+    return Start(
+        set,
+        p,
+        how,
+        State(y=safe_height(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked(),
+    )
 
 
 def rotation_scale(p: Parameters) -> float:
@@ -211,7 +241,8 @@ def scale(name: str, p: Parameters) -> float:
 
 
 def forces(A: Array, B: Array) -> dict[str, Array]:
-    """Components of contact forces (3, ...) by name, and the sums of them that the balances determine in every case."""
+    """Components of contact forces (3, ...) by name, and the sums of them that the balances
+    determine in every case."""
     components = dict(zip(("Ax", "Ay", "Az", "Bx", "By", "Bz"), (*A, *B), strict=True))
     return components | {"Ax-By": A[0] - B[1], "Ay+By": A[1] + B[1], "Bx+By": B[0] + B[1]}
 
@@ -222,6 +253,9 @@ def physical_case(case: Case) -> Case:
 
 
 def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
-    """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest first."""
-    found = records.select("settled", "case", lambda m: m.set == set and m.conditions["start"] == how)
+    """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest
+    first."""
+    found = records.select(
+        "settled", "case", lambda m: m.set == set and m.conditions["start"] == how
+    )
     return dict(sorted((m.parameters.omega_0, physical_case(Case(int(m.value)))) for m in found))

@@ -1,4 +1,5 @@
-"""Numbers with uncertainties: window means and peaks of sampled runs, curves through points; numbers as JSON has them.
+"""Numbers with uncertainties: window means and peaks of sampled runs, curves through points;
+numbers as JSON has them.
 
 Of curves: values, slopes, zeros and maxima of polynomials, and exponents of linear motions.
 """
@@ -20,7 +21,8 @@ from model.arrays import Array
 COVERAGE = 3.0
 """Standard uncertainties in a tolerance."""
 TAPER = 8
-"""Exponent of the sine that the window is: m periods within it leave about (TAPER/2)!^2/(pi m^(TAPER+1)) of one."""
+"""Exponent of the sine that the window is: m periods within it leave about (TAPER/2)!^2/(pi
+m^(TAPER+1)) of one."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,8 @@ class Measured:
 
 
 def plain(value: Any) -> Any:
-    """Nested data as JSON holds it: dataclasses as mappings, arrays as lists, a case by its name, complex as a pair.
+    """Nested data as JSON holds it: dataclasses as mappings, arrays as lists, a case by its name,
+    complex as a pair.
 
     Of numbers that are not finite None is left.
     """
@@ -57,15 +60,17 @@ def taper(length: int) -> Array:
 
 
 def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
-    """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its limit; both (k,).
+    """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its
+    limit; both (k,).
 
-    From three windows, each a quarter of its length later than the one before: what is left of an approach by a
-    constant ratio, plus the last change itself.
-    """
+    From three windows, each a quarter of its length later than the one before: what is left of an
+    approach by a constant ratio, plus the last change itself."""
     weights = taper(length)
     weights /= weights.sum()
     n, shift = values.shape[1], length // 4
-    first, second, last = (values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0))
+    first, second, last = (
+        values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0)
+    )
     before, after = np.abs(second - first), np.abs(last - second)
     ratio = np.minimum(np.divide(after, before, out=np.zeros_like(after), where=before > 0), 0.9)
     return last, after / (1 - ratio)
@@ -82,7 +87,8 @@ def settled_case(run: Trajectory) -> Case:
 
 
 def peaks(values: Array) -> tuple[npt.NDArray[np.intp], Array]:
-    """Local maxima of samples (n,): their indices, and how much later, in samples, the parabolas have their tops."""
+    """Local maxima of samples (n,): their indices, and how much later, in samples, the parabolas
+    have their tops."""
     k = 1 + np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:]))
     before, at, after = values[k - 1], values[k], values[k + 1]
     return k, (before - after) / (2 * (before - 2 * at + after))
@@ -99,11 +105,11 @@ def hops(run: Trajectory, share: float = 1 / 3) -> bool:
 
 
 def hops_on(y: Array, R: float) -> bool:
-    """Whether heights at samples are those of hops: twice near the floor, and high above it in between.
+    """Whether heights at samples are those of hops: twice near the floor, and high above it in
+    between.
 
-    High is more than half as high as the highest sample, near less than a fifth: every tenth sample of a hop is so low.
-    What stays below 1e-4 R doesn't hop.
-    """
+    High is more than half as high as the highest sample, near less than a fifth: every tenth sample
+    of a hop is so low. What stays below 1e-4 R doesn't hop."""
     highest = y.max()
     near = np.flatnonzero(y < highest / 5)
     if highest < 1e-4 * R or not len(near):
@@ -112,28 +118,36 @@ def hops_on(y: Array, R: float) -> bool:
 
 
 POINTS = 5
-"""Least number of points that `extrapolated_zero`, `initial_slope` and `extrapolated_maximum` extrapolate from."""
+"""Least number of points that `extrapolated_zero`, `initial_slope` and `extrapolated_maximum`
+extrapolate from."""
 LEAST_RATIO, LARGEST_RATIO = 0.2, 0.9
-"""Range of the ratio of the geometric series by which the changes of an estimate, point by point, are continued: two
-changes may be small by chance, and with a ratio near 1 the sum has no bound."""
+"""Range of the ratio of the geometric series by which the changes of an estimate, point by point,
+are continued: two changes may be small by chance, and with a ratio near 1 the sum has no bound."""
 FAR = 10.0
-"""Largest distance of a maximum from the nearest point, divided by the length of the row of points: farther away the
-maximum is one of round-off."""
+"""Largest distance of a maximum from the nearest point, divided by the length of the row of points:
+farther away the maximum is one of round-off."""
 
 
 def slope_error(x: Array, degree: int) -> float:
-    """Standard uncertainty of the slope at 0 of the polynomial through points x (n,), if that of each y is 1."""
+    """Standard uncertainty of the slope at 0 of the polynomial through points x (n,), if that of
+    each y is 1."""
     return float(np.linalg.norm(np.linalg.pinv(np.vander(x, degree + 1, increasing=True))[1]))
 
 
-def straight_line(x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike) -> tuple[Measured, Measured]:
-    """Zero and slope of the line through points x, y (n,) whose y have the standard uncertainties `noise`.
+def straight_line(
+    x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike
+) -> tuple[Measured, Measured]:
+    """Zero and slope of the line through points x, y (n,) whose y have the standard uncertainties
+    `noise`.
 
-    The uncertainties are those of the points carried over, and the scatter about the line where that is larger.
-    """
+    The uncertainties are those of the points carried over, and the scatter about the line where
+    that is larger."""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    weight = np.maximum(np.broadcast_to(noise, y.shape), np.finfo(float).eps * np.abs(y).max()) ** -2.0
-    # About the weighted mean, height and slope are independent of each other, and one point may outweigh all others.
+    weight = (
+        np.maximum(np.broadcast_to(noise, y.shape), np.finfo(float).eps * np.abs(y).max()) ** -2.0
+    )
+    # About the weighted mean, height and slope are independent of each other, and one point may
+    # outweigh all others.
     x0, y0 = np.average(x, weights=weight), np.average(y, weights=weight)
     spread = np.sum(weight * (x - x0) ** 2)
     slope = np.sum(weight * (x - x0) * (y - y0)) / spread
@@ -147,7 +161,8 @@ def straight_line(x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike) -> t
 
 
 def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured]:
-    """Zero of the polynomial through all points x, y (n,), and its slope there; nan without one zero between them.
+    """Zero of the polynomial through all points x, y (n,), and its slope there; nan without one
+    zero between them.
 
     Uncertain by the noise of every y, and a third of what the last degree changes.
     """
@@ -155,7 +170,9 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured
     def fitted(values: Array, degree: int) -> Array:
         fit = Polynomial.fit(x, values, degree)
         zeros = [zero for zero in _real_roots(fit) if x.min() < zero < x.max()]
-        return np.array([zeros[0], fit.deriv()(zeros[0])] if len(zeros) == 1 else [math.nan, math.nan])
+        return np.array(
+            [zeros[0], fit.deriv()(zeros[0])] if len(zeros) == 1 else [math.nan, math.nan]
+        )
 
     degree = len(x) - 1
     best = fitted(y, degree)
@@ -166,18 +183,28 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured
 
 
 def extrapolated_zero(where: Array, values: Sequence[Measured]) -> Measured:
-    """The place at which a quantity is zero, from places (n,) and its values there, the one nearest to zero first."""
-    return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0)), values)
+    """The place at which a quantity is zero, from places (n,) and its values there, the one nearest
+    to zero first."""
+    return _extrapolated(
+        lambda y, n: float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0)), values
+    )
 
 
 def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:
-    """Derivative of the place with respect to a quantity where that is zero; arguments as for `extrapolated_zero`."""
+    """Derivative of the place with respect to a quantity where that is zero; arguments as for
+    `extrapolated_zero`."""
     size = max(abs(m.value) for m in values)
-    return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size, values)
+    return _extrapolated(
+        lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size,
+        values,
+    )
 
 
-def extrapolated_maximum(where: Array, values: Sequence[Measured], others: Array | None = None) -> Measured:
-    """The maximum of the place as a function of a quantity, whose value nearest to it is the first; nan without one.
+def extrapolated_maximum(
+    where: Array, values: Sequence[Measured], others: Array | None = None
+) -> Measured:
+    """The maximum of the place as a function of a quantity, whose value nearest to it is the first;
+    nan without one.
 
     Or what another quantity is there, with its values `others` at the places.
     """
@@ -185,7 +212,9 @@ def extrapolated_maximum(where: Array, values: Sequence[Measured], others: Array
     def maximum(y: Array, n: int) -> float:
         y = y[:n] / np.abs(y).max()
         fit = Polynomial.fit(y, where[:n], n - 1)
-        beyond = [root for root in _real_roots(fit.deriv()) if 0 < (root - y[0]) / (y[0] - y[-1]) < FAR]
+        beyond = [
+            root for root in _real_roots(fit.deriv()) if 0 < (root - y[0]) / (y[0] - y[-1]) < FAR
+        ]
         nearest = min(beyond, key=lambda root: abs(root - y[0]), default=math.nan)
         return float((fit if others is None else Polynomial.fit(y, others[:n], n - 1))(nearest))
 
@@ -193,15 +222,18 @@ def extrapolated_maximum(where: Array, values: Sequence[Measured], others: Array
 
 
 def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Measured]) -> Measured:
-    """The estimate(values, n) from all n values, with an uncertainty by its convergence with n and their noise.
+    """The estimate(values, n) from all n values, with an uncertainty by its convergence with n and
+    their noise.
 
-    It is made without the last two points, without the last, and with all. Its changes are continued as a geometric
-    series with the larger ratio of any two, at most 1, from the last change but one, since the last may be small by
-    chance, or from the last if it is larger. The error is the term after the last, or the sum of all further terms
-    where the last two changes have the same sign: with the largest ratio where their ratio has grown, as it does where
-    the quantity is no smooth function.
-    """
-    values, noise = (np.array([getattr(m, name) for m in points]) for name in ("value", "uncertainty"))
+    It is made without the last two points, without the last, and with all. Its changes are
+    continued as a geometric series with the larger ratio of any two, at most 1, from the last
+    change but one, since the last may be small by chance, or from the last if it is larger. The
+    error is the term after the last, or the sum of all further terms where the last two changes
+    have the same sign: with the largest ratio where their ratio has grown, as it does where the
+    quantity is no smooth function."""
+    values, noise = (
+        np.array([getattr(m, name) for m in points]) for name in ("value", "uncertainty")
+    )
     count = len(values)
     row = np.array([estimate(values, n) for n in range(count - 3, count + 1)])
     changes = np.abs(np.diff(row))
@@ -220,25 +252,30 @@ def _real_roots(polynomial: Polynomial) -> list[float]:
 
 
 def propagator(record: Array, lag: int) -> Array:
-    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d) of a linear motion.
+    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d) of a
+    linear motion.
 
-    The columns of record[k] are d independent motions at sample k; rows should be scaled to be of like size.
-    """
+    The columns of record[k] are d independent motions at sample k; rows should be scaled to be of
+    like size."""
     now, later = record[:-lag], record[lag:]
     gram = np.einsum("nij,nkj->ik", now, now)
     return np.asarray(np.linalg.solve(gram, np.einsum("nij,nkj->ik", now, later)).T)
 
 
-def exponents(at: Callable[[int], Array], interval: float, longest: int) -> npt.NDArray[np.complex128]:
-    """All exponents (d,) in s-1 of a linear motion whose propagator for k sample intervals is at(k), (d, d).
+def exponents(
+    at: Callable[[int], Array], interval: float, longest: int
+) -> npt.NDArray[np.complex128]:
+    """All exponents (d,) in s-1 of a linear motion whose propagator for k sample intervals is
+    at(k), (d, d).
 
-    Each is measured at lags that double up to its own time constant or `longest`: a longer lag shows slow exponents
-    more sharply, and fast motions have decayed by then.
-    """
+    Each is measured at lags that double up to its own time constant or `longest`: a longer lag
+    shows slow exponents more sharply, and fast motions have decayed by then."""
 
     def rates_at(lag: int) -> npt.NDArray[np.complex128]:
         values = np.linalg.eigvals(at(lag)).astype(complex)
-        logarithms = np.log(np.where(values == 0, np.finfo(float).eps, values))  # a zero is a decay to round-off
+        logarithms = np.log(
+            np.where(values == 0, np.finfo(float).eps, values)
+        )  # a zero is a decay to round-off
         return np.asarray(logarithms / (lag * interval))
 
     lag, rates = 1, rates_at(1)
@@ -251,8 +288,11 @@ def exponents(at: Callable[[int], Array], interval: float, longest: int) -> npt.
     return rates
 
 
-def matched(values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
-    """Values (d,) reordered so that each stands where the nearest of others (d,) does, one to one."""
+def matched(
+    values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]
+) -> npt.NDArray[np.complex128]:
+    """Values (d,) reordered so that each stands where the nearest of others (d,) does, one to
+    one."""
     from scipy.optimize import linear_sum_assignment  # here, because it takes half a second to load
 
     order = linear_sum_assignment(np.abs(to[:, None] - values[None, :]))[1]

@@ -1,4 +1,5 @@
-"""How every figure looks: a colour for each case, solid for stable, dashed for unstable, a mark for each engine."""
+"""How every figure looks: a colour for each case, solid for stable, dashed for unstable, a mark for
+each engine."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ COLOURS = {
     Case.NS: "#CC79A7",
     Case.NN: "#000000",
 }
-"""Okabe and Ito's colours, told apart by colour-blind readers; names beside the curves tell them apart in print."""
+"""Okabe and Ito's colours, told apart by colour-blind readers; names beside the curves tell them
+apart in print."""
 HOPPING = "#7B3294"
 """Of a ball that hops for ever, a motion of several cases."""
 FORCE, SLIP, BALL, INK = "#b3261e", "#6a3d9a", "#f5cc6b", "#1c2430"
@@ -76,7 +78,9 @@ def figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def panels(width: float, height: float, rows: int = 1, columns: int = 1, **layout: Any) -> tuple[Figure, Any]:
+def panels(
+    width: float, height: float, rows: int = 1, columns: int = 1, **layout: Any
+) -> tuple[Figure, Any]:
     """A figure in inches and its axes, as `matplotlib.pyplot.subplots` gives them."""
     made = figure(width, height)
     return made, made.subplots(rows, columns, **layout)
@@ -95,24 +99,37 @@ _COLUMNS = {
 
 
 def symbol(name: str) -> str:
-    """A quantity of `compare.kit.quantities`, or a column of a motion, by its name, in letters of the axes."""
+    """A quantity of `compare.kit.quantities`, or a column of a motion, by its name, in letters of
+    the axes."""
 
     def typeset(match: re.Match[str]) -> str:
         letter, tilde, index, zero = match.groups()
-        return "$" + (rf"\tilde{{{letter}}}" if tilde else letter) + f"_{{{index}}}" + ("^0$" if zero else "$")
+        return (
+            "$"
+            + (rf"\tilde{{{letter}}}" if tilde else letter)
+            + f"_{{{index}}}"
+            + ("^0$" if zero else "$")
+        )
 
     text = QUANTITIES[name].symbol if name in QUANTITIES else _COLUMNS[name]
     return re.sub(r"(\w)(\u0303?)_(\w+?)(⁰?)(?!\w)", typeset, text)
 
 
-OMEGA_0, OMEGA_C, OMEGA_X = (f"{name} (rad/s)" for name in ("$ω_0$", symbol("omega_c"), symbol("wall_spin")))
+OMEGA_0, OMEGA_C, OMEGA_X = (
+    f"{name} (rad/s)" for name in ("$ω_0$", symbol("omega_c"), symbol("wall_spin"))
+)
 
 
 def named(p: Parameters, *names: str) -> str:
-    """Dimensionless parameters as text of a caption, all but that of omega_0 if none is named, and the drag law."""
-    values = [f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")]
+    """Dimensionless parameters as text of a caption, all but that of omega_0 if none is named, and
+    the drag law."""
+    values = [
+        f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")
+    ]
     if p.drag != STOKES:
-        values.append(f"{p.drag} drag with Re = {2 * p.r * math.sqrt(p.g * p.R) / p.nu_f:.3g} at √(gR)")
+        values.append(
+            f"{p.drag} drag with Re = {2 * p.r * math.sqrt(p.g * p.R) / p.nu_f:.3g} at √(gR)"
+        )
     return ", ".join(values)
 
 
@@ -122,11 +139,16 @@ def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = ()) 
 
 
 def marks(states: Sequence[Measurement]) -> str:
-    """The part of a caption that explains the marks of measured points; empty where there are none."""
+    """The part of a caption that explains the marks of measured points; empty where there are
+    none."""
     if not states:
         return ""
     between = any(m.protocol == "edge" for m in states)
-    said = " On the unstable SS: the edge between two motions, which the engine was made to follow." if between else ""
+    said = (
+        " On the unstable SS: the edge between two motions, which the engine was made to follow."
+        if between
+        else ""
+    )
     said += f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the mark is larger."
     most = max(abs(m.value) for m in states)
     if any(COVERAGE * m.uncertainty > LONGEST_BAR * most for m in states):
@@ -139,7 +161,8 @@ def marks(states: Sequence[Measurement]) -> str:
 
 
 def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
-    """Draw second scales, at the top and right if they are named: angular velocities in units of sqrt(g/R)."""
+    """Draw second scales, at the top and right if they are named: angular velocities in units of
+    sqrt(g/R)."""
     unit = math.sqrt(p.g / p.R)
     scale: Any = (lambda w: w / unit, lambda W: W * unit)
     if x:
@@ -162,7 +185,8 @@ def curve(
     name: Name = ("", None),
     line: Line = STABLE,
 ) -> None:
-    """Draw a line of theory (n,) in the colour of its case, where y is finite, and its name if that has a place.
+    """Draw a line of theory (n,) in the colour of its case, where y is finite, and its name if that
+    has a place.
 
     Of several cases that lie on it the colours take turns.
     """
@@ -179,7 +203,9 @@ def curve(
         if not way[-1]:  # there is nothing to name
             return
         k = int(np.searchsorted(way, at * way[-1]))
-        here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (points[k + 1] - points[k])
+        here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (
+            points[k + 1] - points[k]
+        )
         beside(axes, here_x, here_y, text, offset, COLOURS[cases[-1]]).set_label(label)
 
 
@@ -189,31 +215,60 @@ def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float])
     beside(axes, x, y, text, offset)
 
 
-def beside(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> Text:
-    """Write a name beside a point or a curve, `offset` in points, with a line to it if it is far off."""
-    leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1} if math.hypot(*offset) > 16 else None
+def beside(
+    axes: Axes,
+    x: float,
+    y: float,
+    text: str,
+    offset: tuple[float, float] = (0, 0),
+    colour: str = "k",
+) -> Text:
+    """Write a name beside a point or a curve, `offset` in points, with a line to it if it is far
+    off."""
+    leader = (
+        {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1}
+        if math.hypot(*offset) > 16
+        else None
+    )
     ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
     va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
-    look: dict[str, Any] = {"color": colour, "arrowprops": leader, "zorder": 6, "ha": ha, "va": va, "fontsize": 9}
+    look: dict[str, Any] = {
+        "color": colour,
+        "arrowprops": leader,
+        "zorder": 6,
+        "ha": ha,
+        "va": va,
+        "fontsize": 9,
+    }
     return axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", bbox=HALO, **look)
 
 
 def guides(axes: Axes, values: dict[str, float]) -> None:
-    """Draw dotted lines at thresholds by name, rad s-1, named at the foot, one higher where names would overlap."""
+    """Draw dotted lines at thresholds by name, rad s-1, named at the foot, one higher where names
+    would overlap."""
     low, high = axes.get_xlim()
     last, step = -math.inf, 0
-    look: dict[str, Any] = {"xytext": (2, 0), "textcoords": "offset points", "fontsize": 9, "bbox": HALO}
+    look: dict[str, Any] = {
+        "xytext": (2, 0),
+        "textcoords": "offset points",
+        "fontsize": 9,
+        "bbox": HALO,
+    }
     for key, value in sorted(values.items(), key=lambda item: item[1]):
         if low <= value <= high:
             step = step + 1 if value - last < 0.08 * (high - low) else 0
             last = value
             axes.axvline(value, **GUIDE)
-            foot: dict[str, Any] = {"xy": (value, 0.02 + 0.07 * step), "xycoords": ("data", "axes fraction")}
+            foot: dict[str, Any] = {
+                "xy": (value, 0.02 + 0.07 * step),
+                "xycoords": ("data", "axes fraction"),
+            }
             axes.annotate(THRESHOLD_LABELS[key], **foot, **look, color="0.25", zorder=0.5)
 
 
 def mark_of(engine: str) -> dict[str, Any]:
-    """Marker of an engine's points as keywords of matplotlib: black, since colours are those of cases."""
+    """Marker of an engine's points as keywords of matplotlib: black, since colours are those of
+    cases."""
     given = ENGINES.get(engine)  # theory against theory has none
     return {"marker": given.mark if given else "D", "color": "0.1", "mfc": "white"}
 
@@ -240,18 +295,28 @@ def points(
     way: str = "",
     **look: Any,
 ) -> None:
-    """Draw measured values times `unit`, by engine, with bars of three standard uncertainties; pale where too long."""
+    """Draw measured values times `unit`, by engine, with bars of three standard uncertainties; pale
+    where too long."""
     rows = list(rows)
     for m in rows:
         axes.update_datalim([(x(m), unit * y(m))])
     longest = LONGEST_BAR * axes.dataLim.height
     for engine, own in by_engine(rows, lambda m: m.engine).items():
-        usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
+        usual = {
+            "ms": 5,
+            "label": engine + way,
+            "capsize": 2.5,
+            "elinewidth": 1,
+            "zorder": 4,
+            "ls": "none",
+        }
         for pale in (False, True):
             shown = [m for m in own if (COVERAGE * unit * m.uncertainty > longest) == pale]
             bars = [math.nan if pale else COVERAGE * unit * m.uncertainty for m in shown]
             faint: dict[str, Any] = (
-                {"alpha": 0.4} | ({"label": f"_{engine}{way}"} if len(shown) < len(own) else {}) if pale else {}
+                {"alpha": 0.4} | ({"label": f"_{engine}{way}"} if len(shown) < len(own) else {})
+                if pale
+                else {}
             )
             places = [x(m) for m in shown], [unit * y(m) for m in shown]
             if shown:
@@ -259,32 +324,56 @@ def points(
 
 
 def legend(of: Axes | Figure, **where: Any) -> None:
-    """Draw a legend that names everything once, if there is anything to name; of a figure outside the panels."""
+    """Draw a legend that names everything once, if there is anything to name; of a figure outside
+    the panels."""
     once: dict[str, Any] = {}
     for axes in of.axes if isinstance(of, Figure) else [of]:
         handles, labels = axes.get_legend_handles_labels()
         once |= dict(zip(labels, handles, strict=True))
     if once:
-        usual = {"frameon": False, "fontsize": 8} if isinstance(of, Figure) else {"framealpha": 0.95, "fontsize": 8.5}
+        usual = (
+            {"frameon": False, "fontsize": 8}
+            if isinstance(of, Figure)
+            else {"framealpha": 0.95, "fontsize": 8.5}
+        )
         of.legend(list(once.values()), list(once), **usual | where)
 
 
 def ground(
-    axes: Axes, run: Trajectory, span: tuple[float, float], unit: float = 1.0, origin: float = 0.0, named: bool = True
+    axes: Axes,
+    run: Trajectory,
+    span: tuple[float, float],
+    unit: float = 1.0,
+    origin: float = 0.0,
+    named: bool = True,
 ) -> None:
-    """Shade each stretch of a span of time in the colour of its case, and name it above where there is room."""
-    begins = [(run.cases[0], run.time[0]), *zip(map(Case, run.events.to_case), run.events.time, strict=True)]
+    """Shade each stretch of a span of time in the colour of its case, and name it above where there
+    is room."""
+    begins = [
+        (run.cases[0], run.time[0]),
+        *zip(map(Case, run.events.to_case), run.events.time, strict=True),
+    ]
     for (case, first), (_, last) in zip(begins, [*begins[1:], (None, run.time[-1])], strict=True):
         low, high = max(first, span[0]), min(last, span[1])
         if low < high:
             x = unit * (np.array([low, high]) - origin)
             axes.axvspan(*x, color=COLOURS[case], alpha=0.15, lw=0)
             if named and high - low > 0.04 * (span[1] - span[0]):
-                axes.text(x.mean(), 1.02, case.name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
+                axes.text(
+                    x.mean(),
+                    1.02,
+                    case.name,
+                    transform=axes.get_xaxis_transform(),
+                    ha="center",
+                    fontsize=8,
+                )
 
 
-def deviations(axes: Axes, rows: Iterable[Measurement], predicted: Callable[[Measurement], float]) -> None:
-    """Draw relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
+def deviations(
+    axes: Axes, rows: Iterable[Measurement], predicted: Callable[[Measurement], float]
+) -> None:
+    """Draw relative deviations of measured values from predicted ones, by engine, on a logarithmic
+    axis."""
     for engine, own in by_engine(rows, lambda m: m.engine).items():
         off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
         axes.plot(list(map(omega_0, own)), off, ls="none", ms=5, **mark_of(engine))

@@ -30,12 +30,20 @@ class Axis:
     """Whether no more than the two ends were given."""
 
     @classmethod
-    def parse(cls, text: str, units: Mapping[str, str] = FIELDS, kind: str = "parameter", allowed: Range = ANY) -> Axis:
+    def parse(
+        cls,
+        text: str,
+        units: Mapping[str, str] = FIELDS,
+        kind: str = "parameter",
+        allowed: Range = ANY,
+    ) -> Axis:
         """Read ``name=from:to:count``, ``name=from:to`` or ``name=a,b,c``; raises `InputError`."""
         name, _, rest = text.partition("=")
         check_names([name], list(units), kind)
         if ":" not in rest:
-            values = tuple(parse_number(name, part, units[name], allowed) for part in rest.split(","))
+            values = tuple(
+                parse_number(name, part, units[name], allowed) for part in rest.split(",")
+            )
             if len(set(values)) < len(values):
                 raise InputError(f"{name} = {rest} names a value twice")
             return cls(name, values)
@@ -48,12 +56,15 @@ class Axis:
             raise InputError(f"{given} is in the wrong order: a range runs from low to high")
         if not count:
             return cls(name, (first, last), between=True)
-        points = int(parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True)))
+        points = int(
+            parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True))
+        )
         return cls(name, tuple(np.linspace(first, last, points).tolist()))
 
     @classmethod
     def several(cls, texts: Sequence[str], *kind: Any) -> list[Axis]:
-        """Read several texts as `parse` does; raises `InputError`, for a name that comes twice, too."""
+        """Read several texts as `parse` does; raises `InputError`, for a name that comes twice,
+        too."""
         axes = [cls.parse(text, *kind) for text in texts]
         names = [axis.name for axis in axes]
         for name in names:
@@ -65,7 +76,10 @@ class Axis:
     def points(self) -> tuple[float, ...]:
         """The values; raises `InputError` if only the ends of a range were given."""
         if self.between:
-            raise InputError(f"here {self.name} needs values: write {self.name}=from:to:count or {self.name}=a,b,c")
+            raise InputError(
+                f"here {self.name} needs values: write {self.name}=from:to:count or "
+                f"{self.name}=a,b,c"
+            )
         return self.values
 
     @property
@@ -77,7 +91,8 @@ class Axis:
 
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
-    """Every combination of the axes' values, the last axis fastest; `InputError` if there are more than `MOST`."""
+    """Every combination of the axes' values, the last axis fastest; `InputError` if there are more
+    than `MOST`."""
     check_number("the grid", math.prod(len(axis.points) for axis in axes), "runs", Range(1, MOST))
     for values in itertools.product(*(axis.points for axis in axes)):
         yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))
@@ -92,8 +107,11 @@ def random(p: Parameters, axes: Sequence[Axis], count: int, seed: int) -> Iterat
 
 
 def sobol(dimensions: int, count: int, seed: int) -> Array:
-    """The first `count` points (count, dimensions) of a scrambled Sobol sequence in the unit cube."""
+    """The first `count` points (count, dimensions) of a scrambled Sobol sequence in the unit
+    cube."""
     from scipy.stats import qmc  # slow to import
 
-    unit = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(2 ** math.ceil(math.log2(count)))
+    unit = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(
+        2 ** math.ceil(math.log2(count))
+    )
     return np.asarray(unit[:count])

@@ -1,4 +1,5 @@
-"""One run as data: everything that determines it, its identity, and how each engine carries it out."""
+"""One run as data: everything that determines it, its identity, and how each engine carries it
+out."""
 
 from __future__ import annotations
 
@@ -23,12 +24,13 @@ from compare.kit.engines import Engine
 from compare.kit.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
 
-# MuJoCo would print each of its warnings, and write them to MUJOCO_LOG.TXT in the current directory; a run that
-# diverges says so itself.
+# MuJoCo would print each of its warnings, and write them to MUJOCO_LOG.TXT in the current
+# directory; a run that diverges says so itself.
 mujoco.set_mju_user_warning(lambda text: None)
 
 LONG = 1e6
-"""Steps from which on a run that hands out its samples keeps a journal and is simulated alone, outside a batch."""
+"""Steps from which on a run that hands out its samples keeps a journal and is simulated alone,
+outside a batch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +55,9 @@ class Task:
         if not isinstance(self.settings, self.simulator.settings | None):
             raise InputError(f"settings of another engine were given to {self.engine!r}")
         object.__setattr__(self, "x0", State.one(self.x0))
-        object.__setattr__(self, "settings", self.settings or self.simulator.configure({}, self.parameters))
+        object.__setattr__(
+            self, "settings", self.settings or self.simulator.configure({}, self.parameters)
+        )
 
     @property
     def simulator(self) -> Engine:
@@ -67,7 +71,8 @@ class Task:
 
     @functools.cached_property
     def key(self) -> str:
-        """Hash of all that determines the run: the fields of the task, the program's sources, the engine's version."""
+        """Hash of all that determines the run: the fields of the task, the program's sources, the
+        engine's version."""
         engine = self.simulator
         code = {"sources": sources(*engine.sources), **engine.versions}
         text = json.dumps({"task": self.describe(), "code": code}, sort_keys=True)
@@ -113,18 +118,22 @@ def deadline(limit: float) -> Callable[[], None]:
 
 
 def carry_out(task: Task, check: Callable[[], None] = lambda: None) -> Trajectory:
-    """Run a task, calling `check` from time to time; a run that breaks down has its failure in the header."""
+    """Run a task, calling `check` from time to time; a run that breaks down has its failure in the
+    header."""
     if simulate := task.simulator.simulate:
         return simulate(task, lambda done: check())
     return _start_stream(task, progress=lambda done: check()).trajectory()
 
 
-def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:
+def store(
+    task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False
+) -> str:
     """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 
-    A run that breaks down is kept under `failed_path`, until one into the same file is whole. Samples of MuJoCo go to
-    the file as they come, and a run of more than `LONG` steps keeps a journal, from which it goes on after having been
-    killed. Once `stop` says so, a run ends as if it had broken down, but MuJoCo's keeps its journal.
+    A run that breaks down is kept under `failed_path`, until one into the same file is whole.
+    Samples of MuJoCo go to the file as they come, and a run of more than `LONG` steps keeps a
+    journal, from which it goes on after having been killed. Once `stop` says so, a run ends as if
+    it had broken down, but MuJoCo's keeps its journal.
 
     Raises
     ------
@@ -180,7 +189,8 @@ def failed_path(path: Path) -> Path:
 
 
 def journal_path(task: Task, path: Path) -> Path:
-    """Where a long run into a file keeps its journal, under its `Task.key`, since the file may have any name."""
+    """Where a long run into a file keeps its journal, under its `Task.key`, since the file may have
+    any name."""
     return path.with_name(f"{task.key}.journal")
 
 
@@ -202,5 +212,10 @@ def sources(*names: str) -> str:
         top = Path(spec.origin)
         for path in sorted(top.parent.rglob("*")) if spec.submodule_search_locations else [top]:
             if path.suffix in (".py", ".xml"):
-                digest.update(path.relative_to(top.parent).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+                digest.update(
+                    path.relative_to(top.parent).as_posix().encode()
+                    + b"\0"
+                    + path.read_bytes()
+                    + b"\0"
+                )
     return digest.hexdigest()

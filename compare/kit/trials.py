@@ -1,8 +1,8 @@
-"""Motions of which there are two: with one time step and with a shorter one, whose difference is the error.
+"""Motions of which there are two: with one time step and with a shorter one, whose difference is
+the error.
 
-Trials, of any length; and records of a few steps: polynomials through one give values and rates of change, whose
-uncertainty is what the step and the degree change.
-"""
+Trials, of any length; and records of a few steps: polynomials through one give values and rates of
+change, whose uncertainty is what the step and the degree change."""
 
 from __future__ import annotations
 
@@ -65,10 +65,14 @@ class TrialResult:
     coarse: Any
     fine: Any
 
-    def row(self, lab: Lab, quantity: str, value: Measured | float, **conditions: Condition) -> Measurement:
+    def row(
+        self, lab: Lab, quantity: str, value: Measured | float, **conditions: Condition
+    ) -> Measurement:
         """A measurement of this trial."""
         trial, conditions = self.trial, {**self.trial.conditions, **conditions}
-        return measurement(lab, self.protocol, trial.set, trial.p, quantity, value, self.tasks, **conditions)
+        return measurement(
+            lab, self.protocol, trial.set, trial.p, quantity, value, self.tasks, **conditions
+        )
 
 
 def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[TrialResult | Missing]:
@@ -86,25 +90,29 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Tria
             yield Missing(protocol, trial.set, f"{trial.name}: the run {runs}", trial.rows)
         else:
             half = len(runs) // 2
-            yield TrialResult(protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:]))
+            yield TrialResult(
+                protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:])
+            )
 
 
 def with_step_error(coarse: float, fine: Measured) -> Measured:
-    """The value with the finer step, uncertain by its difference from that with the coarser one, too, in quadrature."""
+    """The value with the finer step, uncertain by its difference from that with the coarser one,
+    too, in quadrature."""
     return Measured(fine.value, math.hypot(fine.value - coarse, fine.uncertainty))
 
 
 REFINED = 16
-"""Steps in one of `coarse_step`; the finer run has twice as many. With shorter ones the studies' settings come to the
-engine's least impedance, and contacts then answer no faster."""
+"""Steps in one of `coarse_step`; the finer run has twice as many. With shorter ones the studies'
+settings come to the engine's least impedance, and contacts then answer no faster."""
 LAG = 3
 """Steps by which a contact force lags behind its load."""
 HALF_WINDOW, WINDOW_DEGREES = 8, (5, 3)
-"""Half the width of a window in the middle of a motion, in steps of the coarser run; degrees of the polynomials
-through it, of which the lower one shows what the degree changes."""
+"""Half the width of a window in the middle of a motion, in steps of the coarser run; degrees of the
+polynomials through it, of which the lower one shows what the degree changes."""
 EXTRAPOLATION, DOUBT = 2 / 3, 1 / 3
-"""Limit of a vanishing step beyond the finer run, and its uncertainty, in differences of the two runs: the error is
-between first order in the step, for the direction of friction, and second, with limits of 1 and 1/3."""
+"""Limit of a vanishing step beyond the finer run, and its uncertainty, in differences of the two
+runs: the error is between first order in the step, for the direction of friction, and second, with
+limits of 1 and 1/3."""
 
 
 def slip_unit(p: Parameters) -> float:
@@ -113,16 +121,19 @@ def slip_unit(p: Parameters) -> float:
 
 
 def lag_error(p: Parameters, refine: int = 1) -> float:
-    """Least uncertainty of a force divided by the weight, as halving the step may by chance change nothing.
+    """Least uncertainty of a force divided by the weight, as halving the step may by chance change
+    nothing.
 
-    Half the square of the lag `LAG` in units of `time_unit`: the second order, once the first is extrapolated. The
-    steps of `REFINED` may be divided by `refine`.
-    """
+    Half the square of the lag `LAG` in units of `time_unit`: the second order, once the first is
+    extrapolated. The steps of `REFINED` may be divided by `refine`."""
     return (LAG * coarse_step(p) / (REFINED * refine) / time_unit(p)) ** 2 / 2
 
 
-def polynomials(time: Array, values: Array, degrees: tuple[int, int], at: float = 0.0) -> tuple[Array, Array]:
-    """Values and slopes at a time, each (2, ...), of polynomials of two degrees through values (n, ...).
+def polynomials(
+    time: Array, values: Array, degrees: tuple[int, int], at: float = 0.0
+) -> tuple[Array, Array]:
+    """Values and slopes at a time, each (2, ...), of polynomials of two degrees through values (n,
+    ...).
 
     By least squares.
     """
@@ -135,9 +146,9 @@ def polynomials(time: Array, values: Array, degrees: tuple[int, int], at: float 
 def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
     """A state (8,) that satisfies the constraints of a case.
 
-    A ball that rolls goes round so slowly, or one that hangs on the wall so fast, that friction has something to
-    spare; a ball that the wall alone keeps from turning spins backwards about its radial axis.
-    """
+    A ball that rolls goes round so slowly, or one that hangs on the wall so fast, that friction has
+    something to spare; a ball that the wall alone keeps from turning spins backwards about its
+    radial axis."""
     unit, speed = time_unit(p), math.sqrt(p.g * p.R)
     slips = rng.uniform(0.4, 1.0, 3) * rng.choice([-1, 1], 3) * speed / p.r
     omega_c = rng.uniform(0.4, 1.6) / unit
@@ -160,7 +171,8 @@ def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
 
 
 def constrained(case: Case, x: Array, p: Parameters) -> Array:
-    """The state (8,) with what the case holds at zero set to exactly that, of which a contact leaves some 1e-9."""
+    """The state (8,) with what the case holds at zero set to exactly that, of which a contact
+    leaves some 1e-9."""
     held = [name in TRAITS[case].constraints for name in VARIABLES]
     x = np.where(held, 0.0, x)
     return State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked() if case is Case.RN else x

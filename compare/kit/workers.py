@@ -11,7 +11,13 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import (
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,15 +35,16 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Ctrl-C, and what clusters send."""
 JUDGING = 30.0
-"""Processor time that judging a claim or drawing a figure may take, s: thirty times what the longest takes at the quick
-level. What files say may be nonsense that takes years."""
+"""Processor time that judging a claim or drawing a figure may take, s: thirty times what the
+longest takes at the quick level. What files say may be nonsense that takes years."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
 
 
 @dataclass(eq=False)
 class Workers:
-    """An executor, started when it is needed, and anew when its workers died; threads may share it."""
+    """An executor, started when it is needed, and anew when its workers died; threads may share
+    it."""
 
     count: int
     """Tasks at once."""
@@ -72,7 +79,8 @@ class Workers:
         raise StorageError("workers die as soon as they are started")
 
     def map(self, one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
-        """Python's `map` by the workers, in order; what one that died had to do, or a single one, is done here."""
+        """Python's `map` by the workers, in order; what one that died had to do, or a single one,
+        is done here."""
         if self.count < 2:
             yield from map(one, items)
             return
@@ -91,13 +99,18 @@ class Workers:
 
 
 def processes(count: int) -> Workers:
-    """`count` processes of this machine, one BLAS thread each; for 0 this one. Raises `InputError` for a bad count."""
+    """`count` processes of this machine, one BLAS thread each; for 0 this one. Raises `InputError`
+    for a bad count."""
     check_number("workers", count, "processes", Range(0, whole=True))
     if count == 0:
         return Workers(1, _Here, lambda executor, at_once: None, ())
 
     def start() -> Executor:
-        for library in ("OMP", "OPENBLAS", "MKL"):  # inherited by the workers; numpy reads it when they import it
+        for library in (
+            "OMP",
+            "OPENBLAS",
+            "MKL",
+        ):  # inherited by the workers; numpy reads it when they import it
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
         resource_tracker.ensure_running()  # it lets signals through
         with _without_signals():  # a semaphore that is half made would be left
@@ -113,15 +126,21 @@ def processes(count: int) -> Workers:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Processes that end when the other end of a pipe is closed: by us, to give up their work, or by our death."""
+    """Processes that end when the other end of a pipe is closed: by us, to give up their work, or
+    by our death."""
 
     def __init__(self, count: int) -> None:
         context = get_context("spawn")
-        self._end, self.leash = context.Pipe(duplex=False)  # ours must stay open until all workers have started
-        super().__init__(count, mp_context=context, initializer=_follow_parent, initargs=(self._end,))
+        self._end, self.leash = context.Pipe(
+            duplex=False
+        )  # ours must stay open until all workers have started
+        super().__init__(
+            count, mp_context=context, initializer=_follow_parent, initargs=(self._end,)
+        )
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        # Workers that it may start inherit this: they have no handlers before they have imported much.
+        # Workers that it may start inherit this: they have no handlers before they have imported
+        # much.
         with _without_signals():
             return super().submit(_call_in_worker, fn, *args, **kwargs)
 
@@ -130,8 +149,8 @@ class _Pool(ProcessPoolExecutor):
 def _without_signals() -> Iterator[None]:
     """A context in which signals that end a program wait, and whose new processes never get them.
 
-    Those that another thread gets are handled by the main one, blocked or not: they are sent again afterwards.
-    """
+    Those that another thread gets are handled by the main one, blocked or not: they are sent again
+    afterwards."""
     if sys.platform == "win32":
         yield
         return
@@ -152,7 +171,8 @@ def _without_signals() -> Iterator[None]:
 
 
 _between = threading.Lock()
-"""Held by a worker between its tasks, while it may be sending a result: half of one would keep the parent waiting."""
+"""Held by a worker between its tasks, while it may be sending a result: half of one would keep the
+parent waiting."""
 
 
 def _call_in_worker(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
@@ -176,7 +196,9 @@ def _follow_parent(end: Connection) -> None:
         leave(1)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda number, frame: leave(1))  # by the pool, where another worker died
+    signal.signal(
+        signal.SIGTERM, lambda number, frame: leave(1)
+    )  # by the pool, where another worker died
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     threading.Thread(target=wait_for_parent, daemon=True).start()
@@ -232,15 +254,16 @@ def threads(count: int) -> Iterator[ThreadPoolExecutor]:
 
 
 class LateError(BaseException):
-    """What takes too long; no `Exception`, which a judge would take for a breakdown of what it asks."""
+    """What takes too long; no `Exception`, which a judge would take for a breakdown of what it
+    asks."""
 
 
 @contextmanager
 def at_most(limit: float) -> Iterator[None]:
     """Raise `LateError` once more than `limit` s of processor time have passed.
 
-    In the main thread of a process, where signals arrive; elsewhere, and on Windows, there is no limit.
-    """
+    In the main thread of a process, where signals arrive; elsewhere, and on Windows, there is no
+    limit."""
     if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         yield
         return

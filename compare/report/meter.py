@@ -33,33 +33,43 @@ _NONE = "–"
 
 
 def model_warning(off: float) -> list[str]:
-    """The warning that the model leaves out too much of a real fluid, if its error `off` exceeds the limit."""
+    """The warning that the model leaves out too much of a real fluid, if its error `off` exceeds
+    the limit."""
     if off <= real_fluid.LIMIT:
         return []
     return [
-        "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the fluid's torque on "
-        f"the spinning ball, changes its numbers by up to {100 * off:.0f} %, more than {100 * real_fluid.LIMIT:g} %: "
+        "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the "
+        "fluid's torque on "
+        f"the spinning ball, changes its numbers by up to {100 * off:.0f} %, more than "
+        f"{100 * real_fluid.LIMIT:g} %: "
         "all that follows may be off by as much."
     ]
 
 
 def torque(p: Parameters) -> str:
-    """In words what the fluid's torque does to a ball that rolls at both points, by Stokes and by boundary layer."""
+    """In words what the fluid's torque does to a ball that rolls at both points, by Stokes and by
+    boundary layer."""
     laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
     stokes_told, layer_told = (
-        f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({100 * law.shift:+.0f} %), and "
-        f"it would need {f'{rounded(law.friction, most=2)} times' if math.isfinite(law.friction) else 'more than'} "
+        f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s "
+        f"({100 * law.shift:+.0f} %), and "
+        f"it would need "
+        f"{f'{rounded(law.friction, most=2)} times' if math.isfinite(law.friction) else 'more than'} "
         "the friction that there is"
         for law in laws
     )
-    how = "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
+    how = (
+        "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
+    )
     said = f"At ω₀ = {p.omega_0:g} rad/s the fluid's torque, which is left out, brakes the spin {how} = {stokes_told}"
     if layer.Re > 8 and not p.fluid_torque:
         said += f"; with a boundary layer, as for the spin's Re = {rounded(layer.Re, most=2)}, at {layer_told}"
     if max(stokes.friction, layer.friction) > 1:
         said += ". With more than 1 it can't roll at both points"
     known = p.nu_f or p.fluid_torque
-    return f"{said}." if known else f"{said}. (This takes c for Stokes' drag: the fluid isn't known.)"
+    return (
+        f"{said}." if known else f"{said}. (This takes c for Stokes' drag: the fluid isn't known.)"
+    )
 
 
 AT_WALLS = (
@@ -69,7 +79,8 @@ AT_WALLS = (
 
 
 def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
-    """A number as text: at most `most` digits, and beyond the third none that its relative error `off` makes doubtful.
+    """A number as text: at most `most` digits, and beyond the third none that its relative error
+    `off` makes doubtful.
 
     With fewer than three what differs by half would look alike.
     """
@@ -80,7 +91,9 @@ def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
         return "0"
     if off:
         size = abs(value)
-        left = min(most, max(3, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1))
+        left = min(
+            most, max(3, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1)
+        )
     return f"{float(f'{value:.{left}g}'):.{max(most, 6)}g}"
 
 
@@ -93,37 +106,50 @@ def sentences(made: Design) -> list[str]:
     if chosen.margin:
         said.append(
             "Rolling at both points is the ball's only lasting motion up to at worst "
-            f"ω₀ = {rounded(chosen.worst.omega_0, off)} rad/s, {rounded(chosen.margin, off)} times the fastest flow, "
+            f"ω₀ = {rounded(chosen.worst.omega_0, off)} rad/s, {rounded(chosen.margin, off)} times "
+            f"the fastest flow, "
             f"{request.fastest:g} rad/s ({rounded(chosen.limit.omega_0, off)} nominally): there "
             f"{chosen.worst.end.value}."
         )
     else:
         said.append(f"It has no operating range: {chosen.worst.end.value}.")
     if chosen.limit.end is End.UNLOADING:
-        said.append("Nominally, every motion beyond it reads the flow, too, but for the ball's fall at unloading.")
+        said.append(
+            "Nominally, every motion beyond it reads the flow, too, but for the ball's fall at "
+            "unloading."
+        )
     if chosen.margin:
         said.append(
-            "The inertia of the fluid, which the model leaves out, would make the limit at worst about "
+            "The inertia of the fluid, which the model leaves out, would make the limit at worst "
+            "about "
             f"{rounded(made.with_inertia, off)} rad/s."
         )
     if math.isfinite(chosen.response):
-        said.append(f"It follows small changes of the flow with a time constant of {rounded(chosen.response, off)} s.")
+        said.append(
+            f"It follows small changes of the flow with a time constant of "
+            f"{rounded(chosen.response, off)} s."
+        )
     if request.slowest > 0:
         turn, ratio = 2 * math.pi / request.slowest, request.fastest / request.slowest
-        said.append(f"At the slowest flow, 1/{rounded(ratio)} of the fastest, a turn takes {rounded(turn)} s.")
+        said.append(
+            f"At the slowest flow, 1/{rounded(ratio)} of the fastest, a turn takes {rounded(turn)} "
+            f"s."
+        )
     said += [torque(chosen.p.replace(omega_0=request.fastest)), AT_WALLS]
     p = chosen.p
     Re = float(np.max(drag.reynolds(p.R * (curve.omega_0 - curve.band[0]), p)))
     if not drag.covers(Re, p.drag):
         said.append(
-            f"Warning: beyond the limit the ball may lag with Re up to {Re:.3g}, for which the law {p.drag!r} isn't "
+            f"Warning: beyond the limit the ball may lag with Re up to {Re:.3g}, for which the law "
+            f"{p.drag!r} isn't "
             "meant. The limit doesn't depend on drag, what is read beyond it does."
         )
     return said
 
 
 def rows(made: Design) -> dict[str, pages.Rows]:
-    """Tables of a design by title: the best meter of each material, a column each, thresholds, and sensitivities."""
+    """Tables of a design by title: the best meter of each material, a column each, thresholds, and
+    sensitivities."""
     off = made.model_error
     best = dict(sorted(made.choices.items(), key=lambda item: -item[1].margin))
     numbers = {
@@ -134,7 +160,10 @@ def rows(made: Design) -> dict[str, pages.Rows]:
     }
     limits = {name: [rounded(x, off) for x in row] for name, row in numbers.items()}
     spread = {key: [getattr(made.thresholds, key), *made.spread[key]] for key in THRESHOLDS}
-    values = {_symbol_and_unit(name): [rounded(c.values[name]) for c in best.values()] for name in made.choice.values}
+    values = {
+        _symbol_and_unit(name): [rounded(c.values[name]) for c in best.values()]
+        for name in made.choice.values
+    }
     sensitivities = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]
     for name in made.sensitivities[THRESHOLDS[0]]:
         slopes = [made.sensitivities[key][name].value for key in THRESHOLDS]
@@ -142,10 +171,16 @@ def rows(made: Design) -> dict[str, pages.Rows]:
         shown = ("0" if abs(value) < 5e-4 else rounded(value, off) for value in slopes)
         sensitivities.append([SYMBOLS.get(name, name), *shown])
     return {
-        "The best of each material": [["", *best], *([name, *row] for name, row in (values | limits).items())],
+        "The best of each material": [
+            ["", *best],
+            *([name, *row] for name, row in (values | limits).items()),
+        ],
         "Thresholds": [
             ["threshold", "nominal (rad/s)", "lowest", "highest", "what happens there"],
-            *([SYMBOLS[key], *(rounded(x, off) for x in row), MEANING[key]] for key, row in spread.items()),
+            *(
+                [SYMBOLS[key], *(rounded(x, off) for x in row), MEANING[key]]
+                for key, row in spread.items()
+            ),
         ],
         "Sensitivities": sensitivities,
     }
@@ -200,20 +235,42 @@ def page(made: Design) -> str:
 
     r, bounds = made.request, made.request.bounds[made.material]
     response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""
-    spans = {n: f"{low:g} … {high:g}" if low < high else f"{low:g}" for n, (low, high) in bounds.items()}
+    spans = {
+        n: f"{low:g} … {high:g}" if low < high else f"{low:g}" for n, (low, high) in bounds.items()
+    }
     asked = {
         "fluid": _values_as_text(r.fluid),
         "flow": f"ω₀ = {r.slowest:g} … {r.fastest:g} rad/s{response}",
         "bounds": ", ".join(f"{_symbol_and_unit(name)} {span}" for name, span in spans.items()),
-        "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
+        "tolerances": ", ".join(
+            f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()
+        )
+        or "none",
     }
-    drawn, letters = embedded({caption: svg(figure) for figure, caption in (draw(made) for draw in OF_A_METER)})
-    texts = {"doubts": model_warning(made.model_error), "sentences": sentences(made), "tables": rows(made).items()}
-    return pages.render("compare.report", "meter.html", made=made, **texts, asked=asked, figures=drawn, letters=letters)
+    drawn, letters = embedded(
+        {caption: svg(figure) for figure, caption in (draw(made) for draw in OF_A_METER)}
+    )
+    texts = {
+        "doubts": model_warning(made.model_error),
+        "sentences": sentences(made),
+        "tables": rows(made).items(),
+    }
+    return pages.render(
+        "compare.report",
+        "meter.html",
+        made=made,
+        **texts,
+        asked=asked,
+        figures=drawn,
+        letters=letters,
+    )
 
 
 def _values_as_text(values: Mapping[str, Any]) -> str:
-    shown = {n: x if isinstance(x, str) else f"{rounded(x)} {UNITS.get(n, '')}".rstrip() for n, x in values.items()}
+    shown = {
+        n: x if isinstance(x, str) else f"{rounded(x)} {UNITS.get(n, '')}".rstrip()
+        for n, x in values.items()
+    }
     return ", ".join(f"{SYMBOLS.get(name, name)} = {text}" for name, text in shown.items())
 
 

@@ -34,8 +34,11 @@ REASONS = 12
 _OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
 
 
-def write(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> Path:
-    """Write ``summary.json`` and ``report.html`` into the evidence's results directory; return the page's path.
+def write(
+    evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map
+) -> Path:
+    """Write ``summary.json`` and ``report.html`` into the evidence's results directory; return the
+    page's path.
 
     Figures are drawn by `spread`, a `map`. Raises `model.StorageError` if it can't be written.
     """
@@ -46,8 +49,11 @@ def write(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spr
     return path
 
 
-def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> str:
-    """The page as text; what was not run is named in one line, a figure that can't be drawn is a gap."""
+def render(
+    evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map
+) -> str:
+    """The page as text; what was not run is named in one line, a figure that can't be drawn is a
+    gap."""
     directory, option = evidence.directory, _OPTIONS[Level[summary.level]]
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     free = {name: each for name, each in FIGURES.items() if not each.claims}
@@ -65,7 +71,9 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
             "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],
             "repeat": f"dualball validate --claim {claim.id}{option} -o {directory.resolve().name}",
         }
-        shown = dict.fromkeys(own, claim.id) | shown  # a figure of several claims stands beside the first
+        shown = (
+            dict.fromkeys(own, claim.id) | shown
+        )  # a figure of several claims stands beside the first
         sections.setdefault(claim.section, []).append(row)
     apart = [figures[name] for name in free]
     measured = {name for m in evidence.records.measurements for name in m.runs}
@@ -82,11 +90,16 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
         lead=f"A ball rolls and slips round inside a cylinder. {_opening_sentence(ran)}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         witnesses=wording.witnesses(ran),
-        tiles=[*wording.totals(ran), (str(len(measured)), f"simulations with {len(sets)} parameter sets")],
+        tiles=[
+            *wording.totals(ran),
+            (str(len(measured)), f"simulations with {len(sets)} parameter sets"),
+        ],
         figures=[figure for figure in apart if not figure["gap"]],
         sections=sections,
         outcomes=sorted({verdict.outcome for verdict in ran}),
-        heard=sorted({f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.witnesses[1:]}),
+        heard=sorted(
+            {f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.witnesses[1:]}
+        ),
         wording=wording,
         run_of=lambda m: next((name for name in m.runs if storage.exists(directory / name)), ""),
         numbers=packed(columns(evidence.records, {v.claim.id: v.checks for v in ran})),
@@ -97,7 +110,9 @@ def render(evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, sp
         provenance={
             "made": known.get("created", ""),
             "level": summary.level.lower(),
-            "versions": ", ".join(f"{name} {version}" for name, version in known.get("versions", {}).items()),
+            "versions": ", ".join(
+                f"{name} {version}" for name, version in known.get("versions", {}).items()
+            ),
             "commit": known.get("commit", "") or "not from a checkout",
             "machine": known.get("machine", ""),
             "measurements": f"{files} files, listed in {results.SUMMARY}",
@@ -115,7 +130,9 @@ def _row(verdict: Verdict) -> dict[str, Any]:
         "verdict": verdict,
         "mark": "other" if verdict.passed and mark == "fail" else mark,
         "symbol": symbol,
-        "predicted": list(dict.fromkeys(bearing.by for bearing in verdict.claim.bearings if bearing.by)),
+        "predicted": list(
+            dict.fromkeys(bearing.by for bearing in verdict.claim.bearings if bearing.by)
+        ),
         "missing": [*map(str, verdict.missing[:REASONS]), *unseen],
         "checks": wording.ranked(verdict.checks)[:ROWS],
     }
@@ -123,12 +140,22 @@ def _row(verdict: Verdict) -> dict[str, Any]:
 
 def _opening_sentence(ran: Sequence[Verdict]) -> str:
     """How far the orbit of stationary states is from theory, in a sentence."""
-    checks = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
-    orbits = [c for c in checks if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0]
+    checks = [
+        check
+        for verdict in ran
+        for check in verdict.checks
+        if verdict.claim.section == "Stationary states"
+    ]
+    orbits = [
+        c
+        for c in checks
+        if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0
+    ]
     if not orbits:
         return "Its closed-form theory by Antali and Stépán is held against simulation."
     return (
-        "In stationary states the angular velocity ω_c of its orbit, predicted in closed form by Antali and Stépán, is "
+        "In stationary states the angular velocity ω_c of its orbit, predicted in closed form by "
+        "Antali and Stépán, is "
         f"{len(orbits)} of the numbers below; the largest relative deviation of these is "
         f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
     )
@@ -136,20 +163,26 @@ def _opening_sentence(ran: Sequence[Verdict]) -> str:
 
 @functools.cache
 def errata() -> str:
-    """The errata of the paper as HTML; links into the source tree, which a page by itself can't follow, are text."""
+    """The errata of the paper as HTML; links into the source tree, which a page by itself can't
+    follow, are text."""
     text = (resources.files("compare.report") / "templates" / "errata.md").read_text("utf-8")
     made: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
     made = re.sub(r"<h1>.*?</h1>", "", made)  # the page has a heading for it
     made = re.sub(r"(</?h)2>", r"\g<1>3>", made)
     made = re.sub(r'<a href="(?!https?:)[^"]*">(.*?)</a>', r"\1", made)
-    region = '<div class="scroll" tabindex="0" role="region" aria-label="Errata"><table class="prose">'
+    region = (
+        '<div class="scroll" tabindex="0" role="region" aria-label="Errata"><table class="prose">'
+    )
     return made.replace("<table>", region).replace("</table>", "</table></div>")
 
 
 def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str, list[Any]]:
-    """Columns of the page's searchable table: a row for each check, and each measurement on which no claim bears."""
+    """Columns of the page's searchable table: a row for each check, and each measurement on which
+    no claim bears."""
 
-    def identity(m: Measurement) -> tuple[Any, ...]:  # the same for a copy that another process has judged
+    def identity(
+        m: Measurement,
+    ) -> tuple[Any, ...]:  # the same for a copy that another process has judged
         conditions = tuple(sorted(m.conditions.items()))
         return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, conditions
 
@@ -166,14 +199,19 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
     return {
         "set": [m.set for _, m, _ in rows],
         "omega_0": [float(f"{m.parameters.omega_0:.6g}") for _, m, _ in rows],
-        "quantity": [f"{wording.SYMBOLS[m.quantity]} {pages.readable(m.unit)}".rstrip() for _, m, _ in rows],
+        "quantity": [
+            f"{wording.SYMBOLS[m.quantity]} {pages.readable(m.unit)}".rstrip() for _, m, _ in rows
+        ],
         "conditions": [wording.conditions(m.conditions) for _, m, _ in rows],
         "engine": [m.engine for _, m, _ in rows],
         "measured": [rounded(m, m.value) for _, m, _ in rows],
         "uncertainty": [float(f"{m.uncertainty:.2g}") for _, m, _ in rows],
         "relation": [c.relation.replace("=", "") if c else "" for *_, c in rows],
         "predicted": [rounded(m, c.predicted) if c else "" for _, m, c in rows],
-        "deviation": [float(f"{c.deviation:.2g}") if c and math.isfinite(c.deviation) else "" for *_, c in rows],
+        "deviation": [
+            float(f"{c.deviation:.2g}") if c and math.isfinite(c.deviation) else ""
+            for *_, c in rows
+        ],
         "tolerance": [float(f"{c.tolerance:.2g}") if c else "" for *_, c in rows],
         "claim": [claim for claim, *_ in rows],
         "mark": [wording.mark(c) if c else "" for *_, c in rows],
@@ -181,7 +219,10 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
 
 
 def packed(of: Mapping[str, Sequence[Any]]) -> str:
-    """Columns and their texts typeset, as JSON, compressed (deflate) and in base64: about a tenth of their length."""
-    shown = {text: pages.typeset(text) for text in dict.fromkeys([*of["quantity"], *of["conditions"]])}
+    """Columns and their texts typeset, as JSON, compressed (deflate) and in base64: about a tenth
+    of their length."""
+    shown = {
+        text: pages.typeset(text) for text in dict.fromkeys([*of["quantity"], *of["conditions"]])
+    }
     text = json.dumps({**of, "typeset": shown}, ensure_ascii=False, separators=(",", ":"))
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()

@@ -1,4 +1,5 @@
-"""The results directory: run files, measurements, the summary of the verdicts, figures, the report."""
+"""The results directory: run files, measurements, the summary of the verdicts, figures, the
+report."""
 
 from __future__ import annotations
 
@@ -26,8 +27,8 @@ SCHEMA, SCHEMA_VERSION = "dualball-summary", 5
 
 
 Files = Mapping[str, Mapping[int, Sequence[str]]]
-"""Files of measurements, relative to the results directory: by engine, the one on trial first, and time steps in one
-that a protocol asks for."""
+"""Files of measurements, relative to the results directory: by engine, the one on trial first, and
+time steps in one that a protocol asks for."""
 
 
 @dataclass(frozen=True)
@@ -38,25 +39,35 @@ class Summary:
     measurements: Files = field(default_factory=dict)
     """Those that were judged."""
     verdicts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """By claim id: outcome, number of checks, resolving power; the checks follow from the measurements."""
+    """By claim id: outcome, number of checks, resolving power; the checks follow from the
+    measurements."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, verdicts: Iterable[Verdict], level: Level, measured: Files) -> Summary:
-        """The summary of verdicts that were reached now, on the measurements in the files `measured`."""
+        """The summary of verdicts that were reached now, on the measurements in the files
+        `measured`."""
         provenance = {
             "versions": dict(current_versions()),
             "commit": current_commit(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        return cls(level.name, measured, {verdict.claim.id: _outcome(verdict) for verdict in verdicts}, provenance)
+        return cls(
+            level.name,
+            measured,
+            {verdict.claim.id: _outcome(verdict) for verdict in verdicts},
+            provenance,
+        )
 
 
 def load_measurements(directory: Path, files: Files) -> RecordsByEngine:
     """The measurements in files of a directory; raises `StorageError` for one that is not whole."""
     return {
-        engine: {n: sum((record.load(directory / name) for name in names), Records()) for n, names in steps.items()}
+        engine: {
+            n: sum((record.load(directory / name) for name in names), Records())
+            for n, names in steps.items()
+        }
         for engine, steps in files.items()
     }
 
@@ -64,26 +75,58 @@ def load_measurements(directory: Path, files: Files) -> RecordsByEngine:
 def described(verdict: Verdict) -> dict[str, Any]:
     """A verdict with all its checks as JSON-able data; a number that is not finite is null."""
     claim = verdict.claim
-    texts = {name: getattr(claim, name) for name in ("section", "source", "statement", "text", "reason")}
-    of_measurement = ("protocol", "quantity", "unit", "engine", "set", "conditions", "uncertainty", "runs")
-    numbers = ("relation", "predicted", "deviation", "tolerance", "scale", "resolves", "agrees", "conclusive")
+    texts = {
+        name: getattr(claim, name) for name in ("section", "source", "statement", "text", "reason")
+    }
+    of_measurement = (
+        "protocol",
+        "quantity",
+        "unit",
+        "engine",
+        "set",
+        "conditions",
+        "uncertainty",
+        "runs",
+    )
+    numbers = (
+        "relation",
+        "predicted",
+        "deviation",
+        "tolerance",
+        "scale",
+        "resolves",
+        "agrees",
+        "conclusive",
+    )
     checks = []
     for check in verdict.checks:
         m = check.measurement
-        about = {name: getattr(m, name) for name in of_measurement} | {name: getattr(check, name) for name in numbers}
+        about = {name: getattr(m, name) for name in of_measurement} | {
+            name: getattr(check, name) for name in numbers
+        }
         checks.append(about | {"parameters": dataclasses.asdict(m.parameters), "measured": m.value})
     return _outcome(verdict) | texts | {"checks": plain(checks)}
 
 
 def _outcome(verdict: Verdict) -> dict[str, Any]:
-    """A verdict in numbers, without its checks: outcome, counts, resolving power, witnesses; JSON-able."""
+    """A verdict in numbers, without its checks: outcome, counts, resolving power, witnesses;
+    JSON-able."""
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
-    counts = {name: sum(getattr(check, name) for check in verdict.checks) for name in ("agrees", "conclusive")}
+    counts = {
+        name: sum(getattr(check, name) for check in verdict.checks)
+        for name in ("agrees", "conclusive")
+    }
     counts["left_out"] = verdict.left_out
     power = {"resolving_power": verdict.resolving_power, "worst": verdict.worst}
-    less = {"expected": verdict.claim.expected, "missing": [*map(str, verdict.missing)], "error": verdict.error}
+    less = {
+        "expected": verdict.claim.expected,
+        "missing": [*map(str, verdict.missing)],
+        "error": verdict.error,
+    }
     about["witnesses"] = {
-        each.engine: {name: getattr(each, name) for name in ("outcome", "reason", "order", "left_out")}
+        each.engine: {
+            name: getattr(each, name) for name in ("outcome", "reason", "order", "left_out")
+        }
         | {"checks": len(each.checks), "worst": each.worst, "resolving_power": each.resolving_power}
         | {"deviation_at_2ms": {"typical": each.typical, "worst": each.farthest}}
         for each in verdict.witnesses
@@ -93,9 +136,8 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
 
 
 def open_directory(directory: Path) -> None:
-    """Make a directory for results, and check that they may be written there.
-    Raises `StorageError` if the directory can't be written or holds results of another version of the program.
-    """
+    """Make a directory for results, and check that they may be written there. Raises `StorageError`
+    if the directory can't be written or holds results of another version of the program."""
     make_directory(directory)
     check_ours(directory / REPORT, beside=directory / SUMMARY)
     make_directory(directory / RUNS)
@@ -107,7 +149,9 @@ def load(directory: Path) -> Summary:
     """Read the summary; raises `StorageError` if there is none or it is of another version."""
     path = directory / SUMMARY
     if not path.exists():
-        raise StorageError(f"cannot read {path}: No such file or directory; run 'dualball validate -o {directory}'")
+        raise StorageError(
+            f"cannot read {path}: No such file or directory; run 'dualball validate -o {directory}'"
+        )
     with reading_json(path, "summary that this program reads") as content:
         if (content["schema"], content["schema_version"]) != (SCHEMA, SCHEMA_VERSION):
             raise ValueError("it is in another format; choose another directory with --output")
@@ -116,7 +160,9 @@ def load(directory: Path) -> Summary:
             engine: {int(n): [*map(str, names)] for n, names in steps.items()}
             for engine, steps in content["measurements"].items()
         }
-        summary = Summary(content["level"], files, *(dict(content[name]) for name in ("verdicts", "provenance")))
+        summary = Summary(
+            content["level"], files, *(dict(content[name]) for name in ("verdicts", "provenance"))
+        )
         version, ours = summary.provenance["versions"]["dualball"], current_versions()["dualball"]
     if version != ours:
         held = f"{directory} holds results of dualball {version}, this is {ours}"

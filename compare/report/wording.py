@@ -1,4 +1,5 @@
-"""Numbers, conditions and verdicts as a reader sees them, in the terminal and on the page. Nothing reads them back."""
+"""Numbers, conditions and verdicts as a reader sees them, in the terminal and on the page. Nothing
+reads them back."""
 
 from __future__ import annotations
 
@@ -15,8 +16,11 @@ from compare.kit.quantities import QUANTITIES, quantity
 from compare.kit.record import Check, Condition, Measurement
 from model import Case
 
-SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {n: n for n in ("v_h", "n_x", "n_y", "n_z")}
-"""How quantities and named conditions are written, where that isn't their name without underscores."""
+SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
+    n: n for n in ("v_h", "n_x", "n_y", "n_z")
+}
+"""How quantities and named conditions are written, where that isn't their name without
+underscores."""
 _UNITS = {"h": "m", "v_h": "m s-1", "f": "Hz", "amplitude": "rad s-1", "rate": "rad s-2"}
 _UNITS |= {name: each.unit for name, each in QUANTITIES.items()}
 MARKS = {
@@ -36,7 +40,8 @@ def size(value: float, sign: str = "") -> str:
 
 
 def value(m: Measurement, of: float) -> str:
-    """A value of the measurement's quantity as text; cases by their names, of what is tiny its size alone."""
+    """A value of the measurement's quantity as text; cases by their names, of what is tiny its size
+    alone."""
     if not math.isfinite(of):
         return "none" if math.isnan(of) else f"{of:g}"
     if m.quantity == "case":
@@ -47,14 +52,17 @@ def value(m: Measurement, of: float) -> str:
 
 
 def conditions(of: Mapping[str, Condition]) -> str:
-    """Named conditions as text: "case SS, from above, y = 0.02 m"; states that are 0 are left out."""
+    """Named conditions as text: "case SS, from above, y = 0.02 m"; states that are 0 are left
+    out."""
     said = []
     for name, each in of.items():
         plain = name.replace("_", " ")
         if isinstance(each, str):
             said.append(each if name == "side" else f"{plain} {each}")
         elif each or name not in ("y", "v_y", "h", "v_h", "slip_x", "slip_y", "slip_z"):
-            said.append(f"{SYMBOLS.get(name, plain)} = {each:.4g} {readable(_UNITS.get(name, '1'))}".rstrip())
+            said.append(
+                f"{SYMBOLS.get(name, plain)} = {each:.4g} {readable(_UNITS.get(name, '1'))}".rstrip()
+            )
     return ", ".join(said)
 
 
@@ -70,12 +78,14 @@ def mark(check: Check) -> str:
 
 
 def ranked(checks: Sequence[Check]) -> list[Check]:
-    """Checks, the worst first: what fails, then what is too coarse, then by deviation divided by tolerance."""
+    """Checks, the worst first: what fails, then what is too coarse, then by deviation divided by
+    tolerance."""
     return sorted(checks, key=lambda check: (check.agrees, check.conclusive, -check.share))
 
 
 def findings(verdict: Verdict) -> dict[str, str]:
-    """What the numbers of a verdict come to, by heading: the largest deviation, and what error they would notice.
+    """What the numbers of a verdict come to, by heading: the largest deviation, and what error they
+    would notice.
 
     The latter is given by quantity, and left out where only counts are compared.
     """
@@ -98,28 +108,39 @@ def findings(verdict: Verdict) -> dict[str, str]:
 
 
 def noticed_errors(powers: Mapping[str, float]) -> str:
-    """In words which errors of theory would be noticed, by resolving power; empty where all quantities are counts."""
+    """In words which errors of theory would be noticed, by resolving power; empty where all
+    quantities are counts."""
     alike: dict[str, list[str]] = {}
     for name, power in powers.items():
         if quantity(name).resolves:
             alike.setdefault(f"{power:.2g}" if power < 1 else "", []).append(SYMBOLS[name])
     blind = ", ".join(alike.pop("", []))
     errors = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
-    parts = [f"a relative error of {errors}"] * bool(errors) + [f"none in {blind}, which are too coarse"] * bool(blind)
+    parts = [f"a relative error of {errors}"] * bool(errors) + [
+        f"none in {blind}, which are too coarse"
+    ] * bool(blind)
     return "; ".join(parts)
 
 
 def coarsest(witness: Witness) -> float:
     """The coarsest resolving power of a quantity; nan where all are counts."""
-    return max((power for name, power in witness.resolving_power.items() if quantity(name).resolves), default=math.nan)
+    return max(
+        (power for name, power in witness.resolving_power.items() if quantity(name).resolves),
+        default=math.nan,
+    )
 
 
 def witness_outcome(witness: Witness) -> str:
-    """In words the outcome by an engine beside the one on trial, and to what relative error it confirms."""
+    """In words the outcome by an engine beside the one on trial, and to what relative error it
+    confirms."""
     if witness.outcome is not Outcome.CONFIRMED:
         return witness.outcome
     power = coarsest(witness)
-    return f"{witness.outcome} to {power:.1e}" if math.isfinite(power) else f"{witness.outcome} by counts"
+    return (
+        f"{witness.outcome} to {power:.1e}"
+        if math.isfinite(power)
+        else f"{witness.outcome} by counts"
+    )
 
 
 def witness_sentence(witness: Witness) -> str:
@@ -132,7 +153,10 @@ def witness_sentence(witness: Witness) -> str:
     count = len(witness.checks)
     numbers = f" on {count} number{'s' if count > 1 else ''}" if count else ""
     errors = f"; would notice {found}" if (found := noticed_errors(witness.resolving_power)) else ""
-    off, why = at if math.isfinite(witness.farthest) else "", f"; {witness.reason}" if witness.reason else ""
+    off, why = (
+        at if math.isfinite(witness.farthest) else "",
+        f"; {witness.reason}" if witness.reason else "",
+    )
     return f"{witness.outcome}{numbers}{order}{errors}{off}{left_out}{why}"
 
 
@@ -143,12 +167,19 @@ def percent(share: float) -> str:
 
 
 def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
-    """What each engine says of all claims: what it is, how many came out how, which it refutes, its deviations."""
+    """What each engine says of all claims: what it is, how many came out how, which it refutes, its
+    deviations."""
     rows = []
     for name in dict.fromkeys(each.engine for verdict in ran for each in verdict.witnesses):
-        own = [(verdict, each) for verdict in ran for each in verdict.witnesses if each.engine == name]
+        own = [
+            (verdict, each) for verdict in ran for each in verdict.witnesses if each.engine == name
+        ]
         counts = Counter(each.outcome for _, each in own)
-        refuted = {v.claim.id: v.claim.expected is Outcome.REFUTED for v, w in own if w.outcome is Outcome.REFUTED}
+        refuted = {
+            v.claim.id: v.claim.expected is Outcome.REFUTED
+            for v, w in own
+            if w.outcome is Outcome.REFUTED
+        }
         off = [each for _, each in own if math.isfinite(each.typical)]
         powers = [coarsest(each) for _, each in own if each.outcome is Outcome.CONFIRMED]
         known = [power for power in powers if math.isfinite(power)]
@@ -161,7 +192,9 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
             "counted": str(len(powers) - len(known)),
             "to": f"{median(known):.1e}, at worst {max(known):.1e}" if known else "–",
             "refuted": refuted,
-            "open": str(counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]),
+            "open": str(
+                counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]
+            ),
             "typical": percent(median(each.typical for each in off)) if off else "–",
             "worst": percent(max(each.farthest for each in off)) if off else "–",
         }
@@ -170,11 +203,15 @@ def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
 
 
 def headline(ran: Sequence[Verdict]) -> str:
-    """All verdicts in a sentence: the claims that failed or are undecided, or that the engine agrees."""
+    """All verdicts in a sentence: the claims that failed or are undecided, or that the engine
+    agrees."""
     parts, bad = [], [verdict for verdict in ran if not verdict.passed]
     undecided = [verdict.claim.id for verdict in bad if verdict.outcome is Outcome.INCONCLUSIVE]
     failed = [verdict.claim.id for verdict in bad if verdict.outcome is not Outcome.INCONCLUSIVE]
-    for what, ids in (("did not come out as expected", failed), ("can't be told from what was measured", undecided)):
+    for what, ids in (
+        ("did not come out as expected", failed),
+        ("can't be told from what was measured", undecided),
+    ):
         more = f" and {len(ids) - 4} more" if len(ids) > 4 else ""
         parts += [f"{len(ids)} of {len(ran)} claims {what}: {', '.join(ids[:4])}{more}"] * bool(ids)
     if parts:
@@ -186,11 +223,14 @@ def headline(ran: Sequence[Verdict]) -> str:
 
 
 def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
-    """Counts of claims that came out as expected, by kind, and of those that didn't; each with what it counts."""
+    """Counts of claims that came out as expected, by kind, and of those that didn't; each with what
+    it counts."""
     passed = [verdict for verdict in ran if verdict.passed]
     left = sum(verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed for verdict in ran)
     counts = {
-        "confirmed by measurement": sum(v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed),
+        "confirmed by measurement": sum(
+            v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed
+        ),
         "refuted as expected": sum(v.outcome is Outcome.REFUTED for v in passed),
         "formal, theory against theory": sum(bool(v.claim.algebra) for v in passed),
         "not as expected": len(ran) - len(passed) - left,
@@ -200,20 +240,34 @@ def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
 
 
 def coarse_and_missing(ran: Sequence[Verdict]) -> str:
-    """How many numbers are too coarse or missing, and what follows from that, in a sentence; empty if none is."""
+    """How many numbers are too coarse or missing, and what follows from that, in a sentence; empty
+    if none is."""
     coarse = sum(not check.conclusive for verdict in ran for check in verdict.checks)
     left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
     parts = [f"{coarse} of these numbers are too coarse to tell"] * (coarse > 0)
-    parts += [f"{left_out} more could not be measured, each for a reason that is given"] * (left_out > 0)
-    return f"{' and '.join(parts)}: an error of theory there alone would go unnoticed." if parts else ""
+    parts += [f"{left_out} more could not be measured, each for a reason that is given"] * (
+        left_out > 0
+    )
+    return (
+        f"{' and '.join(parts)}: an error of theory there alone would go unnoticed."
+        if parts
+        else ""
+    )
 
 
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """Counts of claims and of numbers by outcome, each with what it counts, in words."""
     checks = [check for verdict in ran for check in verdict.checks]
-    counts = [*by_kind(ran), (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance")]
+    counts = [
+        *by_kind(ran),
+        (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance"),
+    ]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
         counts.append(
-            (str(corrected), f"claim{'s hold' if corrected > 1 else ' holds'} in a corrected form, see the errata")
+            (
+                str(corrected),
+                f"claim{'s hold' if corrected > 1 else ' holds'} in a corrected form, see the "
+                f"errata",
+            )
         )
     return counts

@@ -1,4 +1,5 @@
-"""The subjects of the study: a folder each, with its `measure`, `claims` and `figures`, and a line here.
+"""The subjects of the study: a folder each, with its `measure`, `claims` and `figures`, and a line
+here.
 
 To take one out, remove both.
 """

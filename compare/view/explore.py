@@ -1,8 +1,9 @@
-"""A page on this machine to play with: what theory says of a set as its sliders move, and the motion in 3-D.
+"""A page on this machine to play with: what theory says of a set as its sliders move, and the
+motion in 3-D.
 
-NiceGUI serves it: one process and no page to build, with three.js and plotly.js in the package, so that it works
-without a network. Each tab has a set and a motion of its own, by the event-driven simulation.
-"""
+NiceGUI serves it: one process and no page to build, with three.js and plotly.js in the package, so
+that it works without a network. Each tab has a set and a motion of its own, by the event-driven
+simulation."""
 
 from __future__ import annotations
 
@@ -35,8 +36,9 @@ HOST = "127.0.0.1"
 LASTS, RATE = 10.0, 60
 """Duration of a motion, s, and its samples a second."""
 REST, PATIENCE = 0.3, 3600.0
-"""How long nothing is moved before the motion is simulated anew, s, and a tab is kept that doesn't answer: a browser
-that is busy for seconds, as with 3-D without a graphics card, would begin with the first set again."""
+"""How long nothing is moved before the motion is simulated anew, s, and a tab is kept that doesn't
+answer: a browser that is busy for seconds, as with 3-D without a graphics card, would begin with
+the first set again."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
 SLIDERS: dict[str, tuple[str, float, float, float]] = {
@@ -66,7 +68,8 @@ class Tab:
 
 
 def with_value(p: Parameters, name: str, value: float | str) -> Parameters:
-    """The set with another value of a slider or another law of drag; raises `InputError` for one out of its range."""
+    """The set with another value of a slider or another law of drag; raises `InputError` for one
+    out of its range."""
     if name == "kappa":
         return p.replace(c=float(value) * np.sqrt(p.g / p.R))
     more = {"nu_f": OIL} if name == "drag" and value != drag.STOKES and p.nu_f == 0 else {}
@@ -74,7 +77,8 @@ def with_value(p: Parameters, name: str, value: float | str) -> Parameters:
 
 
 def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
-    """A figure of omega_c of stationary solutions over omega_0, the thresholds, and where the ball starts."""
+    """A figure of omega_c of stationary solutions over omega_0, the thresholds, and where the ball
+    starts."""
     t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, stable_ends(p)
     lines: list[tuple[str, Case, Any, Any, str]] = []
     if np.isfinite(rolls):
@@ -84,7 +88,10 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
         for text, part, dash in (("SS", ~grows, "solid"), ("SS, unstable", grows, "dash")):
             lines.append((text, Case.SS, flows, np.where(part, x.omega_c, np.nan), dash))
     if np.isfinite(rides) and rides < fastest:
-        for case, dash in ((Case.SR, "solid"), (Case.NR, "12px,12px")):  # on one line their colours take turns
+        for case, dash in (
+            (Case.SR, "solid"),
+            (Case.NR, "12px,12px"),
+        ):  # on one line their colours take turns
             lines.append((case.name, case, [rides, fastest], [rides, fastest], dash))
     data = [
         {"type": "scatter", "mode": "lines", "name": text, "x": np.asarray(x).tolist(),
@@ -94,25 +101,43 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     ]  # fmt: skip
     data.append(_cross(p.omega_0, start))
     guides = [(name, getattr(t, name)) for name in ("omega_01", "omega_02", "omega_03", "omega_04")]
-    shown = [(name, at) for name, at in guides if at < fastest and not (name == "omega_03" and folds)]
-    guide = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "line": {"color": "#999", "dash": "dot"}}
+    shown = [
+        (name, at) for name, at in guides if at < fastest and not (name == "omega_03" and folds)
+    ]
+    guide = {
+        "type": "line",
+        "yref": "paper",
+        "y0": 0,
+        "y1": 1,
+        "line": {"color": "#999", "dash": "dot"},
+    }
     shapes = [guide | {"x0": at, "x1": at} for _, at in shown]
-    label = {"yref": "paper", "y": 0.98, "xanchor": "left", "showarrow": False, "font": {"size": 11}}
+    label = {
+        "yref": "paper",
+        "y": 0.98,
+        "xanchor": "left",
+        "showarrow": False,
+        "font": {"size": 11},
+    }
     annotations = [label | {"x": at, "text": str(typeset(SYMBOLS[name]))} for name, at in shown]
     cells = np.linspace(0.0, fastest, 81).tolist()
     data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": _as_bytes(np.zeros((81, 81))), "opacity": 0.0,
                     "showscale": False, "hoverinfo": "none"})  # fmt: skip
-    return _figure(data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, shapes=shapes, annotations=annotations)
+    return _figure(
+        data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, shapes=shapes, annotations=annotations
+    )
 
 
 def regions(p: Parameters, fastest: float) -> Figure:
-    """A figure of which stationary solutions exist over the wall's friction and the flow, and where the set is."""
+    """A figure of which stationary solutions exist over the wall's friction and the flow, and where
+    the set is."""
     eta, flows = np.linspace(0.0, SLIDERS["eta"][2], 121), np.linspace(0.0, fastest, 161)
     found = bifurcation.case_map(p, p.mu, eta, flows).T
     kinds, index = np.unique(found, return_inverse=True)
     cells = index.reshape(found.shape)
     names = [
-        " ".join(dict.fromkeys(f.name.split("_")[0] for f in Exists if f & int(kind) and f.name)) for kind in kinds
+        " ".join(dict.fromkeys(f.name.split("_")[0] for f in Exists if f & int(kind) and f.name))
+        for kind in kinds
     ]
     shades = [TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds]
     colours = [[(k + end) / len(kinds), shade] for k, shade in enumerate(shades) for end in (0, 1)]
@@ -132,14 +157,23 @@ def regions(p: Parameters, fastest: float) -> Figure:
 
 
 def _as_bytes(cells: npt.NDArray[Any]) -> dict[str, str]:
-    """Small whole numbers as bytes, in the form that plotly reads: much faster on a page than a list of numbers."""
+    """Small whole numbers as bytes, in the form that plotly reads: much faster on a page than a
+    list of numbers."""
     cells = cells.astype(np.uint8)
-    return {"bdata": base64.b64encode(cells.tobytes()).decode(), "dtype": "u1", "shape": "{}, {}".format(*cells.shape)}
+    return {
+        "bdata": base64.b64encode(cells.tobytes()).decode(),
+        "dtype": "u1",
+        "shape": "{}, {}".format(*cells.shape),
+    }
 
 
 def _cross(x: float, y: float) -> Figure:
     """A black cross at a point, as data of plotly."""
-    look = {"marker": {"symbol": "cross", "size": 12, "color": "black"}, "showlegend": False, "cliponaxis": False}
+    look = {
+        "marker": {"symbol": "cross", "size": 12, "color": "black"},
+        "showlegend": False,
+        "cliponaxis": False,
+    }
     return {"type": "scatter", "mode": "markers", "name": "here", "x": [x], "y": [y], **look}
 
 
@@ -166,15 +200,21 @@ def simulated(p: Parameters, start: State) -> Trajectory:
 def in_words(p: Parameters) -> str:
     """Thresholds of a set, and the motions to which its ball settles, in a line."""
     t = bifurcation.thresholds(p)
-    parts = [f"{symbol} = {at:.4g}" for name, symbol in SYMBOLS.items() if np.isfinite(at := getattr(t, name))]
+    parts = [
+        f"{symbol} = {at:.4g}"
+        for name, symbol in SYMBOLS.items()
+        if np.isfinite(at := getattr(t, name))
+    ]
     stable = " or ".join(
-        f"{each.case.name} at ω_c = {float(each.state.omega_c):.4g}" for each in analytic.stable_solutions(p)
+        f"{each.case.name} at ω_c = {float(each.state.omega_c):.4g}"
+        for each in analytic.stable_solutions(p)
     )
     return f"{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
 
 
 def serve(p: Parameters, port: int, show: bool) -> None:
-    """Serve the page on the loopback address alone until the process is interrupted; a tab has the set `p` at first.
+    """Serve the page on the loopback address alone until the process is interrupted; a tab has the
+    set `p` at first.
 
     Raises `InputError` if NiceGUI, an extra, isn't installed, or the port is in use.
     """
@@ -190,13 +230,21 @@ def serve(p: Parameters, port: int, show: bool) -> None:
         try:
             tried.bind((HOST, port))
         except OSError as error:
-            why = "is in use" if error.errno == errno.EADDRINUSE else f"can't be had: {error.strerror}"
+            why = (
+                "is in use"
+                if error.errno == errno.EADDRINUSE
+                else f"can't be had: {error.strerror}"
+            )
             raise InputError(f"port {port} {why}; choose another one by --port") from error
     scene = motion.write(p, 1.0)
     app.add_route("/motion", lambda _: HTMLResponse(scene))
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
-    quiet: dict[str, Any] = {"reload": False, "show_welcome_message": False, "reconnect_timeout": PATIENCE}
+    quiet: dict[str, Any] = {
+        "reload": False,
+        "show_welcome_message": False,
+        "reconnect_timeout": PATIENCE,
+    }
     ui.run(partial(page, p), host=HOST, port=port, title="dualball", show=show, **quiet)
 
 
@@ -217,7 +265,8 @@ def page(p: Parameters) -> None:
 
 
 def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[], None]:
-    """Build sliders, choice of drag law and buttons; return a function that draws all and, a bit later, simulates."""
+    """Build sliders, choice of drag law and buttons; return a function that draws all and, a bit
+    later, simulates."""
     from nicegui import run
 
     async def simulate() -> Trajectory | None:
@@ -228,7 +277,9 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
             return None
 
     async def again(mine: int) -> None:
-        if mine == tab.asked and (found := await simulate()) and mine == tab.asked:  # nothing else was asked meanwhile
+        if (
+            mine == tab.asked and (found := await simulate()) and mine == tab.asked
+        ):  # nothing else was asked meanwhile
             tab.run = found
             tab.play()
 
@@ -267,8 +318,12 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
         with ui.row().classes("w-full no-wrap items-center"):
             sliders[name] = slider = ui.slider(min=low, max=high, step=step, value=value(name))
             slider.props(f'aria-label="{name}"').on_value_change(partial(change, name))
-            number = ui.number(value=round(value(name), 4), step=step, format="%.4g").classes("w-24")
-            number.bind_value(slider).props("debounce=500").on("blur", show)  # not at each digit; what is refused goes
+            number = ui.number(value=round(value(name), 4), step=step, format="%.4g").classes(
+                "w-24"
+            )
+            number.bind_value(slider).props("debounce=500").on(
+                "blur", show
+            )  # not at each digit; what is refused goes
     laws = ui.select(list(drag.LAWS), value=tab.p.drag, label="law of drag").classes("w-40")
     laws.on_value_change(partial(change, "drag"))
     line = ui.html("", sanitize=False).classes("text-sm said")
@@ -287,7 +342,8 @@ def _download(ui: Any, save: Callable[[Path], object], name: str) -> None:
 
 
 def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[[], None]) -> None:
-    """Build the characteristic curve and the map of cases; a click chooses where the ball starts, or the set."""
+    """Build the characteristic curve and the map of cases; a click chooses where the ball starts,
+    or the set."""
     fastest = SLIDERS["omega_0"][2]
     figures = {
         "curve": lambda: characteristic(tab.p, float(tab.start.omega_c), fastest),
@@ -324,7 +380,9 @@ def _motion(ui: Any, tab: Tab) -> Callable[[], None]:
     def play() -> None:
         if tab.run and len(tab.run.time):
             frames = json.dumps(motion.frames(tab.run, tab.run.time))
-            within.client.run_javascript(f"getHtmlElement({within.id}).contentWindow.postMessage({frames}, origin)")
+            within.client.run_javascript(
+                f"getHtmlElement({within.id}).contentWindow.postMessage({frames}, origin)"
+            )
 
     within.on("load", play)
     return play

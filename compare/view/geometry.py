@@ -18,7 +18,8 @@ from model.trajectory import columns
 STEP = 5e-3
 """Longest time between points of the trail and of the rotation, s."""
 ARROW = 3.0
-"""Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball, unless said."""
+"""Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball,
+unless said."""
 
 
 @dataclass(frozen=True)
@@ -40,19 +41,25 @@ class Geometry:
     """Velocities in the tangent plane, as arrows, m; none without a force."""
 
 
-def geometry(run: Trajectory, now: Trajectory, force_arrow: float = ARROW, slip_arrow: float = ARROW) -> Geometry:
-    """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled; see `ARROW`."""
+def geometry(
+    run: Trajectory, now: Trajectory, force_arrow: float = ARROW, slip_arrow: float = ARROW
+) -> Geometry:
+    """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled; see
+    `ARROW`."""
     p = run.header.parameters
     steps = max(1, math.ceil((run.time[-1] - run.time[0]) / STEP))
     past = resampled(run, np.linspace(run.time[0], run.time[-1], steps + 1))
     centres, axes = to_world(now.x, now.theta, p).position, frame(now.theta)
     normals = np.stack([axes[:, 1], axes[:, 0]])
     forces, slips = (
-        np.einsum("nab,cna->cnb", axes, v) for v in ([now.force_A, now.force_B], slip_velocities(now.x, p))
+        np.einsum("nab,cna->cnb", axes, v)
+        for v in ([now.force_A, now.force_B], slip_velocities(now.x, p))
     )
     slips -= np.sum(slips * normals, axis=-1, keepdims=True) * normals
     fastest = max(float(np.abs(v).max()) for v in slip_velocities(run.x, p))
-    slips *= np.any(forces, axis=-1, keepdims=True) * (slip_arrow * p.r / fastest if fastest > 0 else 0.0)
+    slips *= np.any(forces, axis=-1, keepdims=True) * (
+        slip_arrow * p.r / fastest if fastest > 0 else 0.0
+    )
     return Geometry(
         past=past,
         turns=orientations(past)[np.searchsorted(past.time, now.time).clip(max=steps)],
@@ -65,7 +72,8 @@ def geometry(run: Trajectory, now: Trajectory, force_arrow: float = ARROW, slip_
 
 
 def resampled(run: Trajectory, times: Array) -> Trajectory:
-    """The run at times (n,) in s, interpolated linearly; the case is that of the last sample before."""
+    """The run at times (n,) in s, interpolated linearly; the case is that of the last sample
+    before."""
     place = np.interp(times, run.time, np.arange(len(run.time)))
     before = place.astype(int)
     after, share = np.minimum(before + 1, len(run.time) - 1), place - before
@@ -74,12 +82,15 @@ def resampled(run: Trajectory, times: Array) -> Trajectory:
         change = values[after] - values[before]
         return np.asarray(values[before] + change * share.reshape(-1, *[1] * (values.ndim - 1)))
 
-    values: dict[str, Any] = {name: at(getattr(run, name)) for name in columns(Trajectory) if name != "case"}
+    values: dict[str, Any] = {
+        name: at(getattr(run, name)) for name in columns(Trajectory) if name != "case"
+    }
     return dataclasses.replace(run, **values, case=run.case[before])
 
 
 def orientations(run: Trajectory) -> Rotation:
-    """The ball's orientation at each sample, from its angular velocity in the middle between them; upright at first."""
+    """The ball's orientation at each sample, from its angular velocity in the middle between them;
+    upright at first."""
     middle = resampled(run, (run.time[1:] + run.time[:-1]) / 2)
     spin = to_world(middle.x, middle.theta, run.header.parameters).spin
     turned = [Rotation.identity()]

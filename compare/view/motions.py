@@ -1,4 +1,5 @@
-"""Motions in words, tables and pictures: what a file of one holds, it on its cases, two side by side.
+"""Motions in words, tables and pictures: what a file of one holds, it on its cases, two side by
+side.
 
 Each is first described as data, then shown.
 """
@@ -74,25 +75,34 @@ def table(about: dict[str, Any]) -> Table:
         return f"{value:g}" if isinstance(value, float) else str(value)
 
     parameters, flow = about["parameters"], Flow.from_mapping(about["flow"])
-    units = {field.name: pages.readable(field.metadata["unit"]) for field in Parameters.quantities()}
+    units = {
+        field.name: pages.readable(field.metadata["unit"]) for field in Parameters.quantities()
+    }
     told = f"{flow.kind}, ω₀ from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
     if flow.is_steady:
         told = f"steady, ω₀ = {flow.value[0]:g} rad/s"
     elif len(flow.waves):
-        waves = ", ".join(f"{amplitude:g} rad/s at {frequency:g} Hz" for amplitude, frequency, _ in flow.waves)
+        waves = ", ".join(
+            f"{amplitude:g} rad/s at {frequency:g} Hz" for amplitude, frequency, _ in flow.waves
+        )
         told = f"{flow.kind}, ω₀ = {flow.value[0]:g} rad/s with waves of {waves}"
     last = zip(VARIABLES, kinematics.UNITS, strict=True) if about["last"] else ()
     rows = {
-        "engine": f"{about['engine']} ({', '.join(f'{k} {v}' for k, v in about['versions'].items())})",
+        "engine": f"{about['engine']} "
+        f"({', '.join(f'{k} {v}' for k, v in about['versions'].items())})",
         "made": f"{about['created']} {about['commit'][:12]}".strip(),
-        "parameters": ", ".join(f"{name} = {parameters[name]:g} {unit}".strip() for name, unit in units.items()),
+        "parameters": ", ".join(
+            f"{name} = {parameters[name]:g} {unit}".strip() for name, unit in units.items()
+        ),
         "drag": parameters["drag"],
         "flow": told,
         "settings": ", ".join(f"{k} = {short(v)}" for k, v in about["settings"].items()),
         "samples": f"{about['samples']} over {about['duration']:g} s",
         "cases": listed([f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]),
         "events": listed([f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]),
-        "last state": "\n".join(f"{n} = {about['last'][n]:.9g} {pages.readable(u)}" for n, u in last),
+        "last state": "\n".join(
+            f"{n} = {about['last'][n]:.9g} {pages.readable(u)}" for n, u in last
+        ),
     }
     return pages.pairs(rows | ({"failure": about["failure"]} if about["failure"] else {}))
 
@@ -104,7 +114,10 @@ def compared(a: Series, b: Series) -> dict[str, Any]:
     """
     both = [name for name in UNITS if name in a.values and name in b.values and name != "case"]
     if not both:
-        raise InputError(f"{a.name} has {', '.join(a.values)}, {b.name} has {', '.join(b.values)}: nothing to compare")
+        raise InputError(
+            f"{a.name} has {', '.join(a.values)}, {b.name} has {', '.join(b.values)}: nothing to "
+            f"compare"
+        )
     about = [
         {
             "name": each.name,
@@ -135,14 +148,18 @@ def compared_tables(about: dict[str, Any]) -> list[Any]:
     """What `compared` returned, for the terminal."""
     rows = {}
     for letter, each in zip("ab", about["motions"], strict=True):
-        made = f"{each['name']}{each['engine'] and ', ' + each['engine']}: {each['samples']} samples"
+        made = (
+            f"{each['name']}{each['engine'] and ', ' + each['engine']}: {each['samples']} samples"
+        )
         rows[letter] = f"{made} from {each['from']:g} to {each['to']:g} s"
         listed = [f"{case} {start:.4g}…{end:.4g} s" for case, start, end in each["cases"]]
         more = f", and {len(listed) - LISTED_OF_TWO} more" if len(listed) > LISTED_OF_TWO else ""
         rows[f"cases of {letter}"] = ", ".join(listed[:LISTED_OF_TWO]) + more
         rows[f"failure of {letter}"] = each["failure"]
     differ = about["parameters that differ"].items()
-    rows["made with other parameters"] = ", ".join(f"{name} = {a} in a, {b} in b" for name, (a, b) in differ)
+    rows["made with other parameters"] = ", ".join(
+        f"{name} = {a} in a, {b} in b" for name, (a, b) in differ
+    )
     table = [["a - b", "unit", "rms", "rms/max |b|", "largest", "at (s)"]]
     for each in about["differences"]:
         part = f"{each['rms'] / each['scale']:.1e}" if each["scale"] else ""
@@ -156,12 +173,15 @@ def compared_tables(about: dict[str, Any]) -> list[Any]:
 
 
 def draw_both(a: Series, b: Series) -> Figure:
-    """A figure of two motions in the quantities that both have, on the cases of the first, and of their differences."""
+    """A figure of two motions in the quantities that both have, on the cases of the first, and of
+    their differences."""
     from compare.kit import style  # here, because drawing takes a second to load
 
     names = [name for name in a.values if name in b.values]
     shown = ("omega_c", "slip_x", "slip_y", "slip_z", "y", "h")
-    seen = [n for n in shown if n in names and (n not in "yh" or max(a[n].max(), b[n].max()) > SEEN)]
+    seen = [
+        n for n in shown if n in names and (n not in "yh" or max(a[n].max(), b[n].max()) > SEEN)
+    ]
     names = seen or names[:1]
     figure, panels = style.panels(9, 1.6 * len(names) + 2.2, len(names) + 1, sharex=True)
     t = common_times(a, b)
@@ -172,7 +192,9 @@ def draw_both(a: Series, b: Series) -> Figure:
         axes.set(ylabel=f"{symbol} ({pages.readable(UNITS[name])})", xlim=t[[0, -1]])
         there = [np.interp(t, each.time, each[name]) for each in (a, b)]
         size = np.abs(there[1]).max() or 1.0
-        panels[-1].semilogy(t, np.maximum(np.abs(there[0] - there[1]) / size, style.LEAST), lw=1, label=symbol)
+        panels[-1].semilogy(
+            t, np.maximum(np.abs(there[0] - there[1]) / size, style.LEAST), lw=1, label=symbol
+        )
         if a.run:
             style.ground(axes, a.run, (t[0], t[-1]), named=axes is panels[0])
     style.legend(panels[0])
@@ -183,21 +205,32 @@ def draw_both(a: Series, b: Series) -> Figure:
 
 
 def draw(run: Trajectory) -> Figure:
-    """A figure of omega_c, slip, gaps and forces over time, on backgrounds in the colour of the case."""
+    """A figure of omega_c, slip, gaps and forces over time, on backgrounds in the colour of the
+    case."""
     from compare.kit import style  # here, because drawing takes a second to load
 
     t, p = run.time, run.header.parameters
     blue, green, orange, red, pink = "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7"
-    scale, unit = (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")
-    friction_A, friction_B = np.hypot(*run.force_A[:, [0, 2]].T), np.hypot(*run.force_B[:, [1, 2]].T)
+    scale, unit = (
+        (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")
+    )
+    friction_A, friction_B = (
+        np.hypot(*run.force_A[:, [0, 2]].T),
+        np.hypot(*run.force_B[:, [1, 2]].T),
+    )
     slips = zip("xyz", (red, green, pink), ("-", "--", ":"), strict=True)
     curves = {
         "angular velocity (rad/s)": (
             ("fluid, $ω_0$", run.header.flow(t), "0.6", "--"),
             ("orbit, $ω_c$", run.omega_c, blue, "-"),
         ),
-        "slip (rad/s)": tuple((style.symbol(f"slip_{k}"), getattr(run, f"slip_{k}"), *look) for k, *look in slips),
-        f"gap ({unit})": (("floor, $y$", scale * run.y, blue, "-"), ("wall, $h$", scale * run.h, orange, "--")),
+        "slip (rad/s)": tuple(
+            (style.symbol(f"slip_{k}"), getattr(run, f"slip_{k}"), *look) for k, *look in slips
+        ),
+        f"gap ({unit})": (
+            ("floor, $y$", scale * run.y, blue, "-"),
+            ("wall, $h$", scale * run.h, orange, "--"),
+        ),
         "force (N)": (
             (style.symbol("force_Ay"), run.force_A[:, 1], blue, "-"),
             ("friction at A", friction_A, blue, ":"),

@@ -1,9 +1,10 @@
-"""Pictures and films of a run: the MuJoCo scene from outside and from beside the ball, with forces, slip and case.
+"""Pictures and films of a run: the MuJoCo scene from outside and from beside the ball, with forces,
+slip and case.
 
-Everything shown is read from the run's file: the scene from the MJCF it holds (that of its parameters for the engines
-that have none), the motion from its samples. What it doesn't hold is how the ball is turned: the ball is shown turned
-with the angular velocity it has, from an arbitrary beginning.
-"""
+Everything shown is read from the run's file: the scene from the MJCF it holds (that of its
+parameters for the engines that have none), the motion from its samples. What it doesn't hold is how
+the ball is turned: the ball is shown turned with the angular velocity it has, from an arbitrary
+beginning."""
 
 from __future__ import annotations
 
@@ -66,29 +67,34 @@ def write(
     rate: int | None = None,
     **arrows: Any,
 ) -> str:
-    """Write a picture (png), a film (gif, mp4), both in 16:10, or a page (html); return in words what was written.
+    """Write a picture (png), a film (gif, mp4), both in 16:10, or a page (html); return in words
+    what was written.
 
     Parameters
     ----------
     at : the time of a picture, the end for None; where a film or page begins, 0 for None; s
     width : pixels; 960 for a picture and 640 for a film if None
-    time, speed, rate : a film or page is slowed down by `speed`, .25 if None, has `rate` frames a second, and takes
-        `time` in s, less if the run ends before; 6 s at 20 frames a second, of a page 60 s at 60
+    time, speed, rate : a film or page is slowed down by `speed`, .25 if None, has `rate` frames a
+        second, and takes `time` in s, less if the run ends before; 6 s at 20 frames a second, of a
+        page 60 s at 60
     arrows : `force_arrow` and `slip_arrow` of `frames`
 
-    Raises `InputError` for what can't be shown, on a machine without OpenGL, or for an mp4 where PyAV, an extra, isn't
-    installed; `StorageError` if the file can't be written.
-    """
+    Raises `InputError` for what can't be shown, on a machine without OpenGL, or for an mp4 where
+    PyAV, an extra, isn't installed; `StorageError` if the file can't be written."""
     kind = output.suffix.lower()
     if kind not in (".png", ".gif", ".mp4", ".html"):
         raise InputError(
-            f"cannot write {output}: a picture is a .png, a film a .gif or .mp4, a page to look round in an .html"
+            f"cannot write {output}: a picture is a .png, a film a .gif or .mp4, a page to look "
+            f"round in an .html"
         )
     check_writable(output)
     unused: dict[str, Any] = {"time": time, "speed": speed, "rate": rate} if kind == ".png" else {}
     for name, value in (unused or {"width": width if kind == ".html" else None}).items():
         if value is not None:
-            raise InputError(f"a {'page' if kind == '.html' else 'picture'} has no {name}: it would have no effect")
+            raise InputError(
+                f"a {'page' if kind == '.html' else 'picture'} has no {name}: it would have no "
+                f"effect"
+            )
     if len(run.time) == 0:
         raise InputError("the run has no samples to show")
     film, end = kind != ".png", float(run.time[-1])
@@ -105,7 +111,8 @@ def write(
     step, until = speed / rate, min(begin + lasts * speed, end)
     if film and (until - begin) / step > MOST_FRAMES:
         raise InputError(
-            f"{(until - begin) / step:.4g} frames are more than {MOST_FRAMES}: choose a shorter time, or a lower rate"
+            f"{(until - begin) / step:.4g} frames are more than {MOST_FRAMES}: choose a shorter "
+            f"time, or a lower rate"
         )
     times = np.arange(begin, until + 1e-12, step) if film else np.array([begin])
     if kind == ".html":
@@ -131,9 +138,8 @@ def write(
 def _gif(images: Iterator[Image.Image], rate: int) -> bytes:
     """A film in 256 colours for all frames, so that none flickers.
 
-    Half are from the first, half are shades of those that mean something, since what moves is small, and a palette of
-    the first frame alone would make it grey.
-    """
+    Half are from the first, half are shades of those that mean something, since what moves is
+    small, and a palette of the first frame alone would make it grey."""
     first = next(images)
     seen = first.quantize(120, dither=Image.Dither.NONE).getpalette() or []
     meant = np.array([to_rgb(colour) for colour in (*style.COLOURS.values(), FORCE, SLIP, BALL)])
@@ -145,12 +151,15 @@ def _gif(images: Iterator[Image.Image], rate: int) -> bytes:
     all_ = itertools.chain([first], images)
     first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in all_)
     out, duration = io.BytesIO(), round(1000 / rate)
-    first.save(out, "gif", optimize=True, save_all=True, append_images=rest, duration=duration, loop=0)
+    first.save(
+        out, "gif", optimize=True, save_all=True, append_images=rest, duration=duration, loop=0
+    )
     return out.getvalue()
 
 
 def _mp4(images: Iterator[Image.Image], rate: int) -> bytes:
-    """A film in H.264, of even width and height as that needs. Raises `InputError` if PyAV, an extra, isn't there."""
+    """A film in H.264, of even width and height as that needs. Raises `InputError` if PyAV, an
+    extra, isn't there."""
     try:
         av = importlib.import_module("av")
     except ImportError as error:
@@ -158,7 +167,11 @@ def _mp4(images: Iterator[Image.Image], rate: int) -> bytes:
     out, first = io.BytesIO(), next(images)
     with av.open(out, "w", format="mp4") as film:
         stream = film.add_stream("h264", rate=rate, options={"crf": "18"})
-        stream.width, stream.height, stream.pix_fmt = first.width // 2 * 2, first.height // 2 * 2, "yuv420p"
+        stream.width, stream.height, stream.pix_fmt = (
+            first.width // 2 * 2,
+            first.height // 2 * 2,
+            "yuv420p",
+        )
         for image in itertools.chain([first], images):
             even = image.crop((0, 0, stream.width, stream.height))
             film.mux(stream.encode(av.VideoFrame.from_image(even)))
@@ -166,12 +179,14 @@ def _mp4(images: Iterator[Image.Image], rate: int) -> bytes:
     return out.getvalue()
 
 
-def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, note: str, slips: bool) -> Image.Image:
-    """The picture from outside with that from beside the ball in its corner, labelled with time, case and note.
+def _labelled(
+    image: Image.Image, small: Image.Image, run: Trajectory, k: int, note: str, slips: bool
+) -> Image.Image:
+    """The picture from outside with that from beside the ball in its corner, labelled with time,
+    case and note.
 
-    Written over it are the case and numbers of sample k of the run, a note beside the time, and a legend, with slip
-    velocities if there are any.
-    """
+    Written over it are the case and numbers of sample k of the run, a note beside the time, and a
+    legend, with slip velocities if there are any."""
     unit, case = image.width / 960, Case(run.case[k])
     margin, pad = round(22 * unit), 14 * unit
     font = Path(matplotlib.get_data_path()) / "fonts/ttf/DejaVuSans.ttf"
@@ -188,7 +203,10 @@ def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, n
     words = f"floor: {case.A.value}\nwall: {case.B.value}"
     draw.multiline_text((right + pad, margin + 2 * unit), words, INK, font=text, spacing=5 * unit)
     speeds = run.slip_speed_A[k], run.slip_speed_B[k]
-    slip = ["–" if contact == "N" else f"{v:.3f} m/s" for contact, v in zip(case.name, speeds, strict=True)]
+    slip = [
+        "–" if contact == "N" else f"{v:.3f} m/s"
+        for contact, v in zip(case.name, speeds, strict=True)
+    ]
     lines = (
         f"t = {run.time[k]:.3f} s   {note}",
         f"ω₀ = {float(run.header.flow(run.time[k])):.2f} rad/s",
@@ -207,7 +225,8 @@ def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, n
 def frames(
     run: Trajectory, times: Array, width: int, force_arrow: float = ARROW, slip_arrow: float = ARROW
 ) -> Iterator[tuple[Image.Image, Image.Image]]:
-    """Pictures of a run at times (n,) in s: from outside, in 16:10, and from beside the ball, a small square.
+    """Pictures of a run at times (n,) in s: from outside, in 16:10, and from beside the ball, a
+    small square.
 
     Raises `InputError` if there is no OpenGL, or the run holds no scene with a ball.
     """
@@ -218,7 +237,11 @@ def frames(
     height = width * 10 // 16
     inset = height * 5 // 12
     model = _model(run, 2 * width, 2 * height)
-    data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / STEP)
+    data, ball, most = (
+        mujoco.MjData(model),
+        model.geom("ball").id,
+        100 + math.ceil(_LONGEST_TRAIL / STEP),
+    )
     mujoco.mj_forward(model, data)
     choose_opengl()
     above, behind = mujoco.MjvCamera(), mujoco.MjvCamera()
@@ -231,11 +254,13 @@ def frames(
     ):
         for k, centre in enumerate(seen.centres):
             data.geom_xpos[ball], data.geom_xmat[ball] = centre, seen.turns[k].as_matrix().ravel()
-            # From behind the ball and a little inwards, so that floor and wall are both seen edge-on.
+            # From behind the ball and a little inwards, so that floor and wall are both seen
+            # edge-on.
             behind.lookat, behind.azimuth = centre, math.degrees(now.theta[k]) + 78.0
             outside.update_scene(data, above)
             beside.update_scene(data, behind)
-            # The trail: where the ball touched the floor's height before, in the colours of the cases, fading.
+            # The trail: where the ball touched the floor's height before, in the colours of the
+            # cases, fading.
             some = (past.time > now.time[k] - _LONGEST_TRAIL) & (past.time < now.time[k])
             age = np.abs(past.theta[some] - now.theta[k]) / (2 * math.pi * _TRAIL)
             points = to_world(past.x[some], past.theta[some], p).position - [0.0, 0.0, 0.92 * p.r]
@@ -243,10 +268,16 @@ def frames(
                 if max(age[i], age[i + 1]) < 1:
                     colour, alpha = style.COLOURS[Case(case)], 0.9 * (1 - age[i])
                     geom = _add(outside.scene, mujoco.mjtGeom.mjGEOM_CAPSULE, colour, alpha)
-                    mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[i], points[i + 1])
+                    mujoco.mjv_connector(
+                        geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[i], points[i + 1]
+                    )
             arrows = []
             for normal, contact, force, slip in zip(
-                seen.normals[:, k], seen.contacts[:, k], seen.forces[:, k], seen.slips[:, k], strict=True
+                seen.normals[:, k],
+                seen.contacts[:, k],
+                seen.forces[:, k],
+                seen.slips[:, k],
+                strict=True,
             ):
                 arrows.append((0.16 * p.r, contact, force, FORCE))
                 arrows.append((0.13 * p.r, contact + 0.1 * p.r * normal, slip, SLIP))
@@ -258,10 +289,14 @@ def frames(
                 for thick, begin, arrow, colour in arrows:
                     if np.linalg.norm(arrow) > 2 * thick:
                         geom = _add(renderer.scene, mujoco.mjtGeom.mjGEOM_ARROW, colour)
-                        mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, thick, begin, begin + arrow)
+                        mujoco.mjv_connector(
+                            geom, mujoco.mjtGeom.mjGEOM_ARROW, thick, begin, begin + arrow
+                        )
                 renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
                 size = (renderer.width // 2, renderer.height // 2)
-                images.append(Image.fromarray(renderer.render()).resize(size, Image.Resampling.LANCZOS))
+                images.append(
+                    Image.fromarray(renderer.render()).resize(size, Image.Resampling.LANCZOS)
+                )
             yield images[0], images[1]
 
 
@@ -275,11 +310,11 @@ def _add(drawn: Any, kind: Any, colour: str, alpha: float = 1.0) -> Any:
 
 
 def _model(run: Trajectory, width: int, height: int) -> Any:
-    """The scene to be drawn in pixels: what only serves contact is hidden, the vessel is a ring of glass.
+    """The scene to be drawn in pixels: what only serves contact is hidden, the vessel is a ring of
+    glass.
 
-    It is that of the MJCF which the run holds, or of its parameters if it holds none. Raises `InputError` if the MJCF
-    is not valid or has no ball.
-    """
+    It is that of the MJCF which the run holds, or of its parameters if it holds none. Raises
+    `InputError` if the MJCF is not valid or has no ball."""
     p = run.header.parameters
     mjcf = run.header.mjcf or scene.build(p, ContactSettings())[1]
     try:
@@ -316,28 +351,36 @@ def _model(run: Trajectory, width: int, height: int) -> Any:
 
 @functools.cache
 def choose_opengl() -> None:
-    """Let `mujoco.Renderer` draw with the kind of OpenGL that MUJOCO_GL names, else with one that works.
+    """Let `mujoco.Renderer` draw with the kind of OpenGL that MUJOCO_GL names, else with one that
+    works.
 
     Raises `InputError` if there is none.
     """
     chosen = os.environ.get("DUALBALL_GL", os.environ.get("MUJOCO_GL", "")).strip().lower()
-    working = platform.system() != "Linux" or next(filter(works, [chosen] if chosen else OFFSCREEN), None)
+    working = platform.system() != "Linux" or next(
+        filter(works, [chosen] if chosen else OFFSCREEN), None
+    )
     if not working:
         remedy = "on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)"
         if chosen:
             remedy = f"unset MUJOCO_GL = {chosen!r}, or set it to one of {', '.join(OFFSCREEN)}"
         raise InputError(f"there is no OpenGL to draw with; {remedy}")
-    if isinstance(working, str):  # MuJoCo chose none when it was imported, or one that needs a display
+    if isinstance(
+        working, str
+    ):  # MuJoCo chose none when it was imported, or one that needs a display
         gl_context.GLContext = importlib.import_module(f"mujoco.{working}").GLContext
 
 
 def works(kind: str) -> bool:
     """Whether a kind of OpenGL works, tried in a process of its own.
 
-    A library that is missing or has no driver may end the process, or leave it unable to load another one.
-    """
-    # OSMesa's context can't be freed while Python shuts down: the process ends at once, without cleaning up.
+    A library that is missing or has no driver may end the process, or leave it unable to load
+    another one."""
+    # OSMesa's context can't be freed while Python shuts down: the process ends at once, without
+    # cleaning up.
     code = "import mujoco, os; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8); os._exit(0)"
     environment = os.environ | {"MUJOCO_GL": kind}
-    tried = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, timeout=60, check=False)
+    tried = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, timeout=60, check=False
+    )
     return tried.returncode == 0

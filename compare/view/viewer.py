@@ -1,4 +1,5 @@
-"""MuJoCo's interactive viewer, with the ball driven by the study's own loop: drag, turning wall, corrections."""
+"""MuJoCo's interactive viewer, with the ball driven by the study's own loop: drag, turning wall,
+corrections."""
 
 from __future__ import annotations
 
@@ -21,21 +22,28 @@ BEHIND = 0.1
 """How far a slow machine may lag behind before the clock is set back, s."""
 
 
-def view(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings, speed: float = 1.0) -> None:
+def view(
+    p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings, speed: float = 1.0
+) -> None:
     """Open a window and simulate in real time, times `speed`, until it is closed.
 
     Raises `InputError` if there is no display, or for a speed out of range.
     """
     check_number("speed", speed, "1", POSITIVE)
-    if platform.system() == "Linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if platform.system() == "Linux" and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
         raise InputError(
-            "there is no display for a window; 'dualball simulate' and 'dualball render' make a film instead"
+            "there is no display for a window; 'dualball simulate' and 'dualball render' make a "
+            "film instead"
         )
     from mujoco import viewer  # here, because it needs a window system
 
     ball = start(p, x0, flow, settings)
     try:
-        handle = viewer.launch_passive(ball.model, ball.data, show_left_ui=False, show_right_ui=False)
+        handle = viewer.launch_passive(
+            ball.model, ball.data, show_left_ui=False, show_right_ui=False
+        )
     except RuntimeError as error:  # macOS needs to be asked in another way
         raise InputError(f"the viewer does not open: {' '.join(str(error).split())}") from error
     with handle:
@@ -67,7 +75,9 @@ def run(handle: Any, ball: JointedBall, flow: Flow, timestep: float, speed: floa
             begin += (due - most) * timestep / speed
             due = most
         with handle.lock():
-            ball.advance(flow((steps + 0.5 + np.arange(due)) * timestep), np.empty((due, recorder.COLUMNS)))
+            ball.advance(
+                flow((steps + 0.5 + np.arange(due)) * timestep), np.empty((due, recorder.COLUMNS))
+            )
         steps += due
         handle.sync()
         time.sleep(max(0.0, FRAME - (time.monotonic() - frame)))

@@ -1,7 +1,7 @@
 """What MuJoCo reaches with this project's settings, and what it can't do.
 
-Each function runs what it needs in a campaign and returns the rows of one table; `document` writes them.
-"""
+Each function runs what it needs in a campaign and returns the rows of one table; `document` writes
+them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ from model import Case, Contact, Events, State
 
 STEPS = (4e-3, 1e-3)
 """Time steps of stationary states, s."""
-_MORE = [Stationary(SMOOTH.replace(omega_0=w), case) for w, case in ((8.0, Case.RR), (20.0, Case.SS), (30.0, Case.SS))]
+_MORE = [
+    Stationary(SMOOTH.replace(omega_0=w), case)
+    for w, case in ((8.0, Case.RR), (20.0, Case.SS), (30.0, Case.SS))
+]
 REACHED = sorted([*STATES, *_MORE], key=lambda state: (state.case, state.p.omega_0))
 """Stationary states: those of the other tables, and some between them."""
 OFF = 1.02
@@ -47,11 +50,15 @@ def _at(step: float, settings: ContactSettings | None = None) -> Contestant:
     return Contestant(MUJOCO.name, MUJOCO, step, settings or ContactSettings.at(step))
 
 
-def reached(campaign: Campaign, states: Sequence[Stationary] = REACHED, steps: Sequence[float] = STEPS) -> Rows:
+def reached(
+    campaign: Campaign, states: Sequence[Stationary] = REACHED, steps: Sequence[float] = STEPS
+) -> Rows:
     """Errors of stationary states from rest and from near them, the worse of the two."""
     lasts = max(state.settles for state in states)
     tasks = {
-        (state, h): [_at(h).task((state.p, x0, lasts, lasts / 1000)) for x0 in (AT_REST, _near(state))]
+        (state, h): [
+            _at(h).task((state.p, x0, lasts, lasts / 1000)) for x0 in (AT_REST, _near(state))
+        ]
         for state in states
         for h in steps
     }
@@ -61,19 +68,27 @@ def reached(campaign: Campaign, states: Sequence[Stationary] = REACHED, steps: S
         held = [state.held(run, (1 - WINDOW) * lasts) for run in campaign.run(pair)]
         orbital = float(abs(state.solution.state.omega_c)) * state.p.R
         errors = max(abs(each.omega_c) for each in held), max(each.slip for each in held) / orbital
-        creep = number(max(each.creep for each in held)) if Contact.R in (state.case.A, state.case.B) else "–"
+        creep = (
+            number(max(each.creep for each in held))
+            if Contact.R in (state.case.A, state.case.B)
+            else "–"
+        )
         lost = f"{max(each.open for each in held):.1%}"
-        rows.append([state.name, f"{state.p.eta:g}", _milliseconds(h), *map(number, errors), creep, lost])
+        rows.append(
+            [state.name, f"{state.p.eta:g}", _milliseconds(h), *map(number, errors), creep, lost]
+        )
     return rows
 
 
 def _near(state: Stationary) -> State:
-    """A start off the state in all of its variables; high over the floor where only the wall carries the ball."""
+    """A start off the state in all of its variables; high over the floor where only the wall
+    carries the ball."""
     return State.of(OFF * state.solution.x)._replace(y=state.p.R if state.case is Case.NR else 0.0)
 
 
 def transient(campaign: Campaign, steps: Sequence[float] = FINE) -> Rows:
-    """Rms errors of the transient with the step, the order from one step to the next, and the extrapolation."""
+    """Rms errors of the transient with the step, the order from one step to the next, and the
+    extrapolation."""
     runs = campaign.run([_at(step).task(APPROACH.run) for step in steps])
     errors = np.array([APPROACH.errors(run.time, run.x) for run in runs])
     ratios = np.array(steps[:-1]) / steps[1:]
@@ -91,11 +106,14 @@ def transient(campaign: Campaign, steps: Sequence[float] = FINE) -> Rows:
 
 
 def event_times(campaign: Campaign, steps: Sequence[float] = (1e-3, 5e-4, 2.5e-4, 1e-4)) -> Rows:
-    """Largest error of the moments at which contacts close, and at which they stick, and orders from step to step."""
+    """Largest error of the moments at which contacts close, and at which they stick, and orders
+    from step to step."""
     rows = [["motion", "h", *(name for kind in KINDS for name in (f"contacts {kind}", "order"))]]
     for motion in (LANDING, HITTING):
         exact, before = _moments(motion.exact.events), dict.fromkeys(KINDS, (math.nan, math.nan))
-        runs = campaign.run([_at(step).task((motion.p, motion.x0, motion.lasts, motion.lasts)) for step in steps])
+        runs = campaign.run(
+            [_at(step).task((motion.p, motion.x0, motion.lasts, motion.lasts)) for step in steps]
+        )
         for step, run in zip(steps, runs, strict=True):
             cells, seen = [], _moments(run.events)
             for kind in KINDS:
@@ -123,7 +141,15 @@ def _moments(events: Events) -> dict[tuple[str, str], float]:
 
 def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0)) -> Rows:
     """B_y in two-point rolling, where it may lie anywhere in an interval."""
-    rows = [["ω₀ (rad/s)", "admissible B_y (N)", "no memory", "memory, from 12 % off", "memory, from rest"]]
+    rows = [
+        [
+            "ω₀ (rad/s)",
+            "admissible B_y (N)",
+            "no memory",
+            "memory, from 12 % off",
+            "memory, from rest",
+        ]
+    ]
     plain, ours = ContactSettings(memory=False, order=1), ContactSettings()
     for omega_0 in omegas:
         p = SMOOTH.replace(omega_0=omega_0)
@@ -131,9 +157,13 @@ def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0))
         off = State(omega_c=0.88 * omega_0)
         lasts = Stationary(p, Case.RR).settles
         starts = (plain, off), (ours, off), (ours, AT_REST)
-        runs = campaign.run([_at(s.timestep, s).task((p, x0, lasts, lasts / 1000)) for s, x0 in starts])
+        runs = campaign.run(
+            [_at(s.timestep, s).task((p, x0, lasts, lasts / 1000)) for s, x0 in starts]
+        )
         forces = [run.force_B[run.time >= (1 - WINDOW) * lasts, 1].mean() for run in runs]
-        rows.append([f"{omega_0:g}", f"{least:.4f} … {greatest:.4f}", *(f"{force:.4f}" for force in forces)])
+        rows.append(
+            [f"{omega_0:g}", f"{least:.4f} … {greatest:.4f}", *(f"{force:.4f}" for force in forces)]
+        )
     return rows
 
 

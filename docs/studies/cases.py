@@ -1,4 +1,5 @@
-"""Figs. 2, 3 and 6: the nine cases, sections of the state space, and transitions to cases of more freedom."""
+"""Figs. 2, 3 and 6: the nine cases, sections of the state space, and transitions to cases of more
+freedom."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ _REACH = 0.42
 
 
 def draw_2() -> Figure:
-    """Fig. 2, the nine cases. Rows: the contact with the floor; columns: with the wall; nearer ones roll."""
+    """Fig. 2, the nine cases. Rows: the contact with the floor; columns: with the wall; nearer ones
+    roll."""
     figure = style.figure(6.4, 6.2)
     for row, panels in zip(_COLUMNS, figure.subplots(3, 3), strict=True):
         for column, axes in zip(_COLUMNS, panels, strict=True):
@@ -48,11 +50,15 @@ def _sketch(axes: Axes, case: Case) -> None:
     _contact(axes, case.A, floor, (1, 0))
     _contact(axes, case.B, wall, (0, 1))
     for point, letter, shift in ((floor, "A", (0, 0.24)), (wall, "B", (-0.24, 0))):
-        axes.text(point[0] + shift[0], point[1] + shift[1], letter, ha="center", va="center", fontsize=8)
+        axes.text(
+            point[0] + shift[0], point[1] + shift[1], letter, ha="center", va="center", fontsize=8
+        )
     active = TRAITS[case].active
     geometric = len({"y", "h"} & set(active))
     numbers = f"{geometric} + {len(active) - geometric} = {len(active)}"
-    axes.text(*centre, f"{case.name}\n{numbers}", ha="center", va="center", fontsize=10, linespacing=1.4)
+    axes.text(
+        *centre, f"{case.name}\n{numbers}", ha="center", va="center", fontsize=10, linespacing=1.4
+    )
     axes.set(xlim=(0, 2.4), ylim=(-0.2, 2.2), aspect="equal")
     axes.axis("off")
 
@@ -61,9 +67,15 @@ def _contact(axes: Axes, contact: Contact, at: tuple[float, float], along: tuple
     if contact is Contact.R:
         axes.plot(*at, "ko", ms=6)
     elif contact is Contact.S:
-        inside = 0.1 * np.array(along[::-1]) * (-1, 1)  # in the ball, clear of the line of floor or wall
+        inside = (
+            0.1 * np.array(along[::-1]) * (-1, 1)
+        )  # in the ball, clear of the line of floor or wall
         ends = [tuple(np.array(at) + inside + side * 0.34 * np.array(along)) for side in (-1, 1)]
-        axes.add_patch(FancyArrowPatch(*ends, arrowstyle="<|-|>", mutation_scale=9, color="#B3261E", lw=1.6, zorder=4))
+        axes.add_patch(
+            FancyArrowPatch(
+                *ends, arrowstyle="<|-|>", mutation_scale=9, color="#B3261E", lw=1.6, zorder=4
+            )
+        )
 
 
 def draw_3() -> Figure:
@@ -79,15 +91,33 @@ def draw_3() -> Figure:
     left.plot([0, 0], [0, 0], [-1, 1], color="0.6", lw=0.8, ls=":")
     left.plot([0], [0], [0], color=style.COLOURS[Case.RR], marker="o", ms=9)
     _name(
-        left, {Case.RR: (-0.2, 0, 0.16), Case.SR: (0.85, 0, 0.14), Case.RS: (0, 0.8, 0.14), Case.SS: (0.8, 0.8, -0.7)}
+        left,
+        {
+            Case.RR: (-0.2, 0, 0.16),
+            Case.SR: (0.85, 0, 0.14),
+            Case.RS: (0, 0.8, 0.14),
+            Case.SS: (0.8, 0.8, -0.7),
+        },
     )
     _axes(left, ("$\\tilde\\omega_x$", "$\\tilde\\omega_y$", "$\\tilde\\omega_z$"))
     left.set_title("$y = v_y = 0$, $\\omega_c$ fixed", fontsize=10)
-    across, along, zero = np.array([[-1.0, 1.0], [-1.0, 1.0]]), np.array([[-1.0, -1.0], [1.0, 1.0]]), np.zeros((2, 2))
+    across, along, zero = (
+        np.array([[-1.0, 1.0], [-1.0, 1.0]]),
+        np.array([[-1.0, -1.0], [1.0, 1.0]]),
+        np.zeros((2, 2)),
+    )
     right.plot_surface(across, zero, along, color=style.COLOURS[Case.SR], alpha=0.4, shade=False)
     right.plot_surface(zero, across, along, color=style.COLOURS[Case.RS], alpha=0.4, shade=False)
     right.plot([0, 0], [0, 0], [-1, 1], color=style.COLOURS[Case.RR], lw=3)
-    _name(right, {Case.RR: (0, 0, 1.1), Case.SR: (0.75, 0, 0.7), Case.RS: (0, -0.75, 0.7), Case.SS: (0.8, 0.8, -0.7)})
+    _name(
+        right,
+        {
+            Case.RR: (0, 0, 1.1),
+            Case.SR: (0.75, 0, 0.7),
+            Case.RS: (0, -0.75, 0.7),
+            Case.SS: (0.8, 0.8, -0.7),
+        },
+    )
     _axes(right, ("$\\tilde\\omega_x$", "$\\tilde\\omega_y$", "$\\omega_c$"))
     right.set_title("$y = v_y = \\tilde\\omega_z = 0$", fontsize=10)
     return figure
@@ -108,8 +138,8 @@ def _axes(axes: Any, names: tuple[str, str, str]) -> None:
 def draw_6() -> Figure:
     """Fig. 6, transitions to cases of more freedom.
 
-    Solid: slip begins at A; dashed: at B; dotted: the ball leaves the floor. Higher up: more freedom.
-    """
+    Solid: slip begins at A; dashed: at B; dotted: the ball leaves the floor. Higher up: more
+    freedom."""
     figure = style.figure(6.4, 4.7)
     axes = figure.add_subplot()
     for inner, outer in SLIP_ARROWS:
@@ -125,7 +155,11 @@ def draw_6() -> Figure:
         box = {"boxstyle": "round,pad=0.45", "fc": "white", "ec": style.COLOURS[case], "lw": 2.2}
         text = f"{case.name}\ndim {len(TRAITS[case].active)}"
         axes.text(x, y, text, ha="center", va="center", fontsize=11, linespacing=1.3, bbox=box)
-    for line, text in (("-", "slip begins at A"), ("--", "slip begins at B"), (":", "leaves the floor at A")):
+    for line, text in (
+        ("-", "slip begins at A"),
+        ("--", "slip begins at B"),
+        (":", "leaves the floor at A"),
+    ):
         axes.plot([], [], color="black", ls=line, lw=1.4, label=text)
     axes.legend(loc="lower right", fontsize=9, frameon=False)
     axes.set(xlim=(-2.5, 3.7), ylim=(-0.45, 3.95), aspect="equal")
@@ -134,12 +168,15 @@ def draw_6() -> Figure:
 
 
 def _arrow(axes: Axes, inner: Case, outer: Case, line: str, shift: float = 0.0) -> None:
-    """An arrow between two cases, moved sideways by `shift`; its head is solid, whatever its line."""
+    """An arrow between two cases, moved sideways by `shift`; its head is solid, whatever its
+    line."""
     tail, head = np.array(_PLACES[inner]), np.array(_PLACES[outer])
     along = (head - tail) / np.hypot(*(head - tail))
     sideways = shift * np.array([-along[1], along[0]])
     begin, end = tail + _REACH * along + sideways, head - _REACH * along + sideways
     axes.plot(*np.transpose([begin, end - 0.1 * along]), color="black", ls=line, lw=1.4)
     look: dict[str, Any] = {"color": "black", "lw": 0, "shrinkA": 0, "shrinkB": 0}
-    tip = FancyArrowPatch(tuple(end - 0.2 * along), tuple(end), arrowstyle="-|>", mutation_scale=13, **look)
+    tip = FancyArrowPatch(
+        tuple(end - 0.2 * along), tuple(end), arrowstyle="-|>", mutation_scale=13, **look
+    )
     axes.add_patch(tip)

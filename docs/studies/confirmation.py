@@ -52,7 +52,14 @@ def rows() -> list[Row]:
 def table() -> list[list[str]]:
     """The rows as text, with their head."""
     body = [
-        [r.what, r.unit, f"{r.predicted:.6g}", f"{r.measured:.6g}", f"{r.error:+.1e}", f"{r.tolerance:.1e}"]
+        [
+            r.what,
+            r.unit,
+            f"{r.predicted:.6g}",
+            f"{r.measured:.6g}",
+            f"{r.error:+.1e}",
+            f"{r.tolerance:.1e}",
+        ]
         for r in rows()
     ]
     return [["what", "unit", "predicted", "measured", "relative error", "allowed"], *body]
@@ -65,7 +72,8 @@ def _at(timestep: float, solimp: float, damping: float = 0.5, **changes: float) 
 
 
 def _turning(timestep: float) -> float:
-    """What steady slipping leaves out: the contact turns within a step, by an angle whose square counts."""
+    """What steady slipping leaves out: the contact turns within a step, by an angle whose square
+    counts."""
     return float(SLIPPING_START.omega_c * timestep) ** 2
 
 
@@ -83,7 +91,11 @@ def _depths() -> Iterator[Row]:
         # What slip would take from the load is given back as it is foreseen, but for the turning.
         tolerance = _turning(timestep) * (1 + settings.hover_number(*given))
         yield Row(
-            f"depth at A in slipping, {setting}", "m", settings.margin(given[0]), -float(run.gap_A[-1]), tolerance
+            f"depth at A in slipping, {setting}",
+            "m",
+            settings.margin(given[0]),
+            -float(run.gap_A[-1]),
+            tolerance,
         )
 
 
@@ -92,10 +104,19 @@ def _margins() -> Iterator[Row]:
     for memory, solimp in itertools.product((True, False), (0.03, 0.1)):
         settings = _at(1e-3, solimp, memory=memory, impratio=30.0)
         last, margins = _steady_slipping(settings)
-        for k, (contact, axis, friction) in enumerate((("A", 1, SLIPPING.mu), ("B", 0, SLIPPING.eta))):
-            load, slip = last[f"force_{contact}"][axis] / SLIPPING.m, float(last[f"slip_speed_{contact}"])
-            what = f"margin at {contact} in slipping, d = {solimp:g}{'' if memory else ', no memory'}"
-            margin = settings.margin(load) * (1 - (0.0 if memory else settings.hover_number(load, friction, slip)))
+        for k, (contact, axis, friction) in enumerate(
+            (("A", 1, SLIPPING.mu), ("B", 0, SLIPPING.eta))
+        ):
+            load, slip = (
+                last[f"force_{contact}"][axis] / SLIPPING.m,
+                float(last[f"slip_speed_{contact}"]),
+            )
+            what = (
+                f"margin at {contact} in slipping, d = {solimp:g}{'' if memory else ', no memory'}"
+            )
+            margin = settings.margin(load) * (
+                1 - (0.0 if memory else settings.hover_number(load, friction, slip))
+            )
             yield Row(what, "m", margin, float(margins[k]), _turning(settings.timestep))
 
 
@@ -109,9 +130,8 @@ def _steady_slipping(settings: ContactSettings) -> tuple[np.void, Array]:
 def _creep() -> Iterator[Row]:
     """Without memory a rolling contact creeps at R_t f/b_f.
 
-    The solver stops within its tolerance of the least cost, which is quadratic in the force, and impratio times as
-    steep in the friction rows.
-    """
+    The solver stops within its tolerance of the least cost, which is quadratic in the force, and
+    impratio times as steep in the friction rows."""
     for solimp, impratio in itertools.product((0.03, 0.3), (1e3, 1e5)):
         settings = _at(1e-3, solimp, impratio=impratio, memory=False)
         run = simulate(ROLLING, (0.0, 0.0, ROLLING.omega_0, 0.0, 0.0, 0.0), 10.0, settings=settings)
@@ -122,7 +142,8 @@ def _creep() -> Iterator[Row]:
 
 
 def _hover() -> Iterator[Row]:
-    """The friction damping b_f at which steady slipping has no margin left, on a line through two smaller ones.
+    """The friction damping b_f at which steady slipping has no margin left, on a line through two
+    smaller ones.
 
     There it would begin to hover; near that a contact that is disturbed goes on hovering.
     """
@@ -137,7 +158,8 @@ def _hover() -> Iterator[Row]:
 
 
 def _decay() -> Iterator[Row]:
-    """In rolling a slip velocity dies out by the factor 1 - b_f h A/(A + R_t) a step; drag adds c h."""
+    """In rolling a slip velocity dies out by the factor 1 - b_f h A/(A + R_t) a step; drag adds c
+    h."""
     for damping, impratio in itertools.product((0.2, 0.5), (1e2, 1e5)):
         settings = _at(1e-3, 0.03, damping, impratio=impratio, memory=False, order=1, servo=0.0)
         p = ROLLING.replace(omega_0=0.0, mu=1.0, eta=0.0)  # it is away from the wall

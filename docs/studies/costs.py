@@ -1,7 +1,7 @@
 """What runs of MuJoCo, campaigns and commands cost, as ratios in one run.
 
-``python -m docs.studies.costs docs/campaigns.md`` writes the tables of that page, in some ten minutes.
-"""
+``python -m docs.studies.costs docs/campaigns.md`` writes the tables of that page, in some ten
+minutes."""
 
 from __future__ import annotations
 
@@ -60,7 +60,9 @@ def study() -> Rows:
     with tempfile.TemporaryDirectory() as directory:
         for name, words in STUDY.items():
             spent, held = _spent([*PROGRAM, *words.format(directory).split()])
-            rows.append([f"dualball {name}", f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"])
+            rows.append(
+                [f"dualball {name}", f"{spent:.1f} s", f"{spent / unit:.0f}", f"{held:.0f} MB"]
+            )
     return rows
 
 
@@ -81,7 +83,12 @@ def costs() -> Rows:
     return [
         *rows,
         [f"simulate_many of {count}: two threads against one", "", "", f"{two_threads:.2f}"],
-        ["two processes of bare arithmetic at that time: the machine's limit", "", "", f"{threads_limit:.2f}"],
+        [
+            "two processes of bare arithmetic at that time: the machine's limit",
+            "",
+            "",
+            f"{threads_limit:.2f}",
+        ],
         ["campaign: two processes against one", "", "", f"{two_over_one:.2f}"],
         ["the same of bare arithmetic: the machine's limit", "", "", f"{machine:.2f}"],
         ["campaign: two Dask workers against two processes", "", "", f"{by_dask():.2f}"],
@@ -91,8 +98,9 @@ def costs() -> Rows:
 
 
 def two_against_one(taken: Callable[[int], float]) -> tuple[float, float]:
-    """Speed of two at work, of what one or two take in s, divided by that of one; and what the machine allows two
-    processes; of the turn in which it allowed most, since other programs take their share."""
+    """Speed of two at work, of what one or two take in s, divided by that of one; and what the
+    machine allows two processes; of the turn in which it allowed most, since other programs take
+    their share."""
     loop = [sys.executable, "-c", "for _ in range(20_000_000): pass"]
 
     def loops(number: int) -> None:
@@ -130,18 +138,40 @@ def start_up() -> Rows:
 
 
 def growth() -> Rows:
-    """What a run of 0.1 s takes in sweeps of more and more of them, of which only means are stored."""
-    rows = [["runs", "sweep: processor time", "memory", "on the disk", "collect: processor time", "memory"]]
+    """What a run of 0.1 s takes in sweeps of more and more of them, of which only means are
+    stored."""
+    rows = [
+        [
+            "runs",
+            "sweep: processor time",
+            "memory",
+            "on the disk",
+            "collect: processor time",
+            "memory",
+        ]
+    ]
     with tempfile.TemporaryDirectory() as directory:
         for count in (1000, 10_000, MOST):
             runs, table = Path(directory) / str(count), Path(directory) / f"{count}.h5"
             vary = f"sweep --vary omega_0=5:45:{count} --time 0.1 --means-only --quiet --workers 0 -o {runs}"
-            taken = [_spent([*PROGRAM, *words.split()]) for words in (vary, f"collect {runs} -o {table} --workers 0")]
+            taken = [
+                _spent([*PROGRAM, *words.split()])
+                for words in (vary, f"collect {runs} -o {table} --workers 0")
+            ]
             size = sum(file.stat().st_size for file in runs.iterdir())
             (sweep, held), (gather, kept) = taken
-            costs = f"{1e3 * sweep / count:.2f} ms a run", f"{held:.0f} MB", f"{size / count / 1e3:.2f} kB a run"
+            costs = (
+                f"{1e3 * sweep / count:.2f} ms a run",
+                f"{held:.0f} MB",
+                f"{size / count / 1e3:.2f} kB a run",
+            )
             rows.append(
-                [f"{count:,}".replace(",", " "), *costs, f"{1e3 * gather / count:.2f} ms a run", f"{kept:.0f} MB"]
+                [
+                    f"{count:,}".replace(",", " "),
+                    *costs,
+                    f"{1e3 * gather / count:.2f} ms a run",
+                    f"{kept:.0f} MB",
+                ]
             )
     return rows
 
@@ -156,12 +186,13 @@ def _spent(words: list[str]) -> tuple[float, float]:
 
 
 def cost(runs: int, steps: int = 2500) -> list[float]:
-    """Processor time of a bare and of a whole step of one simulation, s, and their ratio: medians over `REPEATS`.
+    """Processor time of a bare and of a whole step of one simulation, s, and their ratio: medians
+    over `REPEATS`.
 
-    There is a sample every 100 steps. Timings are taken in turn, each whole one between two bare ones: a machine that
-    slows down does so for both. The bare steps are those of a settled run with its forces, margins and surface
-    velocities left as they are, and the ball held at its azimuth, where the wall stands, by an assignment a step.
-    """
+    There is a sample every 100 steps. Timings are taken in turn, each whole one between two bare
+    ones: a machine that slows down does so for both. The bare steps are those of a settled run with
+    its forces, margins and surface velocities left as they are, and the ball held at its azimuth,
+    where the wall stands, by an assignment a step."""
     settings, p = ContactSettings(), SLIPPING
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
@@ -170,12 +201,20 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     start = p, state.x, steps * settings.timestep, None, settings
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(REPEATS):
-        loops = itertools.chain(*(Run(*start, sample_interval=100 * settings.timestep) for _ in range(runs)))
+        loops = itertools.chain(
+            *(Run(*start, sample_interval=100 * settings.timestep) for _ in range(runs))
+        )
         whole.append(seconds(partial(list, loops), time.process_time))
         bare.append(_bare(settled, runs, steps))
-    ratios = [2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)]
+    ratios = [
+        2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)
+    ]
     each = steps * runs
-    return [statistics.median(bare) / each, statistics.median(whole) / each, statistics.median(ratios)]
+    return [
+        statistics.median(bare) / each,
+        statistics.median(whole) / each,
+        statistics.median(ratios),
+    ]
 
 
 def _bare(settled: JointedBall, runs: int, steps: int) -> float:
@@ -206,7 +245,8 @@ def seconds(work: Callable[[], Any], clock: Callable[[], float] = time.perf_coun
 
 
 def by_dask() -> float:
-    """Speed of two Dask workers in a campaign divided by that of two processes, median; nan without Dask."""
+    """Speed of two Dask workers in a campaign divided by that of two processes, median; nan without
+    Dask."""
     if not importlib.util.find_spec("distributed"):
         return math.nan
     from distributed import LocalCluster
@@ -220,10 +260,14 @@ def by_dask() -> float:
 
 
 def _campaign(kind: Callable[[], Workers]) -> float:
-    """Time in s that a campaign of twice the tasks takes more: what workers take to begin and to end cancels."""
+    """Time in s that a campaign of twice the tasks takes more: what workers take to begin and to
+    end cancels."""
 
     def run(size: int) -> None:
-        with tempfile.TemporaryDirectory() as directory, Campaign(Path(directory), kind()) as campaign:
+        with (
+            tempfile.TemporaryDirectory() as directory,
+            Campaign(Path(directory), kind()) as campaign,
+        ):
             campaign.complete(_tasks(4 * size * BATCH, 2.0))
 
     return seconds(partial(run, 2)) - seconds(partial(run, 1))
@@ -236,7 +280,8 @@ def _tasks(count: int, t_end: float = 0.01) -> list[Task]:
 
 
 def bookkeeping() -> float:
-    """Median over `REPEATS` of what a task of a campaign in this process takes beyond simulating and storing it, s."""
+    """Median over `REPEATS` of what a task of a campaign in this process takes beyond simulating
+    and storing it, s."""
     spent, tasks = [], _tasks(BATCH)
 
     def campaign() -> None:
@@ -247,7 +292,9 @@ def bookkeeping() -> float:
         alone = partial(run_batch, tasks, Storing(Path(directory), "alone"), math.inf)
         alone()  # imports
         for _ in range(REPEATS):
-            spent.append((-seconds(alone, time.process_time) + seconds(campaign, time.process_time)) / BATCH)
+            spent.append(
+                (-seconds(alone, time.process_time) + seconds(campaign, time.process_time)) / BATCH
+            )
     return statistics.median(spent)
 
 
@@ -257,11 +304,20 @@ def resuming() -> float:
         tasks = _tasks(FINISHED)
         run = carry_out(tasks[0])
         for k in range(0, FINISHED, BATCH):
-            storage.save_batch({task.key: run for task in tasks[k : k + BATCH]}, Path(directory) / f"runs-{k:024x}.h5")
+            storage.save_batch(
+                {task.key: run for task in tasks[k : k + BATCH]},
+                Path(directory) / f"runs-{k:024x}.h5",
+            )
         with Campaign(Path(directory), workers=0) as campaign:
             return seconds(partial(campaign.complete, tasks))
 
 
 if __name__ == "__main__":
     tables = {"growth": growth, "costs": costs, "study": study, "start": start_up}
-    sys.exit(write_all(tables, "Write the tables on the costs of runs, campaigns and commands.", "docs/campaigns.md"))
+    sys.exit(
+        write_all(
+            tables,
+            "Write the tables on the costs of runs, campaigns and commands.",
+            "docs/campaigns.md",
+        )
+    )

@@ -1,4 +1,5 @@
-"""How often the limit of no time step is off by more than three of its standard uncertainties: rows of a table."""
+"""How often the limit of no time step is off by more than three of its standard uncertainties: rows
+of a table."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ Series = Callable[[np.random.Generator, Array], Array]
 
 
 def _powers(lowest: float, growth: float) -> Series:
-    """Six terms from order 1 or 2 on, of sizes up to 1, `growth` times as large from each to the next."""
+    """Six terms from order 1 or 2 on, of sizes up to 1, `growth` times as large from each to the
+    next."""
 
     def deviations(rng: np.random.Generator, h: Array) -> Array:
         first = int(rng.integers(1, 3))

@@ -1,4 +1,5 @@
-"""Draw the figures of pages that show no measurement of a validation: ``python -m docs.studies.figures``.
+"""Draw the figures of pages that show no measurement of a validation: ``python -m
+docs.studies.figures``.
 
 Each is written to its place in docs/, and what its caption should say is printed.
 """

@@ -1,8 +1,8 @@
-"""Forecasts of models that others wrote: verdict, time, and predicted creep beside what a second shows, as a table.
+"""Forecasts of models that others wrote: verdict, time, and predicted creep beside what a second
+shows, as a table.
 
-``python -m docs.studies.forecast MODEL.xml ...``; what a second shows is how far two points of the bodies have slid
-apart that were one where they touch.
-"""
+``python -m docs.studies.forecast MODEL.xml ...``; what a second shows is how far two points of the
+bodies have slid apart that were one where they touch."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ SECOND, SETTLE = 1.0, 10.0
 
 
 def row(path: Path) -> list[str]:
-    """Of a model: its name, what the forecast says, pairs at rest, the worst of them, and the time it took, s."""
+    """Of a model: its name, what the forecast says, pairs at rest, the worst of them, and the time
+    it took, s."""
     begin, name = time.perf_counter(), f"{path.parent.name}/{path.stem}"
     try:
         model, data = load(path)
@@ -54,7 +55,9 @@ def _seconds(begin: float) -> str:
 def _verdict(f: Forecast) -> str:
     said = [f"set {f.change.written}"] if f.change else []
     said += ["Coulomb"] * bool(f.remedy) + ["collapsed"] * bool(f.settled.collapsed)
-    said += [f"{len(f.settled.moving)} bodies move"] * bool(f.settled.moving) + ["sleeps"] * bool(f.settled.asleep)
+    said += [f"{len(f.settled.moving)} bodies move"] * bool(f.settled.moving) + ["sleeps"] * bool(
+        f.settled.asleep
+    )
     return "; ".join(said) or "nothing to change"
 
 
@@ -71,7 +74,9 @@ def _shown(model: Any, data: Any) -> dict[str, float]:
         mujoco.mj_step(model, data)
     mujoco.mj_kinematics(model, data)
     first, second = np.moveaxis(
-        data.xpos[bodies] + np.einsum("nkij,nkj->nki", data.xmat[bodies].reshape(-1, 2, 3, 3), own), 1, 0
+        data.xpos[bodies] + np.einsum("nkij,nkj->nki", data.xmat[bodies].reshape(-1, 2, 3, 3), own),
+        1,
+        0,
     )
     slip = np.einsum("nij,nj->ni", frames[:, 1:], second - first) / (data.time - begin) + drift
     found: dict[str, float] = {}

@@ -75,13 +75,18 @@ class Installed(Coulomb):
             mujoco.mj_step(self.model, data, nstep)
 
 
-def start(model: Any, law: dict[str, Any] | None = None, door: Any = Coulomb, **options: Any) -> tuple[Any, Stepper]:
-    """Data of a model with other options, and what steps them; a law's own numbers go by their names in `law.Law`."""
+def start(
+    model: Any, law: dict[str, Any] | None = None, door: Any = Coulomb, **options: Any
+) -> tuple[Any, Stepper]:
+    """Data of a model with other options, and what steps them; a law's own numbers go by their
+    names in `law.Law`."""
     for name, value in options.items():
         setattr(model.opt, name, value)
     if law is None:
         return mujoco.MjData(model), Plain(model)
-    offered = {name: value for name, value in law.items() if name in ("rigid", "restitution", "servo")}
+    offered = {
+        name: value for name, value in law.items() if name in ("rigid", "restitution", "servo")
+    }
     stepper = door(model, **offered)
     if len(law) > len(offered):
         stepper._law = replace(stepper._law, **law)
@@ -89,19 +94,26 @@ def start(model: Any, law: dict[str, Any] | None = None, door: Any = Coulomb, **
     return mujoco.MjData(model), stepper
 
 
-def one(geom: str, mu: float = 0.6, slope: float = 0.0, height: float = 0.05, step: float = 2e-3) -> Any:
+def one(
+    geom: str, mu: float = 0.6, slope: float = 0.0, height: float = 0.05, step: float = 2e-3
+) -> Any:
     """A body on a plane; gravity is tilted instead of the plane, degrees."""
     a = math.radians(slope)
     return mujoco.MjModel.from_xml_string(
         f'<mujoco><option cone="elliptic" tolerance="1e-12" timestep="{step}" '
-        f'gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/><default><geom friction="{mu}"/></default><worldbody>'
-        f'<geom type="plane" size="9 9 1"/><body pos="0 0 {height}"><freejoint/>{geom}</body></worldbody></mujoco>'
+        f'gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/><default><geom '
+        f'friction="{mu}"/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1"/><body pos="0 0 '
+        f'{height}"><freejoint/>{geom}</body></worldbody></mujoco>'
     )
 
 
 LONG = "heap of 216", "at rest, 1000"
 """Scenes that are measured with soft contacts only: others take half an hour."""
-BOX, BALL = '<geom type="box" size=".05 .05 .05" mass="1"/>', '<geom type="sphere" size=".05" mass="1"/>'
+BOX, BALL = (
+    '<geom type="box" size=".05 .05 .05" mass="1"/>',
+    '<geom type="sphere" size=".05" mass="1"/>',
+)
 FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
 
 
@@ -115,7 +127,8 @@ def creep(scene: str, way: dict[str, Any]) -> float:
 
 
 def breakaway(way: dict[str, Any]) -> float:
-    """Force that starts to move a box, faster than 1e-5 m/s, in units of mu N; it grows for 11 s."""
+    """Force that starts to move a box, faster than 1e-5 m/s, in units of mu N; it grows for 11
+    s."""
     data, stepper = start(one(BOX), **way)
     stepper.step(data, 500)
     shares = np.linspace(0, 1.1, 5500)
@@ -147,7 +160,8 @@ def columns(count: int) -> Any:
     )
     bodies = bodies or f'<body pos="0 0 .05"><freejoint/>{BALL}</body>'
     return mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic" gravity="1 0 -9.6"/><default><geom friction=".6"/></default><worldbody>'
+        '<mujoco><option cone="elliptic" gravity="1 0 -9.6"/><default><geom '
+        'friction=".6"/></default><worldbody>'
         f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
     )
 
@@ -157,16 +171,23 @@ def heap(count: int) -> Any:
     rng, bodies = np.random.default_rng(count), ""
     for k in range(count):
         x, y, turn = 0.13 * (k % 3 - 1), 0.13 * (k // 3 % 3 - 1), rng.normal(size=3) * 10
-        place, angles = f"{x} {y} {0.1 + 0.15 * (k // 9)}", " ".join(f"{angle:.3f}" for angle in turn)
+        place, angles = (
+            f"{x} {y} {0.1 + 0.15 * (k // 9)}",
+            " ".join(f"{angle:.3f}" for angle in turn),
+        )
         bodies += f'<body pos="{place}" euler="{angles}"><freejoint/>{BOX}</body>'
     return mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic"/><size memory="50M"/><default><geom friction=".6"/></default><worldbody>'
+        '<mujoco><option cone="elliptic"/><size memory="50M"/><default><geom '
+        'friction=".6"/></default><worldbody>'
         f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
     )
 
 
-def cost(model: Any, way: dict[str, Any], begin: Callable[[Any, Stepper], None], rounds: int, steps: int) -> float:
-    """Processor time of a step, plain MuJoCo's with the same cone being 1: median of runs in turn."""
+def cost(
+    model: Any, way: dict[str, Any], begin: Callable[[Any, Stepper], None], rounds: int, steps: int
+) -> float:
+    """Processor time of a step, plain MuJoCo's with the same cone being 1: median of runs in
+    turn."""
     plain = {name: value for name, value in way.items() if name == "cone"}
     runs, times = [start(copy.copy(model), **each) for each in (plain, way)], np.empty((rounds, 2))
     for row in times:
@@ -218,7 +239,10 @@ def costs() -> Rows:
         "rigid": RIGID,
     }
     scenes: dict[str, Callable[[dict[str, Any]], float]] = {
-        **{f"at rest, {count} contacts": functools.partial(at_rest, count) for count in (1, 12, 52, 200, 1000)},
+        **{
+            f"at rest, {count} contacts": functools.partial(at_rest, count)
+            for count in (1, 12, 52, 200, 1000)
+        },
         "a box that slides": lambda way: moving(one(BOX, 0.25, 20), way, 15, 500, speed=1.0),
         **{
             f"heap of {count} boxes that falls, 1.2 s": functools.partial(falling, count, 1)
@@ -227,7 +251,10 @@ def costs() -> Rows:
     }
     rows = [["cost of a step", *ways]]
     for name, measure in scenes.items():
-        found = [f"{measure(way):.2f}" if not name.startswith(LONG) or way is SOFT else "–" for way in ways.values()]
+        found = [
+            f"{measure(way):.2f}" if not name.startswith(LONG) or way is SOFT else "–"
+            for way in ways.values()
+        ]
         rows.append([name, *found])
     return rows
 
@@ -237,16 +264,26 @@ def holding() -> Rows:
     return [
         ["", *WAYS],
         *(
-            [f"{name} (`{scene}.xml`): creep, m/s", *(f"{creep(scene, way):.1e}" for way in WAYS.values())]
+            [
+                f"{name} (`{scene}.xml`): creep, m/s",
+                *(f"{creep(scene, way):.1e}" for way in WAYS.values()),
+            ]
             for scene, name in SCENES.items()
         ),
-        ["box that is pulled: breaks away at, μN", *(f"{breakaway(way):.4f}" for way in WAYS.values())],
-        ["box shaken on a slope of 10°: drift in 8 s, m", *(f"{shaken(way):.1e}" for way in WAYS.values())],
+        [
+            "box that is pulled: breaks away at, μN",
+            *(f"{breakaway(way):.4f}" for way in WAYS.values()),
+        ],
+        [
+            "box shaken on a slope of 10°: drift in 8 s, m",
+            *(f"{shaken(way):.1e}" for way in WAYS.values()),
+        ],
     ]
 
 
 def slide_down(step: float, way: dict[str, Any]) -> tuple[float, float]:
-    """A box that slides down 20°, mu 0.25: error of its acceleration, at most; share of steps without contact."""
+    """A box that slides down 20°, mu 0.25: error of its acceleration, at most; share of steps
+    without contact."""
     data, stepper = start(one(BOX, 0.25, 20, step=step), **way)
     stepper.step(data, round(1.5 / step))
     speeds, lost = [data.qvel[0]], 0
@@ -258,8 +295,11 @@ def slide_down(step: float, way: dict[str, Any]) -> tuple[float, float]:
     return float(np.abs(np.diff(speeds) / step / exact - 1).max()), lost * step / 0.5
 
 
-def pushed_off(step: float, way: dict[str, Any], mu: float = 0.4, speed: float = 2.0) -> tuple[float, float]:
-    """A box on the floor that gets a speed: by how much its height varies, m; its way, relative to the exact one."""
+def pushed_off(
+    step: float, way: dict[str, Any], mu: float = 0.4, speed: float = 2.0
+) -> tuple[float, float]:
+    """A box on the floor that gets a speed: by how much its height varies, m; its way, relative to
+    the exact one."""
     data, stepper = start(one(FLAT, mu, step=step), **way)
     stepper.step(data, round(1 / step))
     data.qvel[0], begin, heights = speed, data.qpos[0], []
@@ -283,7 +323,9 @@ def sliding() -> Rows:
 
     rows = [["", "step, ms", *ways]]
     for step in (4e-3, 2e-3, 1e-3):
-        down, pushed = ([measure(step, way) for way in ways.values()] for measure in (slide_down, pushed_off))
+        down, pushed = (
+            [measure(step, way) for way in ways.values()] for measure in (slide_down, pushed_off)
+        )
         rows += [
             [
                 "box that slides down 20°, μ 0.25: error of its acceleration",
@@ -296,7 +338,11 @@ def sliding() -> Rows:
                 f"{1e3 * step:g}",
                 *(f"{1e6 * x:.2g}" for x, _ in pushed),
             ],
-            ["its way, relative to v²/(2 μ g)", f"{1e3 * step:g}", *(f"{way:+.1e}" for _, way in pushed)],
+            [
+                "its way, relative to v²/(2 μ g)",
+                f"{1e3 * step:g}",
+                *(f"{way:+.1e}" for _, way in pushed),
+            ],
             [
                 "ball that slides, then rolls: 5/7 v",
                 f"{1e3 * step:g}",
@@ -308,20 +354,34 @@ def sliding() -> Rows:
 
 def landing() -> Rows:
     """A fall of 0.2 m: the depth, the fastest and the highest that a body comes up again."""
-    rows = [["falls 0.2 m, step 2 ms", "deepest, m", "comes up at, m/s", "comes up to, share of 0.2 m"]]
+    rows = [
+        ["falls 0.2 m, step 2 ms", "deepest, m", "comes up at, m/s", "comes up to, share of 0.2 m"]
+    ]
     ways = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
-    ways |= {f"rigid, restitution {e:g}": {"law": {"rigid": True, "restitution": e}} for e in (0.5, 0.9, 1.0)}
-    for (name, geom), (way, asked) in itertools.product({"box": BOX, "ball": BALL}.items(), ways.items()):
+    ways |= {
+        f"rigid, restitution {e:g}": {"law": {"rigid": True, "restitution": e}}
+        for e in (0.5, 0.9, 1.0)
+    }
+    for (name, geom), (way, asked) in itertools.product(
+        {"box": BOX, "ball": BALL}.items(), ways.items()
+    ):
         data, stepper = start(one(geom, height=0.25), **asked)
         heights, speeds = [0.2], [0.0]
         for _ in range(500):
             stepper.step(data)
             heights.append(data.qpos[2] - 0.05)
             speeds.append(data.qvel[2])
-        lowest = next(k for k, height in enumerate(heights) if height < 0.02 and heights[k + 1] >= height)
+        lowest = next(
+            k for k, height in enumerate(heights) if height < 0.02 and heights[k + 1] >= height
+        )
         top = max(heights[lowest:])
         rows.append(
-            [f"{name}, {way}", f"{max(-min(heights), 0):.1e}", f"{max(speeds[lowest:]):.1e}", f"{top / 0.2:.4f}"]
+            [
+                f"{name}, {way}",
+                f"{max(-min(heights), 0):.1e}",
+                f"{max(speeds[lowest:]):.1e}",
+                f"{top / 0.2:.4f}",
+            ]
         )
     return rows
 
@@ -337,8 +397,16 @@ def choices() -> Rows:
             drift, risen = settle(model, stepper)
             rest, rise = rest + (drift < STILL and not mixed), max(rise, risen)
             solves, steps = solves + stepper._own.solves, steps + 3000  # type: ignore[attr-defined]
-        height = max(pushed_off(4e-3, {"law": law}, mu, speed)[0] for mu, speed in ((0.2, 2.0), (1.2, 2.0), (1.2, 5.0)))
-        return [f"{solves / steps:.2f}", f"{rest} of {CHOSEN}", f"{rise:.1e}", f"{1e6 * height:.2g}"]
+        height = max(
+            pushed_off(4e-3, {"law": law}, mu, speed)[0]
+            for mu, speed in ((0.2, 2.0), (1.2, 2.0), (1.2, 5.0))
+        )
+        return [
+            f"{solves / steps:.2f}",
+            f"{rest} of {CHOSEN}",
+            f"{rise:.1e}",
+            f"{1e6 * height:.2g}",
+        ]
 
     laws: dict[str, dict[str, Any]] = {
         "**soft**: slip foreseen to a twentieth of gravity": {},
@@ -386,7 +454,10 @@ def servo() -> Rows:
         speed = data.qvel[0]
         stepper.step(data, 500)
         exact = 5 / 7 * G * math.sin(math.radians(5))
-        return [f"{np.abs(data.contact.dist).max():.1e}", f"{(data.qvel[0] - speed) / exact - 1:+.1e}"]
+        return [
+            f"{np.abs(data.contact.dist).max():.1e}",
+            f"{(data.qvel[0] - speed) / exact - 1:+.1e}",
+        ]
 
     def dropped(servo: float | None) -> list[str]:
         model = one(BOX.replace("mass", 'euler="10 20 0" mass'))
@@ -413,7 +484,10 @@ def servo() -> Rows:
     head = [text for name in servos for text in (f"{name}: depth, m", "")]
     return [
         ["scene", *head],
-        *([name, *(cell for servo in servos.values() for cell in measure(servo))] for name, measure in scenes.items()),
+        *(
+            [name, *(cell for servo in servos.values() for cell in measure(servo))]
+            for name, measure in scenes.items()
+        ),
     ]
 
 
@@ -433,7 +507,8 @@ def pile(seed: int, mixed: bool) -> Any:
 
 
 def settle(model: Any, stepper: Stepper) -> tuple[float, float]:
-    """How far bodies go in the last second, m, and the most that energy rises above what it was since the fall, J."""
+    """How far bodies go in the last second, m, and the most that energy rises above what it was
+    since the fall, J."""
     data, lowest, rise = mujoco.MjData(model), math.inf, 0.0
     for k in range(round((SETTLING + LAST) / 0.01)):
         if k == round(SETTLING / 0.01):
@@ -458,7 +533,16 @@ def piles() -> Rows:
     """How many piles come to rest, and how energy rises."""
     rises = [f"energy rises by more than {rise:g} J in" for rise in RISES]
     middle = ["by: median, J", "most but ten, J", "most, J"]
-    rows = [["piles", "way", "at rest to 1e-9 m", "largest drift in a second: median, m", *rises, *middle]]
+    rows = [
+        [
+            "piles",
+            "way",
+            "at rest to 1e-9 m",
+            "largest drift in a second: median, m",
+            *rises,
+            *middle,
+        ]
+    ]
     ways: dict[str, dict[str, Any]] = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
     shorter = {f"{name}, {1e3 * SHORT} ms": way | {"timestep": SHORT} for name, way in ways.items()}
     for mixed, tried in ((False, ways), (True, ways | shorter)):
@@ -469,7 +553,16 @@ def piles() -> Rows:
             kind = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}"
             rose = [str((rise > least).sum()) for least in RISES]
             quantiles = [f"{x:.1e}" for x in np.quantile(rise, (0.5, 1 - 10 / PILES, 1.0))]
-            rows.append([kind, name, str((drift < STILL).sum()), f"{np.median(drift):.1e}", *rose, *quantiles])
+            rows.append(
+                [
+                    kind,
+                    name,
+                    str((drift < STILL).sum()),
+                    f"{np.median(drift):.1e}",
+                    *rose,
+                    *quantiles,
+                ]
+            )
     return rows
 
 

@@ -1,4 +1,5 @@
-"""What each correction of ours gains: one taken away at a time, against the event-driven simulation.
+"""What each correction of ours gains: one taken away at a time, against the event-driven
+simulation.
 
 ``python -m docs.studies.tables docs/mujoco-settings.md --only gains`` writes the table.
 """
@@ -32,7 +33,8 @@ FALLING = State(y=100.0, v_y=-9.7, omega_c=7.489)
 FALLS = Parameters.named("reference").replace(
     m=0.02, r=0.004, R=0.03, j=0.35, mu=0.15, eta=0.7, g=9.1, c=0.8, omega_0=7.489
 )
-"""A ball that slides down the wall as fast as drag lets it, 10 m/s, with a fifth of its weight on the wall."""
+"""A ball that slides down the wall as fast as drag lets it, 10 m/s, with a fifth of its weight on
+the wall."""
 Ball_of = Ball.of
 Way = Callable[[Parameters], ContactSettings]
 
@@ -67,11 +69,21 @@ WAYS: dict[str, tuple[Way, AbstractContextManager[object]]] = {
 
 def gains() -> Rows:
     """Errors and cost, each with one correction taken away."""
-    head = ["without", "RR at 12, SS at 25", "approach to SS at 25", "random, median", "75 %", "on the wall"]
+    head = [
+        "without",
+        "RR at 12, SS at 25",
+        "approach to SS at 25",
+        "random, median",
+        "75 %",
+        "on the wall",
+    ]
     exact = {seed: found for seed in SEEDS if (found := _exact(seed)) is not None}
     rows = [[*head, "relative time of these"]]
     usual = 0.0
-    for seed, found in exact.items():  # scenes are built, and loops loaded, before anything is timed
+    for (
+        seed,
+        found,
+    ) in exact.items():  # scenes are built, and loops loaded, before anything is timed
         _error(seed, found, _usual)
     for name, (way, changed) in WAYS.items():
         with warnings.catch_warnings(), changed:
@@ -93,7 +105,9 @@ def gains() -> Rows:
 
 def _held(state: states.Stationary, way: Way) -> float:
     p, x0, lasts, interval = state.run
-    return state.held(mjsim.simulate(p, x0, lasts, settings=way(p), sample_interval=interval)).omega_c
+    return state.held(
+        mjsim.simulate(p, x0, lasts, settings=way(p), sample_interval=interval)
+    ).omega_c
 
 
 def _run(p: Parameters, x0: State, lasts: float, way: Way) -> Trajectory:
@@ -105,14 +119,17 @@ def _exact(seed: int) -> Array | None:
     p, x0 = random_start(seed)
     try:
         sharp = analytic.Settings(rtol=1e-10)
-        run = analytic.simulate(p, x0, LASTS, settings=sharp, sample_interval=SAMPLES, initial_impact=True)
+        run = analytic.simulate(
+            p, x0, LASTS, settings=sharp, sample_interval=SAMPLES, initial_impact=True
+        )
     except SimulationError:
         return None
     return run.x[len(run.time) // 2 :]
 
 
 def _error(seed: int, exact: Array, way: Way) -> float:
-    """Rms of a random motion in natural units, rms over the coordinates; infinite if it breaks down."""
+    """Rms of a random motion in natural units, rms over the coordinates; infinite if it breaks
+    down."""
     p, x0 = random_start(seed)
     try:
         run = _run(p, x0, LASTS, way)

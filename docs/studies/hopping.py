@@ -1,5 +1,5 @@
-"""Where the ball hops for ever, and the basins of its attractors: drawn from what `docs.studies.search` and
-`dualball basins` saved."""
+"""Where the ball hops for ever, and the basins of its attractors: drawn from what
+`docs.studies.search` and `dualball basins` saved."""
 
 from __future__ import annotations
 
@@ -34,7 +34,13 @@ def draw_where(record: Searched) -> Figure:
         for simple, mark, colour in ((True, ".", "#D55E00"), (False, "^", "#000000")):
             own = [r for r in rows if (r["confirmed"]["landings"] == 1) is simple]
             label = "one landing a period" if simple else "several, or no period"
-            look: dict[str, Any] = {"ms": 2.2, "mew": 0.5, "mfc": "none", "color": colour, "rasterized": True}
+            look: dict[str, Any] = {
+                "ms": 2.2,
+                "mew": 0.5,
+                "mfc": "none",
+                "color": colour,
+                "rasterized": True,
+            }
             axes.plot([r[a] for r in own], [r[b] for r in own], mark, label=label, **look)
         x, y = ("log" if name in LOGARITHMIC else "linear" for name in (a, b))
         axes.set(xlabel=_AXES[a], ylabel=_AXES[b], xscale=x, yscale=y)
@@ -49,11 +55,15 @@ def _edges(name: str, low: float, high: float) -> np.ndarray:
 def caption_where(record: Searched) -> str:
     """What was found, and the share with its confidence."""
     count, search = len(record.confirmed), record.search
-    box = ", ".join(f"{_SYMBOLS.get(name, name)} {a:g} … {b:.3g}" for name, (a, b) in search.box.items())
+    box = ", ".join(
+        f"{_SYMBOLS.get(name, name)} {a:g} … {b:.3g}" for name, (a, b) in search.box.items()
+    )
     return (
-        f"Sets in which the ball hops for ever from some of {search.starts} random starts, found by time "
+        f"Sets in which the ball hops for ever from some of {search.starts} random starts, found "
+        f"by time "
         f"stepping and confirmed by the event-driven simulation: {count} of {record.sets} sets, "
-        f"{_share(count, record.sets)}. Box: {box}. r/R plays no part, as it drops out of the equations."
+        f"{_share(count, record.sets)}. Box: {box}. r/R plays no part, as it drops out of the "
+        f"equations."
     )
 
 
@@ -65,25 +75,38 @@ def page(*searches: Searched) -> str:
     """The page on searches: how often the ball hops for ever in each part of the box."""
     text = [
         "# Where the ball hops for ever",
-        "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: μ and η are "
-        "the friction of floor and wall, κ = c√(R/g) and Ω₀ = ω₀√(R/g). An attractor with a small basin is "
+        "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box "
+        "evenly: μ and η are "
+        "the friction of floor and wall, κ = c√(R/g) and Ω₀ = ω₀√(R/g). An attractor with a small "
+        "basin is "
         "missed by a few starts. `python -m docs.studies.figures` writes this page from what "
         "`python -m docs.studies.search --save` kept.",
-        "What is kept was screened by time stepping; the search now screens by event-driven simulation, in a fifth of "
-        "the time, which found hopping in two of the first 526 sets in which time stepping had none.",
+        "What is kept was screened by time stepping; the search now screens by event-driven "
+        "simulation, in a fifth of "
+        "the time, which found hopping in two of the first 526 sets in which time stepping had "
+        "none.",
     ]
     for record in searches:
         least, most = record.search.box["kappa"]
-        text += [f"## Drag from κ = {least:.3g} to {most:.3g}", summary(record), pages.markdown(table(record))]
+        text += [
+            f"## Drag from κ = {least:.3g} to {most:.3g}",
+            summary(record),
+            pages.markdown(table(record)),
+        ]
     return "\n\n".join(text) + "\n"
 
 
 def caption_plane(basins: Basins) -> str:
-    """The parameters, the other variables, shares with confidence, and where the two engines differ."""
+    """The parameters, the other variables, shares with confidence, and where the two engines
+    differ."""
     p = basins.parameters
     rest = ((n, v, unit) for n, v, unit in zip(VARIABLES, basins.start, UNITS, strict=True) if v)
-    fixed = ", ".join(f"{n} = {v:.3g} {unit}" for n, v, unit in rest if n not in (basins.across, basins.up))
-    shares = "; ".join(f"{fate} {_share(*basins.share(fate))}" for fate in FATES if basins.share(fate)[0])
+    fixed = ", ".join(
+        f"{n} = {v:.3g} {unit}" for n, v, unit in rest if n not in (basins.across, basins.up)
+    )
+    shares = "; ".join(
+        f"{fate} {_share(*basins.share(fate))}" for fate in FATES if basins.share(fate)[0]
+    )
     text = (
         f"What becomes of a ball that starts on a plane of states ({fixed}; all others zero). "
         f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}. "
@@ -92,7 +115,13 @@ def caption_plane(basins: Basins) -> str:
     if not basins.coarse:
         return text
     far = basins.differences()
-    text += f" Dots: MuJoCo at {1e3 * basins.timestep:g} ms; {len(far)} of {basins.mujoco.size} differ"
+    text += (
+        f" Dots: MuJoCo at {1e3 * basins.timestep:g} ms; {len(far)} of {basins.mujoco.size} differ"
+    )
     if len(far):
-        text += ", next to a boundary" if far.max() <= 1 else f", up to {far.max():g} cells from a boundary"
+        text += (
+            ", next to a boundary"
+            if far.max() <= 1
+            else f", up to {far.max():g} cells from a boundary"
+        )
     return text + "."

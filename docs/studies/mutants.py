@@ -1,4 +1,5 @@
-"""The page on what the verdicts notice, docs/mutants.md, written by ``python -m tests.mutants ... --page FILE``."""
+"""The page on what the verdicts notice, docs/mutants.md, written by ``python -m tests.mutants ...
+--page FILE``."""
 
 from __future__ import annotations
 
@@ -59,7 +60,8 @@ SUBJECTS = {
     "the spin as a case is chosen": "as a case is chosen the axes turn the spin the other way",
     "1/j of the fluid's torque": "the fluid's torque as if j were 1",
 }
-"""What wrong theories of others were about that nobody noticed at first, and a wrong theory here that is about it."""
+"""What wrong theories of others were about that nobody noticed at first, and a wrong theory here
+that is about it."""
 BY_HAND = {
     "SS whose wall never opens": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
     "a floor without load that is never lost": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
@@ -75,7 +77,8 @@ BY_HAND = {
     "the wall's correction of friction's direction 20 % weak in y": "test_drag::test_slipping_converges_with_the_"
     "square_of_the_step",
 }
-"""Faults in compiled code, in methods and in MuJoCo's corrections, put in by hand, and the test that saw each."""
+"""Faults in compiled code, in methods and in MuJoCo's corrections, put in by hand, and the test
+that saw each."""
 Resolved = tuple[float, str, str]
 """The relative error of a theory that a check notices, its set, and its claim."""
 R = TypeVar("R")
@@ -94,11 +97,14 @@ def watched(act: Callable[[], R]) -> tuple[R, set[CodeType]]:
 
 
 def untried(called: Container[CodeType]) -> list[str]:
-    """Public functions of `analytic`, as ``module.function``, that were not called and that no wrong theory changes."""
+    """Public functions of `analytic`, as ``module.function``, that were not called and that no
+    wrong theory changes."""
     changed, names = {f"{wrong.module}.{wrong.function}" for wrong in THEORIES}, []
     for module in pkgutil.walk_packages(analytic.__path__, "analytic."):
         for name, value in vars(importlib.import_module(module.name)).items():
-            if name.startswith("_") or not callable(value) or hasattr(value, "py_func"):  # private, or numba's
+            if (
+                name.startswith("_") or not callable(value) or hasattr(value, "py_func")
+            ):  # private, or numba's
                 continue
             function = inspect.unwrap(value)
             own = inspect.isfunction(function) and function.__module__ == module.name
@@ -108,13 +114,16 @@ def untried(called: Container[CodeType]) -> list[str]:
 
 
 def _resolving(directory: Path) -> tuple[dict[str, list[Resolved]], list[str]]:
-    """By quantity what the checks of a results directory resolve, the coarsest first; and what nothing tries."""
+    """By quantity what the checks of a results directory resolve, the coarsest first; and what
+    nothing tries."""
     power, records = defaultdict[str, list[Resolved]](list), trial.measured(directory)
     verdicts, called = watched(lambda: judge(CLAIMS, records))
     for each in verdicts:
         if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
             for check in each.checks:
-                power[check.measurement.quantity].append((check.resolves, check.measurement.set, each.claim.id))
+                power[check.measurement.quantity].append(
+                    (check.resolves, check.measurement.set, each.claim.id)
+                )
     return {quantity: sorted(rows)[::-1] for quantity, rows in power.items()}, untried(called)
 
 
@@ -124,17 +133,25 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
     And what witnesses `alone` notice.
     """
     powers, untried_at = zip(*(_resolving(level.directory) for level in levels), strict=True)
-    columns = [f"{level.name}: {what}" for level in levels for what in ("largest", "median", "a tenth")]
+    columns = [
+        f"{level.name}: {what}" for level in levels for what in ("largest", "median", "a tenth")
+    ]
     rows = [["quantity", "ceiling", *columns, "where"]]
     for name, quantity in QUANTITIES.items():
         if quantity.resolves and name in powers[-1]:
-            cells = [_power([each[0] for each in power.get(name, ())], quantity.resolves) for power in powers]
+            cells = [
+                _power([each[0] for each in power.get(name, ())], quantity.resolves)
+                for power in powers
+            ]
             where = "{1}, {2}".format(*powers[-1][name][0])
-            rows.append([quantity.symbol, f"{quantity.resolves:.2g}", *itertools.chain(*cells), where])
+            rows.append(
+                [quantity.symbol, f"{quantity.resolves:.2g}", *itertools.chain(*cells), where]
+            )
     tables = _table("theories", {each.name: each.trials for each in (*levels, *alone)})
     tables += _table("engines", {"quick": measured}) if measured else ""
     names, partly = (
-        " and ".join(level.name for level in each) for each in (levels, [e for e in levels if not e.whole])
+        " and ".join(level.name for level in each)
+        for each in (levels, [e for e in levels if not e.whole])
     )
     until = f" (at {partly} until a claim notices it, the quickest first)" if partly else ""
     tried = [trial for trial in levels[0].trials if trial.tried]
@@ -148,19 +165,26 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
 
 def _subjects(trials: Sequence[Trial]) -> list[list[str]]:
     """Who notices wrong theories about each of `SUBJECTS`, and the faults `BY_HAND`."""
-    measured, tests = {trial.what: trial.by for trial in trials}, {wrong.what: wrong.test for wrong in FOR_TESTS}
+    measured, tests = (
+        {trial.what: trial.by for trial in trials},
+        {wrong.what: wrong.test for wrong in FOR_TESTS},
+    )
     rows = [["subject", "wrong theory", "noticed by a claim", "by a unit test"]]
     for subject, what in SUBJECTS.items():
         test = f"`analytic/test_{tests[what]}`" if what in tests else "–"
         rows.append([subject, what, measured.get(what, "–"), test])
-    return rows + [[subject, "by hand", "not tried", f"`{test}`"] for subject, test in BY_HAND.items()]
+    return rows + [
+        [subject, "by hand", "not tried", f"`{test}`"] for subject, test in BY_HAND.items()
+    ]
 
 
 def _by_module(names: Sequence[str]) -> str:
     """Functions as a list in Markdown, an item a module."""
     parts = (name.rpartition(".") for name in names)
     modules = itertools.groupby(parts, lambda part: part[0])
-    return "\n".join(f"* `{module}`: {', '.join(f'`{name}`' for *_, name in own)}" for module, own in modules)
+    return "\n".join(
+        f"* `{module}`: {', '.join(f'`{name}`' for *_, name in own)}" for module, own in modules
+    )
 
 
 def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
@@ -171,8 +195,16 @@ def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
 
 
 def _table(what: str, tried: Mapping[str, Sequence[Trial]]) -> str:
-    noticed = ", ".join(f"{sum(bool(trial.noticed) for trial in trials)} at {level}" for level, trials in tried.items())
-    hung = ", ".join(f"{sum(bool(trial.hung) for trial in trials)} at {level}" for level, trials in tried.items())
-    rows = [[trials[0].what, *(trial.by for trial in trials)] for trials in zip(*tried.values(), strict=True)]
+    noticed = ", ".join(
+        f"{sum(bool(trial.noticed) for trial in trials)} at {level}"
+        for level, trials in tried.items()
+    )
+    hung = ", ".join(
+        f"{sum(bool(trial.hung) for trial in trials)} at {level}" for level, trials in tried.items()
+    )
+    rows = [
+        [trials[0].what, *(trial.by for trial in trials)]
+        for trials in zip(*tried.values(), strict=True)
+    ]
     table = pages.markdown([["fault", *tried], *rows])
     return f"\n## Wrong {what}, {len(rows)}: noticed {noticed}\n\nFaults that hang a claim: {hung}.\n\n{table}\n"

@@ -20,7 +20,8 @@ HUMANOIDS = 22
 
 
 def lift(way: Way) -> Found:
-    """Panda of robosuite, by its own controller: lifts a cube, holds it, shakes it, places it and lets it go."""
+    """Panda of robosuite, by its own controller: lifts a cube, holds it, shakes it, places it and
+    lets it go."""
     import robosuite
 
     env = robosuite.make(
@@ -38,7 +39,8 @@ def lift(way: Way) -> Found:
     steps = round(env.control_timestep / run.model.opt.timestep)
 
     def act(seconds: float, move: Callable[[float], Any], grip: float) -> None:
-        """Move the hand as `move` says of the time since the beginning, with the grip open (-1) or closed (1)."""
+        """Move the hand as `move` says of the time since the beginning, with the grip open (-1) or
+        closed (1)."""
         for period in range(round(seconds / env.control_timestep)):
             action = np.array([*move(period * env.control_timestep), 0, 0, 0, grip])
             for k in range(steps):
@@ -76,7 +78,8 @@ def lift(way: Way) -> Found:
 
 
 def _hand(way: Way, name: str) -> Found:
-    """Shadow hand of gymnasium-robotics, palm upwards, with an object; the worst of three starts."""
+    """Shadow hand of gymnasium-robotics, palm upwards, with an object; the worst of three
+    starts."""
     return worst([_held(way, name, seed) for seed in (3, 4, 5)])
 
 
@@ -92,7 +95,11 @@ def _held(way: Way, name: str, seed: int) -> Found:
     run = Run(way, env.model, env.data)
     palm, wrist = "robot0:palm", run.model.actuator("robot0:A_WRJ0").id
     run.advance(3)
-    creep, before, begin = run.creep("object", of=palm), run.places("object", of=palm), run.data.time
+    creep, before, begin = (
+        run.creep("object", of=palm),
+        run.places("object", of=palm),
+        run.data.time,
+    )
     middle = run.data.ctrl[wrist]
 
     def shake() -> None:
@@ -116,13 +123,18 @@ def egg(way: Way) -> Found:
 
 
 def ant(way: Way) -> Found:
-    """Gymnasium's Ant-v5, its motors off, on a slope of 12°; by Euler's method, as RK4 has no two halves."""
+    """Gymnasium's Ant-v5, its motors off, on a slope of 12°; by Euler's method, as RK4 has no two
+    halves."""
     import gymnasium
 
     env: Any = gymnasium.make("Ant-v5").unwrapped
     env.reset(seed=0)
     env.model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    env.model.opt.gravity[:] = 9.81 * math.sin(math.radians(12)), 0, -9.81 * math.cos(math.radians(12))
+    env.model.opt.gravity[:] = (
+        9.81 * math.sin(math.radians(12)),
+        0,
+        -9.81 * math.cos(math.radians(12)),
+    )
     run = Run(way, env.model, env.data)
     run.advance(14)
     return run.found({CREEP: run.creep()})

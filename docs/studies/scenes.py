@@ -1,9 +1,9 @@
-"""Measure scenes that others wrote, and write their tables: ``python -m docs.studies.scenes docs/scenes.md``.
+"""Measure scenes that others wrote, and write their tables: ``python -m docs.studies.scenes
+docs/scenes.md``.
 
-What was found is kept beside the page, as scenes.json, since the packages don't get along with one version of MuJoCo:
-run it with ``--only NAME`` in an environment of each package, and with ``--kept`` where this project is installed. All
-take some ten minutes.
-"""
+What was found is kept beside the page, as scenes.json, since the packages don't get along with one
+version of MuJoCo: run it with ``--only NAME`` in an environment of each package, and with
+``--kept`` where this project is installed. All take some ten minutes."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ SCENES = {
 
 
 def measure(scene: Scene) -> dict[str, Any]:
-    """What a scene comes to in each way, of two runs the cheaper one; and the versions that it ran with."""
+    """What a scene comes to in each way, of two runs the cheaper one; and the versions that it ran
+    with."""
     needed = ["mujoco"] + ([scene.package] if scene.package else [])
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in reversed(needed))
     found = {}
@@ -88,7 +89,9 @@ def figures(kept: Kept) -> Rows:
         ways = kept[name]["ways"] if name in kept else {}
         for quantity in ways.get("plain", {"values": {}})["values"]:
             cells = [
-                ": ".join([f"{ways[way]['values'][quantity]:.1e}", *ways[way]["wrong"]]) if way in ways else "–"
+                ": ".join([f"{ways[way]['values'][quantity]:.1e}", *ways[way]["wrong"]])
+                if way in ways
+                else "–"
                 for way in WAYS
             ]
             rows.append([f"{scene.title}: {quantity}", *cells])
@@ -103,9 +106,17 @@ def cost(kept: Kept) -> Rows:
         if name in kept:
             ways = kept[name]["ways"]
             plain = ways["plain"]["step"]
-            cells = [f"{ways[way]['step'] / plain:.2f}" if way in ways else "–" for way in timed[1:]]
+            cells = [
+                f"{ways[way]['step'] / plain:.2f}" if way in ways else "–" for way in timed[1:]
+            ]
             rows.append(
-                [scene.title, kept[name]["versions"], f"{ways['plain']['contacts']}", f"{plain * 1e6:.0f}", *cells]
+                [
+                    scene.title,
+                    kept[name]["versions"],
+                    f"{ways['plain']['contacts']}",
+                    f"{plain * 1e6:.0f}",
+                    *cells,
+                ]
             )
     return rows
 
@@ -118,8 +129,16 @@ def worse(kept: Kept) -> Rows:
         for quantity, label in (("depth", "depth, m"), ("rise", "rise of energy, J")):
             values = [ways[way][quantity] if way in ways else None for way in ("plain", *NEW)]
             plain, *others = values
-            if plain is not None and any(other is not None and other > WORSE * plain + 1e-9 for other in others):
-                rows.append([scene.title, label, *("–" if each is None else f"{each:.1e}" for each in values)])
+            if plain is not None and any(
+                other is not None and other > WORSE * plain + 1e-9 for other in others
+            ):
+                rows.append(
+                    [
+                        scene.title,
+                        label,
+                        *("–" if each is None else f"{each:.1e}" for each in values),
+                    ]
+                )
     return rows
 
 
@@ -128,9 +147,13 @@ TABLES = {"figures": figures, "cost": cost, "worse": worse}
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure all scenes whose package is there, or those named, and write the tables."""
-    parser = argparse.ArgumentParser(description="Measure scenes that others wrote, and write their tables.")
+    parser = argparse.ArgumentParser(
+        description="Measure scenes that others wrote, and write their tables."
+    )
     parser.add_argument("page", type=Path, metavar="FILE", help="docs/scenes.md")
-    parser.add_argument("--only", action="append", choices=list(SCENES), metavar="NAME", help="only this scene")
+    parser.add_argument(
+        "--only", action="append", choices=list(SCENES), metavar="NAME", help="only this scene"
+    )
     parser.add_argument("--kept", action="store_true", help="measure nothing, write what is kept")
     args = parser.parse_args(argv)
     file = args.page.with_suffix(".json")

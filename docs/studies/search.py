@@ -1,10 +1,11 @@
-"""Where in parameter space the ball hops for ever: ``python -m docs.studies.search --save found.json``.
+"""Where in parameter space the ball hops for ever: ``python -m docs.studies.search --save
+found.json``.
 
-A search screens random starts of sets, the points of a scrambled Sobol sequence over mu, eta, j, r/R, kappa =
-c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g); a ball that still hops after 60/c is looked at until its hopping
-closes, goes on, or ends. A chunk of sets is a file, named by the hash of all that determines it: a search goes on where
-it stopped, and a longer one contains the shorter ones. `docs.studies.figures` makes the page of what was found.
-"""
+A search screens random starts of sets, the points of a scrambled Sobol sequence over mu, eta, j,
+r/R, kappa = c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g); a ball that still hops after 60/c is
+looked at until its hopping closes, goes on, or ends. A chunk of sets is a file, named by the hash
+of all that determines it: a search goes on where it stopped, and a longer one contains the shorter
+ones. `docs.studies.figures` makes the page of what was found."""
 
 from __future__ import annotations
 
@@ -57,13 +58,17 @@ LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""
 
 DURATION = 60.0
-"""How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but near folds."""
+"""How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but
+near folds."""
 QUIET, LOOKS = 3.0, 12
-"""Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this time."""
+"""Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this
+time."""
 SEEN, SEEN_SAMPLES = 25.0, 4000
-"""How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for; and samples."""
+"""How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for;
+and samples."""
 CONFIRMING = 12.0
-"""How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it counts."""
+"""How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it
+counts."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +80,12 @@ class AttractorSearch:
     seed: int = 0
 
     def key(self, chunk: int) -> str:
-        """Hash of all that determines a chunk: the search, and the sources of screen and confirmation."""
+        """Hash of all that determines a chunk: the search, and the sources of screen and
+        confirmation."""
         own = Path(__file__).read_text("utf-8")
-        text = json.dumps([dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, own, sources(*EVENT.sources)])
+        text = json.dumps(
+            [dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, own, sources(*EVENT.sources)]
+        )
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
     def points(self, count: int) -> Array:
@@ -91,12 +99,14 @@ class AttractorSearch:
 
 @dataclass(frozen=True)
 class Searched:
-    """What a search has found: the sets among its first `sets` in which some start still hops by time stepping."""
+    """What a search has found: the sets among its first `sets` in which some start still hops by
+    time stepping."""
 
     search: AttractorSearch
     sets: int
     rows: tuple[Mapping[str, Any], ...]
-    """The groups of each; "hops", how many starts do; "confirmed", the fields of `Hopping` or None."""
+    """The groups of each; "hops", how many starts do; "confirmed", the fields of `Hopping` or
+    None."""
     failed: int
     """Runs that broke down."""
 
@@ -111,10 +121,16 @@ class Searched:
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
+        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of
+        these."""
         with reading_json(path, "search") as data:
             box = {name: tuple(ends) for name, ends in data["search"].pop("box").items()}
-            return cls(AttractorSearch(box, **data["search"]), data["sets"], tuple(data["rows"]), data["failed"])
+            return cls(
+                AttractorSearch(box, **data["search"]),
+                data["sets"],
+                tuple(data["rows"]),
+                data["failed"],
+            )
 
 
 def parameters(point: Array) -> Parameters:
@@ -125,10 +141,11 @@ def parameters(point: Array) -> Parameters:
 
 
 def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
-    """States (count, 8): orbits from half backwards to twice omega_0, any spin, every other ball off the floor.
+    """States (count, 8): orbits from half backwards to twice omega_0, any spin, every other ball
+    off the floor.
 
-    Nearly twice as many of these come to a hop as of `ensemble.random_starts`, which throw balls and turn them back.
-    """
+    Nearly twice as many of these come to a hop as of `ensemble.random_starts`, which throw balls
+    and turn them back."""
     rng = np.random.default_rng(seed)
     y = rng.uniform(0, p.R, count) * rng.integers(0, 2, count)
     omega_c = p.omega_0 * rng.uniform(-0.5, 2, count)
@@ -137,7 +154,8 @@ def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
 
 
 def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Array, int]:
-    """Which of the starts (n, 8) still hop after 60/c; their states then (n, 8); how many runs failed.
+    """Which of the starts (n, 8) still hop after 60/c; their states then (n, 8); how many runs
+    failed.
 
     One thread; p.c must be positive.
     """
@@ -167,9 +185,8 @@ class Hopping:
 def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     """The hopping that a state leads to by the event-driven simulation; None if it ends.
 
-    That is a stable periodic motion near it if there is one; else the ball is followed for `CONFIRMING`.
-    Raises `SimulationError` if the simulation can't go on.
-    """
+    That is a stable periodic motion near it if there is one; else the ball is followed for
+    `CONFIRMING`. Raises `SimulationError` if the simulation can't go on."""
     unit = math.sqrt(p.R / p.g)
     seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
     if not any(landings(zip(seen.events.from_case, seen.events.to_case, strict=True))):
@@ -178,7 +195,9 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     if fate and fate.orbit and (count := sum(landings(fate.orbit.changes))):
         orbit = fate.orbit
         omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
-        return Hopping(int(count), orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
+        return Hopping(
+            int(count), orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max())
+        )
     lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
     run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SEEN_SAMPLES)
     last = run.time > run.time[-1] * 2 / 3
@@ -193,12 +212,14 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
 def carry_out(search: AttractorSearch, chunk: int, points: Array, path: Path) -> None:
     """Search the sets of a chunk and write its file.
 
-    Confirmed is the first hopping state that can be; if none can, "broken" says where the simulation broke down.
-    """
+    Confirmed is the first hopping state that can be; if none can, "broken" says where the
+    simulation broke down."""
     rows = []
     for k, point in enumerate(points):
         p = parameters(point)
-        hop, x, failed = screen(p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k]))
+        hop, x, failed = screen(
+            p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k])
+        )
         row: dict[str, Any] = {"hops": int(hop.sum()), "failed": failed}
         if hop.any():
             row |= {"x": x[hop][0].tolist(), "confirmed": None, "broken": ""}
@@ -214,7 +235,9 @@ def carry_out(search: AttractorSearch, chunk: int, points: Array, path: Path) ->
     write_text(path, json.dumps({"chunk": chunk, "rows": rows}))
 
 
-def run(directory: Path, search: AttractorSearch, count: int, workers: Workers, show: Show) -> Searched:
+def run(
+    directory: Path, search: AttractorSearch, count: int, workers: Workers, show: Show
+) -> Searched:
     """Search `count` sets, rounded up to whole chunks; finished chunks are read."""
     make_directory(directory)
     points = search.points(math.ceil(count / CHUNK) * CHUNK)
@@ -240,29 +263,46 @@ def share(hits: int, of: int) -> tuple[float, float, float]:
 
 
 def table(record: Searched) -> pages.Rows:
-    """Each sixth of the range of each group, with the number of sets in it, and of those with confirmed hopping."""
+    """Each sixth of the range of each group, with the number of sets in it, and of those with
+    confirmed hopping."""
     points, rows = record.search.points(record.sets), []
     for k, name in enumerate(BOX):
         edges = (np.geomspace if name in LOGARITHMIC else np.linspace)(*record.search.box[name], 7)
         symbol = SYMBOLS.get(name, name)
         sets, _ = np.histogram(points[:, k], edges)
         hopping, _ = np.histogram([row[name] for row in record.confirmed], edges)
-        for low, high, n, hits in zip(edges, edges[1:], sets.tolist(), hopping.tolist(), strict=False):
+        for low, high, n, hits in zip(
+            edges, edges[1:], sets.tolist(), hopping.tolist(), strict=False
+        ):
             part, least, most = (f"{value:.2f}" for value in share(hits, n))
-            rows.append([symbol, f"{low:.3g}", f"{high:.3g}", str(n), str(hits), part, f"{least} … {most}"])
+            rows.append(
+                [symbol, f"{low:.3g}", f"{high:.3g}", str(n), str(hits), part, f"{least} … {most}"]
+            )
     return [["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *rows]
 
 
 def summary(record: Searched) -> str:
     """What a search has found in all, with confidence."""
-    count, broken = len(record.confirmed), f" {record.failed} runs broke down." if record.failed else ""
+    count, broken = (
+        len(record.confirmed),
+        f" {record.failed} runs broke down." if record.failed else "",
+    )
     periods = Counter(row["confirmed"]["landings"] for row in record.confirmed)
-    kinds = [f"{periods[n]} with {n or 'no period found'}" for n in sorted(periods, key=lambda n: (n == 0, n))]
-    box = ", ".join(f"{SYMBOLS.get(name, name)} {a:.3g} to {b:.3g}" for name, (a, b) in record.search.box.items())
+    kinds = [
+        f"{periods[n]} with {n or 'no period found'}"
+        for n in sorted(periods, key=lambda n: (n == 0, n))
+    ]
+    box = ", ".join(
+        f"{SYMBOLS.get(name, name)} {a:.3g} to {b:.3g}"
+        for name, (a, b) in record.search.box.items()
+    )
     return (
-        f"The box is {box}. In {count} of {record.sets} sets some of {record.search.starts} random starts lead to "
-        "hopping that the event-driven simulation confirms: {:.2f} %, or {:.2f} to {:.2f} % with 95 % confidence. "
-        f"Sets by landings in a period: {', '.join(kinds) or 'none'}. By the screen {len(record.rows)} sets still "
+        f"The box is {box}. In {count} of {record.sets} sets some of {record.search.starts} random "
+        f"starts lead to "
+        "hopping that the event-driven simulation confirms: {:.2f} %, or {:.2f} to {:.2f} % with "
+        "95 % confidence. "
+        f"Sets by landings in a period: {', '.join(kinds) or 'none'}. By the screen "
+        f"{len(record.rows)} sets still "
         f"hopped after 60/c; in all others every ball stopped landing.{broken}"
     ).format(*share(count, record.sets))
 
@@ -273,9 +313,13 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=500)
     parser.add_argument("--starts", type=int, default=5, help="random starts of each")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--range", nargs="*", default=[], metavar="NAME=FROM:TO", help=f"of {', '.join(BOX)}")
+    parser.add_argument(
+        "--range", nargs="*", default=[], metavar="NAME=FROM:TO", help=f"of {', '.join(BOX)}"
+    )
     parser.add_argument("--workers", type=int, default=os.cpu_count())
-    parser.add_argument("-o", "--output", type=Path, default=Path("search"), help="directory of the chunks")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("search"), help="directory of the chunks"
+    )
     parser.add_argument("--save", type=Path, help="write the sets with hopping as JSON")
     args = parser.parse_args()
     axes = Axis.several(args.range, dict.fromkeys(BOX, "1"), "group", POSITIVE)

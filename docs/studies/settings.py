@@ -1,4 +1,5 @@
-"""What ways of setting MuJoCo, and other methods, reach and take: ``python -m docs.studies.settings`` draws it.
+"""What ways of setting MuJoCo, and other methods, reach and take: ``python -m
+docs.studies.settings`` draws it.
 
 Each is tried on the stationary states and the approach to one of `docs.studies.states`. Runs
 are kept in results/settings, as those of the tables of the same page (`docs.studies.tables`).
@@ -20,7 +21,16 @@ from matplotlib.figure import Figure
 
 from compare.kit import drawing, progress, style
 from compare.kit.campaign import Campaign
-from compare.kit.engines import ENGINES, EVENT, MOREAU, NEWCOMER, PLAIN, AnySettings, newcomer, plain
+from compare.kit.engines import (
+    ENGINES,
+    EVENT,
+    MOREAU,
+    NEWCOMER,
+    PLAIN,
+    AnySettings,
+    newcomer,
+    plain,
+)
 from compare.kit.pages import Rows
 from compare.kit.tasks import carry_out
 from docs.studies import states
@@ -53,7 +63,10 @@ def main() -> None:
     matplotlib.rcParams["svg.hashsalt"] = "dualball"  # equal figures make equal files
     runs, pictures = Path("results/settings"), Path(__file__).parents[1] / "settings"
     make_directory(pictures)
-    with progress.reporter(counted=True) as show, Campaign(runs, os.cpu_count() or 1, report=show) as campaign:
+    with (
+        progress.reporter(counted=True) as show,
+        Campaign(runs, os.cpu_count() or 1, report=show) as campaign,
+    ):
         drawing.save(draw_ladder(reached(campaign, rungs(STEP))), pictures / "ladder.svg")
         drawing.save(draw_frontier(frontier(campaign, STEPS)), pictures / "frontier.svg")
 
@@ -64,7 +77,9 @@ def rungs(step: float) -> Ways:
         FACETS: NEWCOMER.at(step, states.SLIPPING.p),
         f"{LONE}, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
         LONE: newcomer(step),
-        "ours, memory off, servo 0, order 1": ContactSettings.at(step, memory=False, servo=0.0, order=1),
+        "ours, memory off, servo 0, order 1": ContactSettings.at(
+            step, memory=False, servo=0.0, order=1
+        ),
         "ours, memory off, order 1": ContactSettings.at(step, memory=False, order=1),
         "ours, order 1": ContactSettings.at(step, order=1),
         "ours": ContactSettings.at(step),
@@ -84,11 +99,12 @@ def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
 
 
 def landings(step: float) -> Rows:
-    """What a landing, and motions with one, come to as corrections are taken away: relative errors of omega_c.
+    """What a landing, and motions with one, come to as corrections are taken away: relative errors
+    of omega_c.
 
-    That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball rebounds within
-    0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of `states.HITTING`.
-    """
+    That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball
+    rebounds within 0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of
+    `states.HITTING`."""
     bare = plain(step)
     ways: Ways = {
         "ours (mujoco)": ContactSettings.at(step),
@@ -97,14 +113,24 @@ def landings(step: float) -> Rows:
         "ours, landings left to the contacts": states.Unwatched(**vars(ContactSettings.at(step))),
         "ours, memory off, servo 0, order 1, integrator implicit (mujoco-plain)": bare,
         "mujoco-plain, damping ratio 2": replace(bare, solref=(2 * step, 2.0)),
-        "mujoco-plain, damping ratio 2, step divided by 10": replace(plain(step / 10), solref=(step / 5, 2.0)),
+        "mujoco-plain, damping ratio 2, step divided by 10": replace(
+            plain(step / 10), solref=(step / 5, 2.0)
+        ),
         "mujoco-plain, step divided by 10": plain(step / 10),
         "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
         "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
         LONE: newcomer(step),
         f"{FACETS} (mujoco-defaults)": NEWCOMER.at(step, states.LANDING.p),
     }
-    rows = [["settings", "ω_c 5 ms after a landing", "rebound", "motion with it", "motion that hits the wall"]]
+    rows = [
+        [
+            "settings",
+            "ω_c 5 ms after a landing",
+            "rebound",
+            "motion with it",
+            "motion that hits the wall",
+        ]
+    ]
     for name, way in ways.items():
         (contestant,), land, hit = _contestants({name: way}), states.LANDING, states.HITTING
         lands, hits, *others = (
@@ -118,17 +144,28 @@ def landings(step: float) -> Rows:
         landed = float(exact.time[np.flatnonzero(exact.y <= 0)[0]])
         after = float(np.interp(landed + 5e-3, lands.time, lands.omega_c))
         off = after / float(np.interp(landed + 5e-3, exact.time, exact.omega_c)) - 1
-        high = [run.y[(run.time > landed + 2e-3) & (run.time < landed + 0.1)].max() for run in (lands, *others)]
+        high = [
+            run.y[(run.time > landed + 2e-3) & (run.time < landed + 0.1)].max()
+            for run in (lands, *others)
+        ]
         height = float(max(high))
-        motions = (each.errors(run.time, run.x)[0] for each, run in ((states.LANDING, lands), (states.HITTING, hits)))
+        motions = (
+            each.errors(run.time, run.x)[0]
+            for each, run in ((states.LANDING, lands), (states.HITTING, hits))
+        )
         rebound = f"{1e3 * height:.2g} mm" if height > 1e-5 else "none"
         rows.append([name, states.number(abs(off)), rebound, *map(states.number, motions)])
     return rows
 
 
 def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:
-    """Entries, with their cost, of MuJoCo under several settings and of theory's two simulators, at several steps."""
-    ways = [each for alike in zip(*(_contestants(rivals(step)) for step in steps), strict=True) for each in alike]
+    """Entries, with their cost, of MuJoCo under several settings and of theory's two simulators, at
+    several steps."""
+    ways = [
+        each
+        for alike in zip(*(_contestants(rivals(step)) for step in steps), strict=True)
+        for each in alike
+    ]
     theory = [each for name in (MOREAU.name, EVENT.name) for each in _theory(name, steps)]
     return states.scored(campaign, [*ways, *theory], ERRORS, states.cost)
 
@@ -141,8 +178,12 @@ def _theory(name: str, steps: Sequence[float]) -> list[Contestant]:
 
 
 def _contestants(ways: Ways) -> list[Contestant]:
-    """They run without a warning where contacts chatter: what poor settings do is the question here."""
-    engines = {name: PLAIN if isinstance(each, ContactSettings) else NEWCOMER for name, each in ways.items()}
+    """They run without a warning where contacts chatter: what poor settings do is the question
+    here."""
+    engines = {
+        name: PLAIN if isinstance(each, ContactSettings) else NEWCOMER
+        for name, each in ways.items()
+    }
     return [Contestant(name, engines[name], each.timestep, each) for name, each in ways.items()]
 
 
@@ -150,8 +191,14 @@ def draw_ladder(entries: Sequence[Entry]) -> Figure:
     """Rows of settings, a mark for each error of omega_c; a run that diverged has none."""
     figure = style.figure(9, 1.1 + 0.33 * len(entries))
     axes = figure.add_subplot()
-    for name, look in zip((name for name in entries[0].scores if name != OPEN), LOOKS, strict=False):
-        own = [(max(e.scores[name], states.LEAST), k) for k, e in enumerate(entries) if math.isfinite(e.scores[name])]
+    for name, look in zip(
+        (name for name in entries[0].scores if name != OPEN), LOOKS, strict=False
+    ):
+        own = [
+            (max(e.scores[name], states.LEAST), k)
+            for k, e in enumerate(entries)
+            if math.isfinite(e.scores[name])
+        ]
         axes.plot([x for x, _ in own], [k for _, k in own], "-", lw=0.6, label=name, **look)
     axes.set_yticks(range(len(entries)), [entry.name for entry in entries], fontsize=8.5)
     axes.invert_yaxis()
@@ -164,7 +211,9 @@ def draw_ladder(entries: Sequence[Entry]) -> Figure:
 def draw_frontier(entries: Sequence[Entry]) -> Figure:
     """A panel for each state, a line for each method."""
     names = dict.fromkeys(entry.name for entry in entries)
-    return states.draw_error_over_cost(entries, dict(zip(names, itertools.cycle(LOOKS), strict=False)))
+    return states.draw_error_over_cost(
+        entries, dict(zip(names, itertools.cycle(LOOKS), strict=False))
+    )
 
 
 if __name__ == "__main__":

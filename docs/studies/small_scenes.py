@@ -20,12 +20,21 @@ BRICKS, COURSES = 16, 8
 DOMINOS = 10
 
 
-def model(body: str, option: str = "", more: str = "", slope: float = 0.0, mu: float = 0.6, extra: str = "") -> Any:
+def model(
+    body: str,
+    option: str = "",
+    more: str = "",
+    slope: float = 0.0,
+    mu: float = 0.6,
+    extra: str = "",
+) -> Any:
     """A world on a slope, degrees, downwards along x."""
     a = math.radians(slope)
     return mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="elliptic" gravity="{9.81 * math.sin(a)} 0 {-9.81 * math.cos(a)}" {option}>{extra}'
-        f'</option><default><geom friction="{mu}"/></default><worldbody>{body}</worldbody>{more}</mujoco>'
+        f'<mujoco><option cone="elliptic" gravity="{9.81 * math.sin(a)} 0 {-9.81 * math.cos(a)}" '
+        f"{option}>{extra}"
+        f"</option><default><geom "
+        f'friction="{mu}"/></default><worldbody>{body}</worldbody>{more}</mujoco>'
     )
 
 
@@ -39,13 +48,16 @@ FLOOR = '<geom name="floor" type="plane" size="9 9 1"/>'
 
 
 def treadmill(way: Way) -> Found:
-    """A box rides up a belt of 10°: by the velocity of its surface, or, where there is none, on a plate that moves."""
+    """A box rides up a belt of 10°: by the velocity of its surface, or, where there is none, on a
+    plate that moves."""
     surface = hasattr(mujoco.MjModel, "geom_surfacevel")
     belt = 'type="box" size="3 .2 .05" pos="0 0 -.05"'
     if surface:
         world = f'<geom {belt} surfacevel="{-SPEED} 0 0 0 0 0"/>'
     else:
-        world = f'<body gravcomp="1"><joint type="slide" axis="1 0 0"/><geom {belt} mass="1e6"/></body>'
+        world = (
+            f'<body gravcomp="1"><joint type="slide" axis="1 0 0"/><geom {belt} mass="1e6"/></body>'
+        )
     run = Run(way, model(world + free("box", "0 0 .05", 'type="box" size=".05 .05 .05"'), slope=10))
     if not surface:
         run.data.qvel[0] = -SPEED
@@ -56,10 +68,10 @@ def treadmill(way: Way) -> Found:
 
 
 def carousel(way: Way) -> Found:
-    """A box rides on a disc that turns; it drifts outwards, too, as the integrator takes the tangent for the circle."""
-    disc = (
-        '<body name="disc"><joint axis="0 0 1"/><geom type="cylinder" size=".5 .02" pos="0 0 -.02" mass="1e6"/></body>'
-    )
+    """A box rides on a disc that turns; it drifts outwards, too, as the integrator takes the
+    tangent for the circle."""
+    plate = '<geom type="cylinder" size=".5 .02" pos="0 0 -.02" mass="1e6"/>'
+    disc = f'<body name="disc"><joint axis="0 0 1"/>{plate}</body>'
     run = Run(way, model(disc + free("box", ".2 0 .03", 'type="box" size=".03 .03 .03"')))
     run.data.qvel[0] = run.data.qvel[6] = TURN
     run.data.qvel[2] = 0.2 * TURN
@@ -68,7 +80,8 @@ def carousel(way: Way) -> Found:
 
 
 def dominos(way: Way) -> Found:
-    """A row of dominos, of which the first is pushed; they come to lie on each other; the worst of four pushes."""
+    """A row of dominos, of which the first is pushed; they come to lie on each other; the worst of
+    four pushes."""
     return worst([pushed(way, push) for push in (3.0, 3.2, 3.5, 4.0)])
 
 
@@ -84,7 +97,8 @@ def pushed(way: Way, push: float) -> Found:
 
 
 def cradle(way: Way) -> Found:
-    """Newton's cradle: what the last of five balls reaches of the angle of the first, by damped stiff contacts."""
+    """Newton's cradle: what the last of five balls reaches of the angle of the first, by damped
+    stiff contacts."""
     balls = "".join(
         f'<body name="b{k}" pos="{0.1005 * k} 0 0"><joint axis="0 1 0" pos="0 0 .5"/>'
         f'<geom size=".05" mass="1" solref="-1e6 -20"/></body>'
@@ -99,19 +113,26 @@ def cradle(way: Way) -> Found:
 
 
 def nut(way: Way) -> Found:
-    """A nut on a standing bolt, of MuJoCo's plugin of signed distances: its thread should hold it."""
+    """A nut on a standing bolt, of MuJoCo's plugin of signed distances: its thread should hold
+    it."""
     named = "".join(
-        f'<plugin plugin="mujoco.sdf.{name}"><instance name="{name}"><config key="radius" value="{radius}"/></instance>'
+        f'<plugin plugin="mujoco.sdf.{name}"><instance name="{name}"><config key="radius" '
+        f'value="{radius}"/></instance>'
         "</plugin>"
         for name, radius in (("nut", 0.26), ("bolt", 0.255))
     )
-    mesh = "".join(f'<mesh name="{name}"><plugin instance="{name}"/></mesh>' for name in ("nut", "bolt"))
+    mesh = "".join(
+        f'<mesh name="{name}"><plugin instance="{name}"/></mesh>' for name in ("nut", "bolt")
+    )
     geom = '<geom type="sdf" mesh="{0}" {1}><plugin instance="{0}"/></geom>'
     heavy = 'mass="2"'
     scene = (
-        f'<mujoco><extension>{named}</extension><asset>{mesh}</asset><default><geom friction=".3" solref=".01 1" '
-        'solimp=".95 .99 1e-4"/></default><option cone="elliptic" sdf_iterations="10" sdf_initpoints="20"/><worldbody>'
-        f'<body name="nut" pos="0 0 .83" euler="180 0 0"><freejoint/>{geom.format("nut", heavy)}</body>'
+        f'<mujoco><extension>{named}</extension><asset>{mesh}</asset><default><geom friction=".3" '
+        f'solref=".01 1" '
+        'solimp=".95 .99 1e-4"/></default><option cone="elliptic" sdf_iterations="10" '
+        'sdf_initpoints="20"/><worldbody>'
+        f'<body name="nut" pos="0 0 .83" euler="180 0 '
+        f'0"><freejoint/>{geom.format("nut", heavy)}</body>'
         f'<body name="bolt" euler="180 0 0">{geom.format("bolt", "")}</body></worldbody></mujoco>'
     )
     run = Run(way, mujoco.MjModel.from_xml_string(scene), passive=True)
@@ -122,7 +143,8 @@ def nut(way: Way) -> Found:
 def tactile(way: Way) -> Found:
     """A plate on a pad of 36 sprung spheres, each with a sensor of touch, on a slope of 15°."""
     pad = "".join(
-        f'<body pos="{0.01 * i} {0.01 * j} 0"><joint type="slide" axis="0 0 1" stiffness="300" damping="1"/>'
+        f'<body pos="{0.01 * i} {0.01 * j} 0"><joint type="slide" axis="0 0 1" stiffness="300" '
+        f'damping="1"/>'
         f'<geom size=".004" mass=".001"/><site name="s{i}{j}" size=".004"/></body>'
         for i in range(6)
         for j in range(6)
@@ -137,7 +159,8 @@ def tactile(way: Way) -> Found:
 
 
 def castle(way: Way) -> Found:
-    """A round tower of bricks in eight courses, some 1500 contacts, in a wind that friction withstands."""
+    """A round tower of bricks in eight courses, some 1500 contacts, in a wind that friction
+    withstands."""
     half, radius = 0.05, 0.3
     bricks = "".join(
         free(
@@ -153,11 +176,14 @@ def castle(way: Way) -> Found:
     run = Run(way, model(FLOOR + bricks, slope=3), passive=True)
     run.advance(1)
     creep = run.creep(seconds=0.2)
-    return run.found({CREEP: creep}, {"fell": run.places(f"b{COURSES - 1}-0")[0, 2] < 0.06 * (COURSES - 1)})
+    return run.found(
+        {CREEP: creep}, {"fell": run.places(f"b{COURSES - 1}-0")[0, 2] < 0.06 * (COURSES - 1)}
+    )
 
 
 def sleeping(way: Way) -> Found:
-    """Three towers of three boxes, with sleeping on: how many bodies are awake after 4 s, and after a push."""
+    """Three towers of three boxes, with sleeping on: how many bodies are awake after 4 s, and after
+    a push."""
     if not hasattr(mujoco.mjtEnableBit, "mjENBL_SLEEP"):
         raise NotImplementedError(f"MuJoCo {mujoco.__version__} does not sleep")
     boxes = "".join(
@@ -178,7 +204,8 @@ def mocap(way: Way) -> Found:
         '<geom type="box" size=".015 .01 .04" mass=".1"/></body>'
     )
     hand = (
-        '<body name="target" mocap="true" pos="0 0 .15"/><body name="hand" pos="0 0 .15"><freejoint/>'
+        '<body name="target" mocap="true" pos="0 0 .15"/><body name="hand" pos="0 0 '
+        '.15"><freejoint/>'
         '<geom type="box" size=".03 .08 .02" mass=".5" contype="0" conaffinity="0"/>'
         + finger.format(-0.05, 1, 1)
         + finger.format(0.05, 2, -1)
@@ -188,7 +215,13 @@ def mocap(way: Way) -> Found:
         '<equality><weld body1="target" body2="hand" solref=".01 1"/></equality>'
         '<actuator><motor joint="f1"/><motor joint="f2"/></actuator>'
     )
-    run = Run(way, model(FLOOR + hand + free("box", "0 0 .03", 'type="box" size=".03 .03 .03" mass=".2"'), more=more))
+    run = Run(
+        way,
+        model(
+            FLOOR + hand + free("box", "0 0 .03", 'type="box" size=".03 .03 .03" mass=".2"'),
+            more=more,
+        ),
+    )
     data, target = run.data, run.data.mocap_pos[0]
     data.ctrl[:] = 8
     run.advance(0.5)
@@ -196,16 +229,22 @@ def mocap(way: Way) -> Found:
     run.advance(1, lambda: target.__setitem__(2, 0.15 + 0.1 * min(data.time - 0.5, 1)))
     run.advance(0.5)
     creep, begin, before = run.creep("box", of="hand"), data.time, run.places("box", of="hand")
-    run.advance(1, lambda: target.__setitem__(0, 0.02 * math.sin(8 * math.pi * (data.time - begin))))
+    run.advance(
+        1, lambda: target.__setitem__(0, 0.02 * math.sin(8 * math.pi * (data.time - begin)))
+    )
     run.advance(0.5)
     slip = float(np.abs(run.places("box", of="hand") - before).max())
-    return run.found({CREEP: creep, SLIP: slip}, {"dropped": abs(run.places("box", of="hand") - start).max() > 0.02})
+    return run.found(
+        {CREEP: creep, SLIP: slip},
+        {"dropped": abs(run.places("box", of="hand") - start).max() > 0.02},
+    )
 
 
 def tendon(way: Way) -> Found:
     """A weight of 3 N on a tendon over a pulley, whose dry friction of 5 N should hold it."""
     world = (
-        '<site name="above" pos="0 0 1"/><body name="weight" pos="0 0 .5"><joint type="slide" axis="0 0 1"/>'
+        '<site name="above" pos="0 0 1"/><body name="weight" pos="0 0 .5"><joint type="slide" '
+        'axis="0 0 1"/>'
         '<geom size=".05" mass=".306"/><site name="hook"/></body>'
     )
     tendon = '<tendon><spatial frictionloss="5"><site site="above"/><site site="hook"/></spatial></tendon>'
@@ -217,9 +256,11 @@ def tendon(way: Way) -> Found:
 def soft_grip() -> Any:
     """A box between two soft pads of finite elements."""
     pad = (
-        '<body name="{0}" pos="0 {1} .2"><joint name="{0}" type="slide" axis="0 {2} 0" damping="20"/>'
+        '<body name="{0}" pos="0 {1} .2"><joint name="{0}" type="slide" axis="0 {2} 0" '
+        'damping="20"/>'
         '<geom type="box" size=".03 .005 .03" mass=".2" pos="0 {3} 0" contype="0" conaffinity="0"/>'
-        '<flexcomp name="p{0}" type="grid" count="4 3 4" spacing=".015 .01 .015" dim="3" radius=".001" mass=".05">'
+        '<flexcomp name="p{0}" type="grid" count="4 3 4" spacing=".015 .01 .015" dim="3" '
+        'radius=".001" mass=".05">'
         '<contact selfcollide="none" solref=".01 1"/><edge equality="true"/>'
         '<pin gridrange="0 {4} 0 3 {4} 3"/></flexcomp></body>'
     )
@@ -246,9 +287,15 @@ def flex(way: Way) -> Found:
 def rolling(way: Way) -> Found:
     """A wheel and a ball that roll at .5 m/s: what they lose of it in a second."""
     ball, wheel = 'size=".05" mass="1"', 'type="cylinder" size=".05 .02" mass="1" euler="90 0 0"'
-    run = Run(way, model(FLOOR + free("ball", "0 0 .0499", ball) + free("wheel", "0 .5 .0499", wheel)), passive=True)
+    run = Run(
+        way,
+        model(FLOOR + free("ball", "0 0 .0499", ball) + free("wheel", "0 .5 .0499", wheel)),
+        passive=True,
+    )
     for first in (0, 6):
         run.data.qvel[first], run.data.qvel[first + 4] = 0.5, 10.0
     run.advance(1)
     ball_lost, wheel_lost = 0.5 - run.data.qvel[[0, 6]]
-    return run.found({"speed the ball loses, m/s": ball_lost, "speed the wheel loses, m/s": wheel_lost})
+    return run.found(
+        {"speed the ball loses, m/s": ball_lost, "speed the wheel loses, m/s": wheel_lost}
+    )

@@ -1,4 +1,5 @@
-"""What theory costs: ``python -m docs.studies.speed docs/speed.md`` writes the tables of that page, in ten minutes."""
+"""What theory costs: ``python -m docs.studies.speed docs/speed.md`` writes the tables of that page,
+in ten minutes."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ from model.arrays import Array
 from model.kinematics import SLIP_XYZ, TURNING
 
 LEAST, BEST = 0.3, 1e-13
-"""Seconds that the runs of which the quickest counts take at least, and the tolerance of the run that others are held
-against."""
+"""Seconds that the runs of which the quickest counts take at least, and the tolerance of the run
+that others are held against."""
 RUNS = 100
 """Random runs at once."""
 TOLERANCES = [10.0**-k for k in range(6, 14)]
@@ -57,11 +58,15 @@ MOTIONS = {
     "slipping at both points, 20 s": Motion(
         P, State(omega_c=13.0, slip_x=-3.0, slip_y=0.08, slip_z=8.7), 20.0, Flow.steady(25.0)
     ),
-    "rolling on the wall alone, 20 s": Motion(P, _ON_THE_WALL._replace(y=0.5, omega_c=44.5), 20.0, Flow.steady(45.0)),
+    "rolling on the wall alone, 20 s": Motion(
+        P, _ON_THE_WALL._replace(y=0.5, omega_c=44.5), 20.0, Flow.steady(45.0)
+    ),
     "rolling at both points, Schiller and Naumann's drag, 20 s": Motion(
         P.replace(drag="schiller-naumann", nu_f=1e-5), State(omega_c=4.0), 20.0, Flow.steady(6.0)
     ),
-    "staircase of five flows, 30 s": Motion(P, State(omega_c=5.0), 30.0, Flow.staircase([10, 25, 40, 25, 10], 6.0)),
+    "staircase of five flows, 30 s": Motion(
+        P, State(omega_c=5.0), 30.0, Flow.staircase([10, 25, 40, 25, 10], 6.0)
+    ),
     "pulsation, 20 events in 20 s": Motion(P, State(omega_c=20.0), 20.0, Flow.sine(25.0, 8.0, 0.5)),
 }
 
@@ -87,8 +92,11 @@ def plainly(motion: Motion, rtol: float = 1e-9) -> Any:
         return run(motion, rtol)
 
 
-def _solved(method: str, of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
-    """In the place of `integrator.stretch`: scipy's `solve_ivp`, to which what ends a case is an event.
+def _solved(
+    method: str, of: Stretch, pace: Pace, taken: int, most: int
+) -> tuple[int, Pace, int, int]:
+    """In the place of `integrator.stretch`: scipy's `solve_ivp`, to which what ends a case is an
+    event.
 
     The time of the solver runs from zero, since a direction of slip settles very soon.
     """
@@ -133,23 +141,30 @@ def _solved(method: str, of: Stretch, pace: Pace, taken: int, most: int) -> tupl
 
 
 def by_scipy(motion: Motion, method: str, rtol: float) -> Any:
-    """By a solver of `solve_ivp` and its events, the equations and what follows an event as the study has them."""
+    """By a solver of `solve_ivp` and its events, the equations and what follows an event as the
+    study has them."""
     with mock.patch.object(hybrid, "stretch", partial(_solved, method)), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it fails with one line more
         return plainly(motion, rtol)
 
 
 def deviation(x: Any, right: Any) -> float:
-    """Largest deviation of states, each variable in units of its largest, slips of the largest of all three."""
+    """Largest deviation of states, each variable in units of its largest, slips of the largest of
+    all three."""
     sizes = np.abs(right).max(axis=0) + 1e-300
     sizes[SLIP_XYZ] = sizes[SLIP_XYZ].max()
     return float(np.abs((x - right) / sizes).max())
 
 
 def event_driven() -> Rows:
-    """What event-driven simulation costs and how exact it is, and `solve_ivp` at no greater error."""
+    """What event-driven simulation costs and how exact it is, and `solve_ivp` at no greater
+    error."""
     rows = [["", "compiled, ms", "error", "plain Python, ms", "error"]]
-    rows[0] += [cell for method in METHODS for cell in (f"solve_ivp with {method}, ms", "by compiled", "error")]
+    rows[0] += [
+        cell
+        for method in METHODS
+        for cell in (f"solve_ivp with {method}, ms", "by compiled", "error")
+    ]
     for name, motion in MOTIONS.items():
         right, row, worst, spent = run(motion, BEST).x, [name], 0.0, list[float]()
         for way in (run, plainly):
@@ -163,9 +178,11 @@ def event_driven() -> Rows:
     return rows
 
 
-def _no_worse(motion: Motion, method: str, worst: float, right: Array, compiled: float) -> list[str]:
-    """Time, that divided by a compiled run's, and error of `solve_ivp` at the first of the tolerances that errs by no
-    more than `worst`."""
+def _no_worse(
+    motion: Motion, method: str, worst: float, right: Array, compiled: float
+) -> list[str]:
+    """Time, that divided by a compiled run's, and error of `solve_ivp` at the first of the
+    tolerances that errs by no more than `worst`."""
     for rtol in TOLERANCES:
         try:
             error = deviation(by_scipy(motion, method, rtol).x, right)
@@ -178,16 +195,19 @@ def _no_worse(motion: Motion, method: str, worst: float, right: Array, compiled:
 
 
 def states() -> Rows:
-    """The same without the forces and samples that are made of states by the same code: what `solve_ivp` gives alone.
+    """The same without the forces and samples that are made of states by the same code: what
+    `solve_ivp` gives alone.
 
-    By LSODA, of the motions that it gets through, at the tolerance at which it errs by no more than compiled runs.
-    """
+    By LSODA, of the motions that it gets through, at the tolerance at which it errs by no more than
+    compiled runs."""
     rows = [["", "compiled, ms", "solve_ivp with LSODA, ms", "by compiled"]]
     for name, motion in list(MOTIONS.items())[:3]:
         right = run(motion, BEST).x
 
         def compiled(rtol: float = 1e-9, of: Motion = motion) -> Array:
-            x: Array = simulate_many(of.p, of.x, of.t_end, of.flow, Settings(rtol=rtol), threads=1).x[0]
+            x: Array = simulate_many(
+                of.p, of.x, of.t_end, of.flow, Settings(rtol=rtol), threads=1
+            ).x[0]
             return x
 
         def by_lsoda(rtol: float, own: Callable[[float], Array] = compiled) -> Array:
@@ -196,21 +216,27 @@ def states() -> Rows:
                 return own(rtol)
 
         worst = deviation(compiled(), right)
-        rtol = next(each for each in TOLERANCES if deviation(by_lsoda(each), right) <= worst or each == TOLERANCES[-1])
+        rtol = next(
+            each
+            for each in TOLERANCES
+            if deviation(by_lsoda(each), right) <= worst or each == TOLERANCES[-1]
+        )
         ours, theirs = seconds(compiled), seconds(partial(by_lsoda, rtol))
         rows.append([name, f"{1e3 * ours:.2f}", f"{1e3 * theirs:.1f}", f"{theirs / ours:.1f}"])
     return rows
 
 
 STEPPED, ALLOWED = [0.02 / n for n in (2, 4, 5, 8, 10, 20, 40)], 5e-3
-"""Time steps, s, parts of the time between samples, and the error up to which one of them will do."""
+"""Time steps, s, parts of the time between samples, and the error up to which one of them will
+do."""
 
 
 def stepped() -> Rows:
-    """What the longest time step that errs by no more than `ALLOWED` costs, of the study's Moreau-Jean and of Siconos.
+    """What the longest time step that errs by no more than `ALLOWED` costs, of the study's
+    Moreau-Jean and of Siconos.
 
-    Siconos runs in a process of its own, which is told the fluid's force and asked for the state at every step.
-    """
+    Siconos runs in a process of its own, which is told the fluid's force and asked for the state at
+    every step."""
     motion, siconos = MOTIONS["slipping at both points, 20 s"], engine("siconos")
     given = motion.p, motion.x, motion.t_end, motion.flow
     turning = np.isin(np.arange(8), np.arange(8)[TURNING])  # gaps and their rates are round-off
@@ -220,9 +246,18 @@ def stepped() -> Rows:
         for step in STEPPED:
             begin = time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
             x = work(step).x
-            ours, own = time.process_time() - begin[0], resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin[1]
+            ours, own = (
+                time.process_time() - begin[0],
+                resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin[1],
+            )
             if len(x) == len(right) and (error := deviation(x * turning, right)) <= ALLOWED:
-                return [name, f"{1e3 * step:.3g}", f"{error:.1e}", f"{1e3 * (ours + own):.0f}", f"{1e3 * own:.0f}"]
+                return [
+                    name,
+                    f"{1e3 * step:.3g}",
+                    f"{error:.1e}",
+                    f"{1e3 * (ours + own):.0f}",
+                    f"{1e3 * own:.0f}",
+                ]
         return [name, "none", "–", "–", "–"]
 
     if siconos.missing:
@@ -230,8 +265,18 @@ def stepped() -> Rows:
     step_by_step = partial(simulate, *given, method="time-stepping")
 
     def take(step: float) -> Trajectory:
-        way: dict[str, Any] = {"settings": siconos.at(step, motion.p), "sample_interval": motion.t_end / 1000}
-        task = Task(engine=siconos.name, parameters=motion.p, x0=motion.x, t_end=motion.t_end, flow=motion.flow, **way)
+        way: dict[str, Any] = {
+            "settings": siconos.at(step, motion.p),
+            "sample_interval": motion.t_end / 1000,
+        }
+        task = Task(
+            engine=siconos.name,
+            parameters=motion.p,
+            x0=motion.x,
+            t_end=motion.t_end,
+            flow=motion.flow,
+            **way,
+        )
         return carry_out(task)
 
     step_by_step(timestep=STEPPED[0])  # which compiles it
@@ -245,7 +290,8 @@ def stepped() -> Rows:
 
 
 def many() -> Rows:
-    """Random runs by `simulate_many` against `simulate`, and threads, of the turn in which the machine allowed most."""
+    """Random runs by `simulate_many` against `simulate`, and threads, of the turn in which the
+    machine allowed most."""
     starts = random_starts(P, RUNS)
 
     def apart() -> None:
@@ -253,7 +299,9 @@ def many() -> Rows:
             simulate(P, x, 5.0, sample_interval=1.0)
 
     def at_once(threads: int = 1, method: str = "event") -> None:
-        simulate_many(P, starts, 5.0, settings=Settings(method=method), sample_interval=1.0, threads=threads)
+        simulate_many(
+            P, starts, 5.0, settings=Settings(method=method), sample_interval=1.0, threads=threads
+        )
 
     each = {name: 1e3 * seconds(way) / RUNS for name, way in (
         ("simulate, one after the other", apart),

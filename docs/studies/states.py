@@ -1,8 +1,9 @@
-"""What settings of MuJoCo are tried on: stationary states and motions of the ball; and how far a run is from them.
+"""What settings of MuJoCo are tried on: stationary states and motions of the ball; and how far a
+run is from them.
 
-A run of a state starts at rest against the wall, which is no solution of the problem, and is judged only once that
-start is forgotten: a run that began in the state would stay there whatever it would have converged to.
-"""
+A run of a state starts at rest against the wall, which is no solution of the problem, and is judged
+only once that start is forgotten: a run that began in the state would stay there whatever it would
+have converged to."""
 
 from __future__ import annotations
 
@@ -79,9 +80,11 @@ class Stationary:
     def forgets(self) -> float:
         """Time in s after which what is left of the start is lost in round-off.
 
-        That takes ln(1/eps) = 36 time constants: the slowest of the state, or that of spinning up before, (1 + 2j)/c.
-        """
-        return -math.log(EPS) * max(analytic.slowest_time_constant(self.solution), (1 + 2 * self.p.j) / self.p.c)
+        That takes ln(1/eps) = 36 time constants: the slowest of the state, or that of spinning up
+        before, (1 + 2j)/c."""
+        return -math.log(EPS) * max(
+            analytic.slowest_time_constant(self.solution), (1 + 2 * self.p.j) / self.p.c
+        )
 
     @property
     def settles(self) -> float:
@@ -94,7 +97,8 @@ class Stationary:
         return self.p, AT_REST, self.settles, self.settles / 1000
 
     def held(self, run: Trajectory, since: float | None = None) -> Held:
-        """How far the samples of a run since a time in s are from the state; by default the last `WINDOW` of `run`."""
+        """How far the samples of a run since a time in s are from the state; by default the last
+        `WINDOW` of `run`."""
         if not run.complete:
             return Held(self.name, *[math.nan] * 4)
         since = (1 - WINDOW) * self.settles if since is None else since
@@ -107,14 +111,24 @@ class Stationary:
             name=self.name,
             omega_c=float(run.omega_c[last].mean() / self.solution.state.omega_c) - 1,
             slip=float(np.abs(run.x[last, SLIP_XYZ].mean(axis=0) - x[SLIP_XYZ]).max()) * self.p.r,
-            open=max(float(np.mean(normal <= 0)) for contact, _, normal in contacts if contact is not Contact.N),
-            creep=max([float(speed.mean()) for contact, speed, _ in contacts if contact is Contact.R], default=0.0),
+            open=max(
+                float(np.mean(normal <= 0))
+                for contact, _, normal in contacts
+                if contact is not Contact.N
+            ),
+            creep=max(
+                [float(speed.mean()) for contact, speed, _ in contacts if contact is Contact.R],
+                default=0.0,
+            ),
         )
 
 
 ROLLING = Stationary(SMOOTH.replace(omega_0=12.0), Case.RR)
 SLIPPING = Stationary(SMOOTH.replace(omega_0=25.0), Case.SS)
-BARELY, RIDING = Stationary(SMOOTH.replace(omega_0=14.5), Case.SS), Stationary(ROUGH.replace(omega_0=25.0), Case.NR)
+BARELY, RIDING = (
+    Stationary(SMOOTH.replace(omega_0=14.5), Case.SS),
+    Stationary(ROUGH.replace(omega_0=25.0), Case.NR),
+)
 STATES = (ROLLING, BARELY, SLIPPING, RIDING)
 """Rolling, slipping little and much, and carried by the wall alone."""
 
@@ -137,14 +151,23 @@ class Transient:
 
     @cached_property
     def exact(self) -> Trajectory:
-        """By the event-driven simulation, at the times of all runs, since blows don't let it be interpolated."""
+        """By the event-driven simulation, at the times of all runs, since blows don't let it be
+        interpolated."""
         sharp = analytic.Settings(rtol=1e-12)
-        return analytic.simulate(self.p, self.x0, self.lasts, settings=sharp, sample_interval=FINEST)
+        return analytic.simulate(
+            self.p, self.x0, self.lasts, settings=sharp, sample_interval=FINEST
+        )
 
     def errors(self, time: Array, x: Array) -> tuple[float, float]:
-        """Relative rms errors of omega_c and of the slip, in units of its largest component, of states x (n, 8)."""
-        truth = np.stack([np.interp(time, self.exact.time, column) for column in self.exact.x.T], axis=-1)
-        slip = np.sqrt(np.mean(np.sum((x - truth)[:, SLIP_XYZ] ** 2, axis=-1))) / np.abs(truth[:, SLIP_XYZ]).max()
+        """Relative rms errors of omega_c and of the slip, in units of its largest component, of
+        states x (n, 8)."""
+        truth = np.stack(
+            [np.interp(time, self.exact.time, column) for column in self.exact.x.T], axis=-1
+        )
+        slip = (
+            np.sqrt(np.mean(np.sum((x - truth)[:, SLIP_XYZ] ** 2, axis=-1)))
+            / np.abs(truth[:, SLIP_XYZ]).max()
+        )
         omega_c = State.of(x).omega_c / State.of(truth).omega_c - 1
         return float(np.sqrt(np.mean(omega_c**2))), float(slip)
 
@@ -201,7 +224,12 @@ class Contestant:
         p, x0, lasts, interval = asked
         every = max(interval, self.step or 0.0)
         return Task(
-            engine=self.engine.name, parameters=p, x0=x0, t_end=lasts, settings=self.settings, sample_interval=every
+            engine=self.engine.name,
+            parameters=p,
+            x0=x0,
+            t_end=lasts,
+            settings=self.settings,
+            sample_interval=every,
         )
 
 
@@ -233,16 +261,22 @@ def scored(
     asked: Sequence[Discipline],
     cost: Callable[[Task], float] | None = None,
 ) -> list[Entry]:
-    """What contestants reach in some disciplines, and what a run takes by `cost`, if given, measured once."""
+    """What contestants reach in some disciplines, and what a run takes by `cost`, if given,
+    measured once."""
     rows = [[[each.task(run) for run in discipline.runs] for discipline in asked] for each in those]
-    failed = {f.task.key: f.reason for f in campaign.complete(task for row in rows for tasks in row for task in tasks)}
+    failed = {
+        f.task.key: f.reason
+        for f in campaign.complete(task for row in rows for tasks in row for task in tasks)
+    }
     entries = []
     for number, (each, row) in enumerate(zip(those, rows, strict=True)):
         entry = Entry(each.name, each.step)
         for discipline, tasks in zip(asked, row, strict=True):
             reasons = [failed[task.key] for task in tasks if task.key in failed]
             entry.failures.update({discipline.name: reasons[0]} if reasons else {})
-            entry.scores[discipline.name] = math.nan if reasons else discipline.score(campaign.run(tasks))
+            entry.scores[discipline.name] = (
+                math.nan if reasons else discipline.score(campaign.run(tasks))
+            )
         if cost:
             campaign.report(f"cost of {each.name}", number, len(those), 0)
             task = each.task(APPROACH.run)
@@ -255,7 +289,8 @@ def scored(
 
 
 def cost(task: Task) -> float:
-    """Processor time divided by simulated time of one run by itself, without what it takes to begin.
+    """Processor time divided by simulated time of one run by itself, without what it takes to
+    begin.
 
     The time of this process and of those that it started and that ended.
     """
@@ -320,16 +355,25 @@ CONTACT = Discipline(OPEN, tuple(run for each in ERRORS for run in each.runs), _
 """How often contact is lost in the runs of `ERRORS`."""
 
 
-def draw_error_over_cost(entries: Sequence[Entry], looks: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """A panel for each error of omega_c; entries of one name at several time steps are joined, with its looks."""
+def draw_error_over_cost(
+    entries: Sequence[Entry], looks: Mapping[str, Mapping[str, Any]]
+) -> Figure:
+    """A panel for each error of omega_c; entries of one name at several time steps are joined, with
+    its looks."""
     other = (COST, OPEN)  # no errors of omega_c
-    shown = [name for name in dict.fromkeys(n for e in entries for n in e.scores) if name not in other]
+    shown = [
+        name for name in dict.fromkeys(n for e in entries for n in e.scores) if name not in other
+    ]
     lines = -(-len(shown) // COLUMNS)
     figure = style.figure(11, 0.9 + 3.0 * lines)
     panels = figure.subplots(lines, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, discipline in zip(panels, shown, strict=False):
         for name, look in looks.items():
-            own = [e for e in entries if e.name == name and math.isfinite(e.scores.get(discipline, math.nan))]
+            own = [
+                e
+                for e in entries
+                if e.name == name and math.isfinite(e.scores.get(discipline, math.nan))
+            ]
             own.sort(key=lambda entry: entry.scores[COST])
             x, y = [e.scores[COST] for e in own], [max(e.scores[discipline], LEAST) for e in own]
             axes.plot(x, y, ms=6, lw=1, label=name, **look)

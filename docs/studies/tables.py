@@ -1,8 +1,8 @@
-"""Write the measured tables of a page, as in ``python -m docs.studies.tables docs/mujoco-settings.md``; or of another.
+"""Write the measured tables of a page, as in ``python -m docs.studies.tables
+docs/mujoco-settings.md``; or of another.
 
-Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are kept in a results
-directory and not computed again.
-"""
+Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are
+kept in a results directory and not computed again."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ def write_all(tables: Mapping[str, Callable[[], Rows]], what: str, page: str) ->
     """As a program: measure and write all tables of a page, or those named."""
     parser = argparse.ArgumentParser(description=what)
     parser.add_argument("page", type=Path, metavar="FILE", help=page)
-    parser.add_argument("--only", action="append", choices=list(tables), metavar="NAME", help="only this table")
+    parser.add_argument(
+        "--only", action="append", choices=list(tables), metavar="NAME", help="only this table"
+    )
     args = parser.parse_args()
     for name in args.only or tables:
         write(args.page, name, tables[name]())
@@ -60,7 +62,8 @@ def _of_settings(entries: Sequence[Entry]) -> Rows:
 
 
 def variants(step: float) -> settings.Ways:
-    """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction rows."""
+    """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction
+    rows."""
     firm = {"solimp": 0.1, "solreffriction": 2 * step / 0.1}
     firmly = f"ours, solreffriction {firm['solreffriction']:g}, solimp 0.1"
     alone, pyramids = {"memory": False, "order": 1}, "memory off, order 1, cone pyramidal"
@@ -71,7 +74,9 @@ def variants(step: float) -> settings.Ways:
         "ours, integrator implicitfast": ContactSettings.at(step, integrator="implicitfast"),
         f"{firmly}, integrator discrete": ContactSettings.at(step, **firm, integrator="discrete"),
         "ours, integrator discrete": ContactSettings.at(step, integrator="discrete"),
-        "ours, memory off, noslip_iterations 10": ContactSettings.at(step, memory=False, noslip_iterations=10),
+        "ours, memory off, noslip_iterations 10": ContactSettings.at(
+            step, memory=False, noslip_iterations=10
+        ),
         "ours, memory off": ContactSettings.at(step, memory=False),
         "ours": ContactSettings.at(step),
     }
@@ -90,7 +95,9 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "transient": accuracy.transient,
     "events": accuracy.event_times,
     "split": accuracy.force_split,
-    "ablation": lambda campaign: _of_settings(settings.reached(campaign, settings.rungs(settings.STEP))),
+    "ablation": lambda campaign: _of_settings(
+        settings.reached(campaign, settings.rungs(settings.STEP))
+    ),
     "frontier": lambda campaign: states.rows(settings.frontier(campaign, settings.STEPS)),
     "variants": lambda campaign: _of_settings(settings.reached(campaign, variants(settings.STEP))),
 }
@@ -99,7 +106,8 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
 
 @functools.cache
 def _league(kept: Path) -> dict[str, list[Result]]:
-    """Of all engines, each measured unless its file is there: delete that of an engine whose adapter has changed."""
+    """Of all engines, each measured unless its file is there: delete that of an engine whose
+    adapter has changed."""
 
     def results(name: str) -> list[Result]:
         file = kept / f"{name}.pickle"
@@ -110,7 +118,11 @@ def _league(kept: Path) -> dict[str, list[Result]]:
 
     with progress.reporter(counted=True) as show, ThreadPoolExecutor(os.cpu_count()) as pool:
         found = dict(zip(league.ENTRIES, pool.map(results, league.ENTRIES), strict=True))
-    if missing := [results[0].skipped for results in found.values() if all(result.skipped for result in results)]:
+    if missing := [
+        results[0].skipped
+        for results in found.values()
+        if all(result.skipped for result in results)
+    ]:
         raise InputError(f"the page is about all engines: {missing[0]}")
     write_text(kept / "league.json", json.dumps(league.to_mapping(found)))
     drawing.save(league.draw(found), Path(__file__).parents[1] / "league.svg")
@@ -119,7 +131,9 @@ def _league(kept: Path) -> dict[str, list[Result]]:
 
 def _errors(asked: bool, kept: Path) -> Rows:
     """Errors by case of the engines as they come, or of those in their best settings."""
-    chosen = {name: own for name, own in _league(kept).items() if name.endswith("-defaults") == asked}
+    chosen = {
+        name: own for name, own in _league(kept).items() if name.endswith("-defaults") == asked
+    }
     return league.rows({name.removesuffix("-defaults"): own for name, own in chosen.items()})
 
 
@@ -140,16 +154,34 @@ PAGES = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and write all tables of a page, or those named."""
-    parser = argparse.ArgumentParser(description="Write the measured tables of a page of the documentation.")
-    parser.add_argument("page", type=Path, metavar="FILE", help=f"a page called {' or '.join(PAGES)}")
-    parser.add_argument("--only", action="append", metavar="NAME", help="only this table (may be repeated)")
-    parser.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR", help="where runs are kept")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
+    parser = argparse.ArgumentParser(
+        description="Write the measured tables of a page of the documentation."
+    )
+    parser.add_argument(
+        "page", type=Path, metavar="FILE", help=f"a page called {' or '.join(PAGES)}"
+    )
+    parser.add_argument(
+        "--only", action="append", metavar="NAME", help="only this table (may be repeated)"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("results"),
+        metavar="DIR",
+        help="where runs are kept",
+    )
+    parser.add_argument(
+        "--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)"
+    )
     args = parser.parse_args(argv)
     check_choice("page", args.page.name, list(PAGES))
     runs, tables = PAGES[args.page.name]
     check_names(args.only or (), list(tables), "table")
-    with progress.reporter(counted=True) as show, Campaign(args.output / runs, args.workers, report=show) as campaign:
+    with (
+        progress.reporter(counted=True) as show,
+        Campaign(args.output / runs, args.workers, report=show) as campaign,
+    ):
         for name in args.only or tables:
             campaign.doing = name
             write(args.page, name, tables[name](campaign))

@@ -1,7 +1,8 @@
-"""Ways to step a MuJoCo scene that is to hold still, and what a scene costs and does while it is stepped.
+"""Ways to step a MuJoCo scene that is to hold still, and what a scene costs and does while it is
+stepped.
 
-Needs MuJoCo, NumPy and `mujoco_coulomb` alone, so that it runs beside any package that brings scenes.
-"""
+Needs MuJoCo, NumPy and `mujoco_coulomb` alone, so that it runs beside any package that brings
+scenes."""
 
 from __future__ import annotations
 
@@ -62,11 +63,12 @@ class Plain(Halves):
 
 
 class PairPose(Halves):
-    """The idea of MuJoCo's pull request 3349: bodies that stick have a relative pose; a spring takes them back to it.
+    """The idea of MuJoCo's pull request 3349: bodies that stick have a relative pose; a spring
+    takes them back to it.
 
-    The pose of the second body in the axes of the first is noted when they first touch, and again when a contact of
-    theirs slides. The spring has the stiffness of the normal row. Elliptic cones only.
-    """
+    The pose of the second body in the axes of the first is noted when they first touch, and again
+    when a contact of theirs slides. The spring has the stiffness of the normal row. Elliptic cones
+    only."""
 
     def __init__(self, model: Any) -> None:
         super().__init__(model)
@@ -74,9 +76,17 @@ class PairPose(Halves):
 
     def step2(self, data: Any) -> None:
         contact = data.contact
-        used = np.flatnonzero((contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1))
-        rows, frames, points = contact.efc_address[used], contact.frame[used].reshape(-1, 3, 3), contact.pos[used]
-        pairs = [(int(one), int(other)) for one, other in self.model.geom_bodyid[contact.geom[used]]]
+        used = np.flatnonzero(
+            (contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1)
+        )
+        rows, frames, points = (
+            contact.efc_address[used],
+            contact.frame[used].reshape(-1, 3, 3),
+            contact.pos[used],
+        )
+        pairs = [
+            (int(one), int(other)) for one, other in self.model.geom_bodyid[contact.geom[used]]
+        ]
         self._poses = {pair: self._poses.get(pair) or self._pose(data, *pair) for pair in pairs}
         for pair, row, frame, point in zip(pairs, rows, frames, points, strict=True):
             slip = frame[1:] @ self._slip(data, pair, point)
@@ -128,10 +138,9 @@ WAYS = {
 class Found:
     """What a scene came to: its own figures by name, and what is measured in each.
 
-    `step` is the processor time of a step in the mean, s; `contacts` how many there were at most; `depth` how far
-    bodies sank in at most, m; `rise` by how much energy rose above its least so far, J, if nothing drives the scene;
-    `wrong` what failed, and MuJoCo's warnings.
-    """
+    `step` is the processor time of a step in the mean, s; `contacts` how many there were at most;
+    `depth` how far bodies sank in at most, m; `rise` by how much energy rose above its least so
+    far, J, if nothing drives the scene; `wrong` what failed, and MuJoCo's warnings."""
 
     values: dict[str, float]
     step: float
@@ -206,7 +215,8 @@ class Run:
         seconds: float = 1.0,
         between: Callable[[], None] | None = None,
     ) -> float:
-        """Mean speed at which bodies leave their places in the axes of another, of the fastest, m/s."""
+        """Mean speed at which bodies leave their places in the axes of another, of the fastest,
+        m/s."""
         before = self.places(*bodies, of=of)
         self.advance(seconds, between)
         return float(np.abs(self.places(*bodies, of=of) - before).max()) / seconds
@@ -222,7 +232,9 @@ class Run:
 
     def found(self, values: dict[str, float], wrong: dict[str, bool] | None = None) -> Found:
         """What there is to say: figures by name and unit, and what may have gone wrong by name."""
-        warned = [mujoco.mjtWarning(k).name for k, each in enumerate(self.data.warning) if each.number]
+        warned = [
+            mujoco.mjtWarning(k).name for k, each in enumerate(self.data.warning) if each.number
+        ]
         return Found(
             {name: float(value) for name, value in values.items()},
             self._spent / max(self._steps, 1),

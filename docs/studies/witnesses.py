@@ -1,4 +1,5 @@
-"""What three witnesses say in a validation that was kept: rows for the page on MuJoCo's settings."""
+"""What three witnesses say in a validation that was kept: rows for the page on MuJoCo's
+settings."""
 
 from __future__ import annotations
 
@@ -34,38 +35,79 @@ QUANTITIES = {
 
 
 def verdicts(results: Path) -> list[Verdict]:
-    """Of all claims of the last validation in a results directory; raises as `compare.report.results.load`."""
+    """Of all claims of the last validation in a results directory; raises as
+    `compare.report.results.load`."""
     return [full_verdict(claim, stored(results)) for claim in CLAIMS]
 
 
 def counted(results: Path) -> Rows:
-    """How many claims each witness was asked, and how they came out, with its deviations at a step of 2 ms.
+    """How many claims each witness was asked, and how they came out, with its deviations at a step
+    of 2 ms.
 
-    `mujoco-coulomb`, which measures by itself, has a directory of its own below, as `make mutants` leaves it.
-    """
+    `mujoco-coulomb`, which measures by itself, has a directory of its own below, as `make mutants`
+    leaves it."""
     said = verdicts(results)
-    told, formal = wording.witnesses(said), str(sum(bool(verdict.claim.algebra) for verdict in said))
+    told, formal = (
+        wording.witnesses(said),
+        str(sum(bool(verdict.claim.algebra) for verdict in said)),
+    )
     told += wording.witnesses(verdicts(results / "coulomb"))
-    head = ["witness", "asked", "confirmed", "to", "at worst", "refuted", "undecided", "typical deviation", "worst"]
+    head = [
+        "witness",
+        "asked",
+        "confirmed",
+        "to",
+        "at worst",
+        "refuted",
+        "undecided",
+        "typical deviation",
+        "worst",
+    ]
     for row in told:
         expected = sum(row["refuted"].values())
-        row["refuted"] = f"{len(row['refuted'])}" + (f" ({expected} as expected)" if expected else "")
+        row["refuted"] = f"{len(row['refuted'])}" + (
+            f" ({expected} as expected)" if expected else ""
+        )
         row["to"], _, row["at worst"] = row["to"].partition(", at worst ")
-    rows = [[row[name] for name in ("engine", *head[1:6], "open", "typical", "worst")] for row in told]
+    rows = [
+        [row[name] for name in ("engine", *head[1:6], "open", "typical", "worst")] for row in told
+    ]
     return [head, *rows, ["theory against theory", formal, formal, *["–"] * 6]]
 
 
 def limits(results: Path) -> Rows:
-    """How far plain MuJoCo is from theory in the limit of no step, and how sure that is, by quantity."""
-    rows = [["in the limit of no step", "numbers", "median deviation", "worst deviation", "tolerance of the worst"]]
+    """How far plain MuJoCo is from theory in the limit of no step, and how sure that is, by
+    quantity."""
+    rows = [
+        [
+            "in the limit of no step",
+            "numbers",
+            "median deviation",
+            "worst deviation",
+            "tolerance of the worst",
+        ]
+    ]
     own = [w for v in verdicts(results) for w in v.witnesses if w.engine == PLAIN.name]
     for text, names in QUANTITIES.items():
-        checks = {(c.measurement.quantity, c.measurement.value): c for w in own for c in w.checks if c.scale > 0}
+        checks = {
+            (c.measurement.quantity, c.measurement.value): c
+            for w in own
+            for c in w.checks
+            if c.scale > 0
+        }
         equal = [c for c in checks.values() if c.relation is Relation.EQUAL]
         found = [c for c in equal if c.measurement.quantity.startswith(names)]
-        off = [(abs(c.deviation) / c.scale, c.resolves) for c in found if math.isfinite(c.predicted)]
+        off = [
+            (abs(c.deviation) / c.scale, c.resolves) for c in found if math.isfinite(c.predicted)
+        ]
         worst, tolerance = max(off)
-        rows.append([text, str(len(off)), *(f"{x:.1e}" for x in (median(x for x, _ in off), worst, tolerance))])
+        rows.append(
+            [
+                text,
+                str(len(off)),
+                *(f"{x:.1e}" for x in (median(x for x, _ in off), worst, tolerance)),
+            ]
+        )
     return rows
 
 
@@ -74,9 +116,16 @@ def not_confirmed(results: Path) -> Rows:
     rows = [["claim", "outcome", "why"]]
     for verdict in verdicts(results):
         for said in verdict.witnesses:
-            if said.engine == PLAIN.name and said.outcome not in (Outcome.CONFIRMED, Outcome.NOT_ASKED):
+            if said.engine == PLAIN.name and said.outcome not in (
+                Outcome.CONFIRMED,
+                Outcome.NOT_ASKED,
+            ):
                 wrong = sum(not check.agrees for check in said.checks)
-                why = f"{wrong} of {len(said.checks)} numbers disagree" if wrong else said.reason.split(";")[0]
+                why = (
+                    f"{wrong} of {len(said.checks)} numbers disagree"
+                    if wrong
+                    else said.reason.split(";")[0]
+                )
                 rows.append([verdict.claim.id, said.outcome, why])
     return rows
 
@@ -85,7 +134,9 @@ def not_confirmed(results: Path) -> Rows:
 def _ceilings(times: float) -> Iterator[None]:
     """All ceilings of quantities multiplied."""
     known = quantities.QUANTITIES
-    with mock.patch.dict(known, {name: replace(q, resolves=times * q.resolves) for name, q in known.items()}):
+    with mock.patch.dict(
+        known, {name: replace(q, resolves=times * q.resolves) for name, q in known.items()}
+    ):
         yield
 
 
@@ -95,7 +146,8 @@ def _constant(name: str) -> Callable[[float], AbstractContextManager[None]]:
 
 
 CHOSEN = {
-    name: _constant(name) for name in ("SAFETY", "SAME", "CEILING", "COARSEST", "MARGIN", "FAR_OFF", "LOWEST_ORDER")
+    name: _constant(name)
+    for name in ("SAFETY", "SAME", "CEILING", "COARSEST", "MARGIN", "FAR_OFF", "LOWEST_ORDER")
 } | {"all ceilings of quantities": _ceilings}
 """What was chosen after a first measurement and can be changed without measuring anew."""
 
@@ -104,14 +156,20 @@ def chosen(results: Path) -> Rows:
     """The verdicts, by any witness, that change where a constant is half or twice as large."""
 
     def said() -> dict[str, Outcome]:
-        return {f"{v.claim.id} by {w.engine}": w.outcome for v in verdicts(results) for w in v.witnesses}
+        return {
+            f"{v.claim.id} by {w.engine}": w.outcome for v in verdicts(results) for w in v.witnesses
+        }
 
     rows, now = [["constant", "value", "half of it", "twice of it"]], said()
     for name, multiplied in CHOSEN.items():
         cells = []
         for times in (0.5, 2.0):
             with multiplied(times):
-                changed = {who: outcome for who, outcome in said().items() if outcome is not now[who]}
-            cells.append("; ".join(f"{who}: {outcome}" for who, outcome in changed.items()) or "none")
+                changed = {
+                    who: outcome for who, outcome in said().items() if outcome is not now[who]
+                }
+            cells.append(
+                "; ".join(f"{who}: {outcome}" for who, outcome in changed.items()) or "none"
+            )
         rows.append([name, f"{getattr(witnesses, name, '')}", *cells])
     return rows

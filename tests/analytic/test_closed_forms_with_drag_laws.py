@@ -1,8 +1,9 @@
-"""Stationary solutions, fold and branch are right under every law of drag, by brute force; claims hold their rates.
+"""Stationary solutions, fold and branch are right under every law of drag, by brute force; claims
+hold their rates.
 
-The law and the branch of SS are written out here again: nothing of `analytic.mechanics.drag` or `slipping_branch` is
-used for what is expected. The equations of motion are those of `test_dynamics`.
-"""
+The law and the branch of SS are written out here again: nothing of `analytic.mechanics.drag` or
+`slipping_branch` is used for what is expected. The equations of motion are those of
+`test_dynamics`."""
 
 import numpy as np
 import pytest
@@ -47,8 +48,11 @@ def random_set(law, rng):
 
 
 def scanned(p):
-    """The greatest omega_0 of the branch inside its ends, by ever finer scans, and how many extrema the first saw."""
-    angles = np.concatenate([np.geomspace(1e-9, 0.1, 100), np.linspace(0.1, np.pi / 2 - 0.1, 400)[1:]])
+    """The greatest omega_0 of the branch inside its ends, by ever finer scans, and how many extrema
+    the first saw."""
+    angles = np.concatenate(
+        [np.geomspace(1e-9, 0.1, 100), np.linspace(0.1, np.pi / 2 - 0.1, 400)[1:]]
+    )
     angles = np.concatenate([angles, np.pi / 2 - np.geomspace(1e-9, 0.1, 200)[::-1][1:]])
     flows = flow_at(angles, p)
     rises = np.sign(np.diff(flows))
@@ -62,11 +66,16 @@ def scanned(p):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_fold_against_a_scan(law):
-    """omega_04 to 1e-10, one fold beyond eta_cr and none before; omega_01, omega_02, omega_03 are those of Stokes."""
+    """omega_04 to 1e-10, one fold beyond eta_cr and none before; omega_01, omega_02, omega_03 are
+    those of Stokes."""
     folds, rng = [], np.random.default_rng([12, LAWS.index(law)])
     for p in (random_set(law, rng) for _ in range(12)):
         t, stokes = analytic.thresholds(p), analytic.thresholds(p.replace(drag=STOKES))
-        assert (t.omega_01, t.omega_02, t.omega_03) == (stokes.omega_01, stokes.omega_02, stokes.omega_03)
+        assert (t.omega_01, t.omega_02, t.omega_03) == (
+            stokes.omega_01,
+            stokes.omega_02,
+            stokes.omega_03,
+        )
         assert t.eta_cr == LIGHT[law] * stokes.eta_cr
         top, turns = scanned(p)
         assert number_of_folds(p) == (p.eta > t.eta_cr) == turns == np.isfinite(t.omega_04)
@@ -79,7 +88,8 @@ def test_fold_against_a_scan(law):
 
 @pytest.mark.parametrize("nu_f", [1e-6, 5e-6, 1e-5, 1e-4])
 def test_fold_where_the_drag_bends(nu_f):
-    """With C_D constant beyond Re = 989 the drag grows faster at once: for 1e-6 and 5e-6 the fold is that corner."""
+    """With C_D constant beyond Re = 989 the drag grows faster at once: for 1e-6 and 5e-6 the fold
+    is that corner."""
     p = P.replace(c=0.07, nu_f=nu_f, drag=SCHILLER_NAUMANN)
     top, turns = scanned(p)
     assert number_of_folds(p) == turns == 1
@@ -95,8 +105,8 @@ def test_fold_where_the_drag_bends(nu_f):
 def test_solutions_are_zeros_of_the_equations(law, omega_0, eta):
     """To round-off of the largest acceleration.
 
-    NS sinks, which is its only rate (48): the drag alone balances the weight that the wall doesn't carry.
-    """
+    NS sinks, which is its only rate (48): the drag alone balances the weight that the wall doesn't
+    carry."""
     p = P.replace(drag=law, omega_0=omega_0, eta=eta)
     scale = (p.g + p.R * (omega_0**2 + p.c * omega_0)) / (p.j * p.r)
     for s in analytic.stationary_solutions(p):
@@ -104,7 +114,9 @@ def test_solutions_are_zeros_of_the_equations(law, omega_0, eta):
         off = np.abs(analytic.vector_field(s.case, s.x, p) - sinking).max()
         assert off <= 100 * np.finfo(float).eps * scale, s.case
         if s.case is not Case.RR:
-            np.testing.assert_array_equal([s.force_A, s.force_B], analytic.contact_forces(s.case, s.x, p))
+            np.testing.assert_array_equal(
+                [s.force_A, s.force_B], analytic.contact_forces(s.case, s.x, p)
+            )
         if s.case is Case.NS:
             assert s.moves
             assert s.state.v_y < 0
@@ -116,21 +128,35 @@ def test_solutions_are_zeros_of_the_equations(law, omega_0, eta):
 @pytest.mark.parametrize("law", NOT_STOKES)
 @pytest.mark.parametrize("omega_0", [5.0, 25.0, 40.0])
 def test_where_the_fluid_takes_the_ball_along_a_slight_lag_decides(law, omega_0):
-    """RR, SR, NR: the eigenvalues of Stokes' drag, or those without drag under the quadratic law, said so."""
+    """RR, SR, NR: the eigenvalues of Stokes' drag, or those without drag under the quadratic law,
+    said so."""
     p = P.replace(drag=law, omega_0=omega_0, eta=0.6)
     same = p.replace(drag=STOKES, c=LIGHT[law] * p.c)
     for case in (Case.RR, Case.SR, Case.NR):
         (s,) = (s for s in analytic.stationary_solutions(p) if s.case is case)
-        (stokes,) = (s for s in analytic.stationary_solutions(p.replace(drag=STOKES)) if s.case is case)
+        (stokes,) = (
+            s for s in analytic.stationary_solutions(p.replace(drag=STOKES)) if s.case is case
+        )
         (expected,) = (s for s in analytic.stationary_solutions(same) if s.case is case)
         np.testing.assert_allclose(
-            np.sort_complex(s.eigenvalues), np.sort_complex(expected.eigenvalues), atol=1e-12 * omega_0
+            np.sort_complex(s.eigenvalues),
+            np.sort_complex(expected.eigenvalues),
+            atol=1e-12 * omega_0,
         )
-        assert (s.exists, s.slip_stability, s.family) == (stokes.exists, stokes.slip_stability, stokes.family)
+        assert (s.exists, s.slip_stability, s.family) == (
+            stokes.exists,
+            stokes.slip_stability,
+            stokes.family,
+        )
         exponential = law != QUADRATIC or stokes.stability is not analytic.Stability.ASYMPTOTIC
         assert s.stability is (stokes.stability if exponential else analytic.Stability.ALGEBRAIC)
         assert s.stable == stokes.stable
-        assert s.stability is not analytic.Stability.ALGEBRAIC or analytic.slowest_time_constant(s) == np.inf
-    if omega_0 == 40.0:  # the first mode of SR is that of leaning; the other dies out like a slight lag does
+        assert (
+            s.stability is not analytic.Stability.ALGEBRAIC
+            or analytic.slowest_time_constant(s) == np.inf
+        )
+    if (
+        omega_0 == 40.0
+    ):  # the first mode of SR is that of leaning; the other dies out like a slight lag does
         expected, _ = analytic.leaning_modes(p.replace(drag=STOKES, c=LIGHT[law] * p.c + 1e-12))
         np.testing.assert_allclose(analytic.leaning_modes(p)[0], expected, atol=1e-10)

@@ -1,4 +1,5 @@
-"""Errors of the paper that docs/errata.md lists and no other test shows; what documents point to is there."""
+"""Errors of the paper that docs/errata.md lists and no other test shows; what documents point to is
+there."""
 
 import re
 from pathlib import Path
@@ -13,7 +14,8 @@ P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
 
 
 def test_section_1_1():
-    """In a fluid at rest a ball may spin on the spot away from the wall: nothing moves, and the floor alone presses."""
+    """In a fluid at rest a ball may spin on the spot away from the wall: nothing moves, and the
+    floor alone presses."""
     x = [0.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.02, 0.0]
     still = P.replace(omega_0=0.0)
     np.testing.assert_array_equal(vector_field(Case.RN, x, still), np.zeros(8))
@@ -31,7 +33,9 @@ def test_section_1_3():
 def test_section_5_1():
     """eta_cr mu^2 = c^2 R/(4 g) isn't below 1e-6, and eta_cr may be above eta."""
     steel = Parameters.named("steel-in-water")
-    small = Parameters.from_fluid(nu_f=1.004e-6, rho_f=998.2, rho_b=7850.0, r=2e-3, R=0.025, mu=0.2, eta=0.2)
+    small = Parameters.from_fluid(
+        nu_f=1.004e-6, rho_f=998.2, rho_b=7850.0, r=2e-3, R=0.025, mu=0.2, eta=0.2
+    )
     plastic = Parameters.named("plastic-in-oil")
     values = [thresholds(p).eta_cr * p.mu**2 for p in (steel, small, plastic)]
     assert values == pytest.approx([3.9e-7, 1.5e-5, 2.0e-2], rel=0.03)
@@ -39,11 +43,14 @@ def test_section_5_1():
 
 
 def test_equation_40():
-    """Where cos alpha < 0 the spin can't be steady about both the radius and the tangent: (45), rows 4 and 5."""
+    """Where cos alpha < 0 the spin can't be steady about both the radius and the tangent: (45),
+    rows 4 and 5."""
     for omega_c in np.geomspace(0.5, 60.0, 15):
         for alpha in np.linspace(0.5 * np.pi, 1.5 * np.pi, 99)[1:-1]:
             unit = [0.0, 0.0, omega_c, np.sin(alpha), 0.0, np.cos(alpha), 0.0, 0.0]
-            F_A, F_B = contact_forces(Case.SS, unit, P)  # they depend on the directions of slip alone
+            F_A, F_B = contact_forces(
+                Case.SS, unit, P
+            )  # they depend on the directions of slip alone
             slip_z = -F_A[2] / (P.j * P.m * P.r * omega_c)
             size = slip_z / np.cos(alpha)
             if F_A[1] >= 0 and F_B[0] >= 0 and size > 0:

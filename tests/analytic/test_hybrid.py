@@ -1,4 +1,5 @@
-"""Simulations have the rates of vector fields and the motions and events of closed forms, event-driven ones to 1e-9."""
+"""Simulations have the rates of vector fields and the motions and events of closed forms,
+event-driven ones to 1e-9."""
 
 import itertools
 import math
@@ -21,7 +22,9 @@ RTOL = 1e-9
 
 def changes(run):
     """(before, after) of every event."""
-    return [(Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True)]
+    return [
+        (Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True)
+    ]
 
 
 STEP, RAMP = 1e-6, Flow.ramp(17.0, 20.0, 1.0)
@@ -29,7 +32,9 @@ STEP, RAMP = 1e-6, Flow.ramp(17.0, 20.0, 1.0)
 
 def start(case, rng):
     """A random state of the case."""
-    values = dict(zip(VARIABLES, rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3], strict=True))
+    values = dict(
+        zip(VARIABLES, rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3], strict=True)
+    )
     values |= {"y": abs(values["y"]), "h": P.R * rng.uniform(0.1, 0.9)}
     x = np.array([values[name] if name in TRAITS[case].active else 0.0 for name in VARIABLES])
     return x + (case is Case.RN) * np.eye(8)[5] * -x[7] / P.r
@@ -47,26 +52,33 @@ def lasting(case, p):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", list(Case))
 def test_rates_are_those_of_the_vector_field(case, law):
-    """Differences err by round-off/STEP, and by STEP^2 times third derivatives; angles turn at some 1e3 rad/s."""
+    """Differences err by round-off/STEP, and by STEP^2 times third derivatives; angles turn at some
+    1e3 rad/s."""
     p = P.replace(omega_0=17.0, mu=0.3, eta=0.45, nu_f=1e-4, drag=law)
     runs = list(itertools.islice(lasting(case, p), 10))
     assert len(runs) >= 5
     for run in runs:
-        slope, expected = (run.x[2] - run.x[0]) / (2 * STEP), vector_field(case, run.x[1], p, RAMP(STEP))
+        slope, expected = (
+            (run.x[2] - run.x[0]) / (2 * STEP),
+            vector_field(case, run.x[1], p, RAMP(STEP)),
+        )
         np.testing.assert_allclose(slope, expected, rtol=1e-6, atol=1e-6 * np.max(np.abs(expected)))
         assert (run.theta[2] - run.theta[0]) / (2 * STEP) == pytest.approx(run.omega_c[1], abs=1e-6)
         assert run.header.settings["energy_residual"] < 1e-11 * run.header.settings["energy_scale"]
 
 
 def test_bounces_come_to_rest():
-    """Bounces on the spot without drag: t_k = t_0 (1 + 2 e + … + 2 e^k), and rest at t_0 (1+e)/(1-e)."""
+    """Bounces on the spot without drag: t_k = t_0 (1 + 2 e + … + 2 e^k), and rest at t_0
+    (1+e)/(1-e)."""
     p, y, e = P.replace(c=0.0, omega_0=0.0), 0.04, 0.6
     run = simulate(p, [y, 0, 0, 0, 0, 0, 0.02, 0], 1.0, restitution=e, sample_interval=0.1)
     t_0, m_v = math.sqrt(2 * y / p.g), p.m * math.sqrt(2 * p.g * y)
     count = len(run.events)
     expected = t_0 * (1 + 2 * np.cumsum(np.append(0.0, e ** np.arange(1, count))))
     np.testing.assert_allclose(run.events.time, expected, rtol=RTOL)
-    np.testing.assert_allclose(run.events.impulse_A[:, 1], m_v * (1 + e) * e ** np.arange(count), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(
+        run.events.impulse_A[:, 1], m_v * (1 + e) * e ** np.arange(count), rtol=1e-6, atol=1e-12
+    )
     assert run.events.time[-1] == pytest.approx(t_0 * (1 + e) / (1 - e), rel=RTOL)
     assert changes(run)[-1] == (Case.NN, Case.RN)
 
@@ -77,12 +89,16 @@ def test_rolling_ends_where_no_forces_are_left():
     end = simulate(p, [0, 0, 9.0, 0, 0, 0], 1.0).events.time[0]
     run = simulate(p, [0, 0, 9.0, 0, 0, 0], end + 2e-3, sample_interval=end / 2 + 1e-3)
     assert changes(run) == [(Case.RR, Case.SS)]
-    assert rolling_forces.margin(25 - 16 * math.exp(-p.c * end / (1 + 2 * p.j)), p) == pytest.approx(0.0, abs=RTOL)
+    assert rolling_forces.margin(
+        25 - 16 * math.exp(-p.c * end / (1 + 2 * p.j)), p
+    ) == pytest.approx(0.0, abs=RTOL)
     sooner = simulate(p, [0, 0, 9.0, 0, 0, 0], end + 1e-3).slip_z[-1]
     assert run.slip_z[-1] / sooner == pytest.approx(4.0, rel=0.05)
 
 
-@pytest.mark.parametrize(("method", "error"), [("event", 1e-9), ("time-stepping", 4e-6)])  # the square of its step
+@pytest.mark.parametrize(
+    ("method", "error"), [("event", 1e-9), ("time-stepping", 4e-6)]
+)  # the square of its step
 @pytest.mark.parametrize(
     "flow",
     [
@@ -95,7 +111,9 @@ def test_rolling_ends_where_no_forces_are_left():
 )
 def test_rolling_follows_any_flow(flow, method, error):
     """By its linear equation (23)."""
-    run = simulate(P, [0, 0, 8.0, 0, 0, 0], 3.0, flow, method=method, timestep=2e-3, sample_interval=0.05)
+    run = simulate(
+        P, [0, 0, 8.0, 0, 0, 0], 3.0, flow, method=method, timestep=2e-3, sample_interval=0.05
+    )
     given = (lambda t, w: -P.c * (w - flow(t)) / (1 + 2 * P.j)), (0, 3), [8.0]
     expected = solve_ivp(*given, rtol=1e-11, atol=1e-12, max_step=0.01, t_eval=run.time)
     np.testing.assert_allclose(run.omega_c, expected.y[0], rtol=error)
@@ -103,7 +121,8 @@ def test_rolling_follows_any_flow(flow, method, error):
 
 
 def test_near_the_axis_is_an_ordinary_place():
-    """A flight that passes 1e-7 m from the axis is a straight line (no drag), though omega_c is huge there."""
+    """A flight that passes 1e-7 m from the axis is a straight line (no drag), though omega_c is
+    huge there."""
     p, miss, v, rho = P.replace(c=0.0), 1e-7, 0.2, 0.02
     radial, along = v * math.sqrt(1 - (miss / rho) ** 2), v * miss / rho
     x0 = [0.03, 0, along / rho, 0, 0, 0, p.R - rho, radial]
@@ -120,21 +139,51 @@ ROUGH = DRAGGED.replace(eta=0.6)
     ("p", "x", "flow", "before", "after", "left"),
     [
         (DRAGGED, [0, 0, 6.4, 20, 30, -150], Flow.steady(0.0), Case.SS, Case.SN, "B_x"),
-        (DRAGGED, [0, 0, 0, 0, 3.0, 0, 0.03, 0], Flow.ramp(0, 100, 0.05), Case.RN, Case.SN, "friction of the floor"),
-        (ROUGH, [0.1, 0, 30, -100, 0, 0], Flow.ramp(30, -60, 0.2), Case.NR, Case.NS, "friction of the wall"),
-        (ROUGH.replace(mu=0.05), [0, 0, 22, -40, 0, 0], Flow.ramp(22, 60, 0.1), Case.SR, Case.NR, "A_y"),
+        (
+            DRAGGED,
+            [0, 0, 0, 0, 3.0, 0, 0.03, 0],
+            Flow.ramp(0, 100, 0.05),
+            Case.RN,
+            Case.SN,
+            "friction of the floor",
+        ),
+        (
+            ROUGH,
+            [0.1, 0, 30, -100, 0, 0],
+            Flow.ramp(30, -60, 0.2),
+            Case.NR,
+            Case.NS,
+            "friction of the wall",
+        ),
+        (
+            ROUGH.replace(mu=0.05),
+            [0, 0, 22, -40, 0, 0],
+            Flow.ramp(22, 60, 0.1),
+            Case.SR,
+            Case.NR,
+            "A_y",
+        ),
     ],
 )
 def test_a_case_ends_where_its_forces_do(p, x, flow, before, after, left):
-    """Against the clock, too: a normal force that vanishes, or friction that is full, by `contact_forces`."""
+    """Against the clock, too: a normal force that vanishes, or friction that is full, by
+    `contact_forces`."""
     run = simulate(p, x, 0.3, flow, sample_interval=0.3)
     assert changes(run)[0] == (before, after)
     end = run.events.time[0]
     last = simulate(p, x, end, flow, sample_interval=end).x[-1]
-    kept = [name in VARIABLES[:3] or name in TRAITS[before].active or before is Case.RN for name in VARIABLES]
+    kept = [
+        name in VARIABLES[:3] or name in TRAITS[before].active or before is Case.RN
+        for name in VARIABLES
+    ]
     (A_x, A_y, A_z), (B_x, B_y, B_z) = contact_forces(before, last * kept, p, flow(end))
     of_floor, of_wall = p.mu * A_y - math.hypot(A_x, A_z), p.eta * B_x - math.hypot(B_y, B_z)
-    loads = {"A_y": A_y, "B_x": B_x, "friction of the floor": of_floor, "friction of the wall": of_wall}
+    loads = {
+        "A_y": A_y,
+        "B_x": B_x,
+        "friction of the floor": of_floor,
+        "friction of the wall": of_wall,
+    }
     assert loads[left] == pytest.approx(0.0, abs=1e-7 * p.m * p.g)
 
 

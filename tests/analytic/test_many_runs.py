@@ -54,12 +54,16 @@ def landings(run):
 
 
 @pytest.mark.parametrize(
-    ("start", "restitution", "tolerance"), [*((start, 0.0, 1e-6) for start in STARTS), ("flies", 0.5, 1e-5)]
+    ("start", "restitution", "tolerance"),
+    [*((start, 0.0, 1e-6) for start in STARTS), ("flies", 0.5, 1e-5)],
 )
 def test_event_driven_runs_agree(start, restitution, tolerance, monkeypatch):
     """To what errors of 1e-9 in each grow to: chains of landings magnify them."""
     x0, (balls, flows) = STARTS[start], (BALLS[:1], FLOWS[:1]) if restitution else (BALLS, FLOWS)
-    given = {"settings": Settings(restitution=restitution, initial_impact=True), "sample_interval": 0.1}
+    given = {
+        "settings": Settings(restitution=restitution, initial_impact=True),
+        "sample_interval": 0.1,
+    }
     alone = [simulate(p, x0, 1.5, flow, **given) for p, flow in zip(balls, flows, strict=True)]
     many = simulate_many(balls, x0, 1.5, flows, threads=2, **given)
     assert np.all(many.end == 1.5)
@@ -77,7 +81,8 @@ def test_time_stepping_agrees(monkeypatch):
     """To round-off, for one step serves both; at the ends of the flow's pieces a step ends, too."""
     settings, x0s = Settings(method="time-stepping", timestep=1e-3), np.array([*STARTS.values()])
     alone = [
-        simulate(p, x, 0.75, flow, settings, sample_interval=0.25) for p, x, flow in zip(BALLS, x0s, FLOWS, strict=True)
+        simulate(p, x, 0.75, flow, settings, sample_interval=0.25)
+        for p, x, flow in zip(BALLS, x0s, FLOWS, strict=True)
     ]
     many = simulate_many(BALLS, x0s, 0.75, FLOWS, settings, sample_interval=0.25, threads=2)
     for run, x, case in zip(alone, many.x, many.case, strict=True):

@@ -1,4 +1,5 @@
-"""Periodic motions close, are as stable as their multipliers say, and motions from many starts come to what they do."""
+"""Periodic motions close, are as stable as their multipliers say, and motions from many starts come
+to what they do."""
 
 from types import SimpleNamespace
 
@@ -35,10 +36,13 @@ def swing():
 
 
 def test_newton_closes_the_orbit(hop, swing):
-    """After five periods of a simulation with another tolerance and other samples the ball is where it was."""
+    """After five periods of a simulation with another tolerance and other samples the ball is where
+    it was."""
     for orbit in (hop, swing):
         assert orbit.steps <= 8
-        run = simulate(orbit.p, orbit.loop.x, 5 * orbit.period, sample_interval=orbit.period, rtol=1e-11)
+        run = simulate(
+            orbit.p, orbit.loop.x, 5 * orbit.period, sample_interval=orbit.period, rtol=1e-11
+        )
         away = np.abs(run.x - orbit.loop.x) / state_units(orbit.p)
         # Each period adds about the defect and the tolerance, of which every disturbance dies out.
         assert away.max() < 5 * (orbits.CLOSED + 1e-9)
@@ -46,7 +50,8 @@ def test_newton_closes_the_orbit(hop, swing):
 
 
 def test_multipliers_are_how_disturbances_change(hop, swing):
-    """Of the derivative M of the return map: two returns later a disturbance is M^2 of it, within 1 %."""
+    """Of the derivative M of the return map: two returns later a disturbance is M^2 of it, within 1
+    %."""
     for orbit in (hop, swing):
         push = 1e-4 * orbit.loop.extent * np.ones(len(orbit.loop.free))
         loop = orbit.loop.moved(push)
@@ -56,7 +61,9 @@ def test_multipliers_are_how_disturbances_change(hop, swing):
         left = np.linalg.matrix_power(orbit.derivative, 2) @ push
         away = orbit.loop.coordinates(back.x - orbit.loop.x)
         assert np.abs(away - left).max() < 0.01 * np.abs(left).max()
-        np.testing.assert_allclose(np.poly(orbit.multipliers), np.poly(orbit.derivative), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            np.poly(orbit.multipliers), np.poly(orbit.derivative), rtol=1e-9, atol=1e-12
+        )
 
 
 def test_a_branch_ends_at_the_range(hop):
@@ -70,7 +77,8 @@ def test_a_branch_ends_at_the_range(hop):
 
 @pytest.mark.slow
 def test_hops_that_rebound_end_in_a_torus(hop):
-    """Followed in the coefficient of restitution, from where the orbit can be found from that without."""
+    """Followed in the coefficient of restitution, from where the orbit can be found from that
+    without."""
     x, period = hop.loop.x, hop.period
     for restitution in (0.2, 0.3, 0.4, 0.5, 0.53):
         orbit = orbits.refine(HOPPING, x, period, restitution)
@@ -86,19 +94,23 @@ def test_hops_that_rebound_end_in_a_torus(hop):
     ("eta", "faster", "hops"), [(0.0905, 4e-4, True), (0.0905, 1e-3, False), (0.0915, 1e-4, False)]
 )
 def test_no_torus_attracts_beyond_the_torus_bifurcation(hop, eta, faster, hops):
-    """It is subcritical: ever smaller disturbances end the hops before it, and beyond it any does."""
+    """It is subcritical: ever smaller disturbances end the hops before it, and beyond it any
+    does."""
     orbit = orbit_branch.follow(hop, "eta", 0.0725, eta).orbits[-1]
     assert orbit.p.eta == pytest.approx(eta)
     assert orbit.stable is (eta < 0.0913)
     x = State.of(orbit.loop.x)
-    run = simulate(orbit.p, x._replace(omega_c=x.omega_c * (1 + faster)).stacked(), 300.0, sample_interval=1.0)
+    run = simulate(
+        orbit.p, x._replace(omega_c=x.omega_c * (1 + faster)).stacked(), 300.0, sample_interval=1.0
+    )
     assert bool((run.events.time > 290.0).any()) is hops
     if not hops:
         assert run.cases[-1] is Case.NR
 
 
 def test_no_orbit_and_bad_input(hop):
-    """Rolling for ever has no period; a guess far from all orbits doesn't converge; ranges must make sense."""
+    """Rolling for ever has no period; a guess far from all orbits doesn't converge; ranges must
+    make sense."""
     with pytest.raises(NoOrbitError, match="rolls at both points"):
         orbits.refine(Parameters.named("reference"), (0, 0, 12, 0, 0, 0), 0.2)
     with pytest.raises(NoOrbitError):
@@ -144,26 +156,39 @@ def test_lyapunov_exponent_of_a_known_growth():
 
     def run(p, x0s, duration, interval):
         whole, growth = SimpleNamespace(failure=""), np.exp(0.3 * duration)
-        return [SimpleNamespace(x=np.array([x, x * growth]), case=[Case.NN], header=whole) for x in x0s]
+        return [
+            SimpleNamespace(x=np.array([x, x * growth]), case=[Case.NN], header=whole) for x in x0s
+        ]
 
-    assert fates.lyapunov(HOPPING, np.zeros(8), Case.NN, 20.0, 0.5, run) == pytest.approx((0.3, 0.0), abs=1e-6)
+    assert fates.lyapunov(HOPPING, np.zeros(8), Case.NN, 20.0, 0.5, run) == pytest.approx(
+        (0.3, 0.0), abs=1e-6
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "kind"), [(0.1, Kind.QUASI_PERIODIC), (0.4, Kind.CHAOTIC)])
 def test_recurrent_motions_that_do_not_close(exponent, kind, monkeypatch):
-    """omega_c and the slips go round at two rates whose ratio is the golden one: neighbours decide, in three errors."""
+    """omega_c and the slips go round at two rates whose ratio is the golden one: neighbours decide,
+    in three errors."""
     monkeypatch.setattr(fates, "lyapunov", lambda *motion, run: (exponent, 0.1))
-    size, rates = state_units(HOPPING)[2:6], np.array([3.0, 1.5 * (1 + 5**0.5)]) / (HOPPING.R / HOPPING.g) ** 0.5
+    size, rates = (
+        state_units(HOPPING)[2:6],
+        np.array([3.0, 1.5 * (1 + 5**0.5)]) / (HOPPING.R / HOPPING.g) ** 0.5,
+    )
 
     def run(p, x0s, duration, interval):
         time = np.arange(round(duration / interval) + 1) * interval
         begun = (x0s[:, 2:6] / size).view(complex)
         turned = (begun[:, None] * np.exp(1j * time[:, None] * rates)).view(float) * size
         names = "omega_c", "slip_x", "slip_y", "slip_z"
-        return [motion(p, time, case=Case.SS, **dict(zip(names, each.T, strict=True))) for each in turned]
+        return [
+            motion(p, time, case=Case.SS, **dict(zip(names, each.T, strict=True)))
+            for each in turned
+        ]
 
     start = np.append([0.0, 0.0], [0.5, 0.0, 2.0, 0.0] * size)
-    (only,) = attractors(HOPPING, start, lasting=3 * fates.WINDOW * (HOPPING.R / HOPPING.g) ** 0.5, run=run)
+    (only,) = attractors(
+        HOPPING, start, lasting=3 * fates.WINDOW * (HOPPING.R / HOPPING.g) ** 0.5, run=run
+    )
     assert only.fate.kind is kind
     assert only.fate.exponent == exponent

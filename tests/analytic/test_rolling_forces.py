@@ -1,4 +1,5 @@
-"""No force of the family of RR does better than the one that is said to, by brute force over its parameter."""
+"""No force of the family of RR does better than the one that is said to, by brute force over its
+parameter."""
 
 import numpy as np
 import pytest
@@ -9,7 +10,16 @@ from analytic.mechanics.dynamics import rolling_family
 from model import Case, Parameters
 
 P = Parameters.named("reference")
-FRICTION = [(0.2, 0.2), (0.2, 0.6), (0.6, 0.2), (0.4, 0.4), (1.5, 0.3), (0.3, 1.5), (1.0, 1.0), (2.0, 2.0)]
+FRICTION = [
+    (0.2, 0.2),
+    (0.2, 0.6),
+    (0.6, 0.2),
+    (0.4, 0.4),
+    (1.5, 0.3),
+    (0.3, 1.5),
+    (1.0, 1.0),
+    (2.0, 2.0),
+]
 RNG = np.random.default_rng(7)
 OMEGA_C = RNG.uniform(-40, 40, 300)
 OMEGA_0 = OMEGA_C + RNG.normal(0, 60, 300)
@@ -26,7 +36,8 @@ def utilisation(omega_c, p, omega_0, B_y):
 
 @pytest.mark.parametrize(("mu", "eta"), FRICTION)
 def test_least_utilisation_interval_and_margin_agree(mu, eta):
-    """No B_y of a dense scan does better, the member itself attains what is claimed, and the ends of the interval 1."""
+    """No B_y of a dense scan does better, the member itself attains what is claimed, and the ends
+    of the interval 1."""
     p = P.replace(mu=mu, eta=eta)
     best = rolling_forces.least_utilisation(OMEGA_C, p, OMEGA_0)
     scan = p.m * p.g * (1 - np.geomspace(1e-4, 1e4, 4000))
@@ -37,11 +48,15 @@ def test_least_utilisation_interval_and_margin_agree(mu, eta):
     attained = utilisation(OMEGA_C, p, OMEGA_0, best.B_y)[finite]
     # The root of the crossing is known to round-off of q, which the steepest utilisation amplifies.
     reached = np.isclose(attained, best.utilisation[finite], rtol=1e-10, atol=0)
-    assert np.all(reached | (attained <= 1 + 1e-9) & (min(mu, eta) > 1)), "it is only approached where the ball can jam"
+    assert np.all(reached | (attained <= 1 + 1e-9) & (min(mu, eta) > 1)), (
+        "it is only approached where the ball can jam"
+    )
     least, greatest = rolling_forces.admissible_interval(OMEGA_C, p, OMEGA_0)
     holds = np.isfinite(greatest)
     assert holds.any()
-    assert holds.all() == (min(mu, eta) > 1), "only between two contacts rougher than 1 is there always a force"
+    assert holds.all() == (min(mu, eta) > 1), (
+        "only between two contacts rougher than 1 is there always a force"
+    )
     np.testing.assert_array_equal(rolling_forces.margin(OMEGA_C, p, OMEGA_0) >= 0, holds)
     np.testing.assert_array_equal((best.utilisation <= 1)[finite], holds[finite])
     for ends in (least, greatest):
@@ -51,7 +66,8 @@ def test_least_utilisation_interval_and_margin_agree(mu, eta):
 
 @pytest.mark.parametrize(("mu", "eta"), [(1.5, 0.3), (1.2, 0.1), (3.0, 0.5)])
 def test_stationary_rolling_jams_for_mu_over_1(mu, eta):
-    """omega_0^2 <= (g/R) mu(1 - eta)/(j + eta - mu eta(1 + j)) if that is positive, without end if not."""
+    """omega_0^2 <= (g/R) mu(1 - eta)/(j + eta - mu eta(1 + j)) if that is positive, without end if
+    not."""
     p = P.replace(mu=mu, eta=eta)
     divisor = p.j + eta - mu * eta * (1 + p.j)
     if divisor > 0:
@@ -81,4 +97,6 @@ def test_at_rest_and_without_friction():
 def test_public_forces_are_the_member_of_least_utilisation_where_there_is_one():
     x = np.array([[0, 0, omega_c, 0, 0, 0] for omega_c in (5.0, 12.0)])
     _, F_B = contact_forces(Case.RR, x, P, x[:, 2])
-    np.testing.assert_array_equal(F_B[:, 1], rolling_forces.least_utilisation(x[:, 2], P, x[:, 2]).B_y)
+    np.testing.assert_array_equal(
+        F_B[:, 1], rolling_forces.least_utilisation(x[:, 2], P, x[:, 2]).B_y
+    )

@@ -1,4 +1,5 @@
-"""Both simulators keep the laws at every sample, reflect, refuse what is wrong, and keep what a stopped run has."""
+"""Both simulators keep the laws at every sample, reflect, refuse what is wrong, and keep what a
+stopped run has."""
 
 import itertools
 import json
@@ -24,7 +25,8 @@ RUNS = int(os.environ.get("DUALBALL_RANDOM_RUNS", "10000"))
 
 
 def assert_lawful(run):
-    """Coulomb's inequality, signs of normal forces, gaps, energy: each up to `TOLERANCE` of the natural unit."""
+    """Coulomb's inequality, signs of normal forces, gaps, energy: each up to `TOLERANCE` of the
+    natural unit."""
     p = run.header.parameters
     weight = p.m * p.g * (1 + np.abs(p.R * run.omega_c**2 / p.g))
     (A_x, A_y, A_z), (B_x, B_y, B_z) = run.force_A.T / weight, run.force_B.T / weight
@@ -33,7 +35,10 @@ def assert_lawful(run):
     assert np.all(np.hypot(A_x, A_z) <= p.mu * A_y + TOLERANCE)
     assert np.all(np.hypot(B_y, B_z) <= p.eta * B_x + TOLERANCE)
     assert np.all(np.minimum(run.gap_A, run.gap_B) >= -TOLERANCE * p.R)
-    at_A, at_B = ("A", run.gap_A, run.slip_speed_A, run.force_A), ("B", run.gap_B, run.slip_speed_B, run.force_B)
+    at_A, at_B = (
+        ("A", run.gap_A, run.slip_speed_A, run.force_A),
+        ("B", run.gap_B, run.slip_speed_B, run.force_B),
+    )
     for contact, gap, slip, force in (at_A, at_B):
         state = np.array([getattr(case, contact) for case in run.cases])
         assert np.all(gap[state != Contact.N] == 0)
@@ -41,11 +46,14 @@ def assert_lawful(run):
         rolls = state == Contact.R
         assert np.all(slip[rolls] <= 1e-12 * math.sqrt(p.g * p.R) * (1 + weight[rolls]))
     # Motions much slower than sqrt(g R) are integrated to the absolute tolerance.
-    assert run.header.settings["energy_residual"] <= TOLERANCE * (run.header.settings["energy_scale"] + p.m * p.g * p.R)
+    assert run.header.settings["energy_residual"] <= TOLERANCE * (
+        run.header.settings["energy_scale"] + p.m * p.g * p.R
+    )
 
 
 def fault(seed, t_end=5.0):
-    """What is wrong with a run of the robustness test; empty if nothing is. Some move into what they touch at first."""
+    """What is wrong with a run of the robustness test; empty if nothing is. Some move into what
+    they touch at first."""
     p, x = random_start(seed)
     touching = x._replace(y=x.y * (seed % 5 > 0), h=x.h * (seed % 7 > 0))
     try:
@@ -71,9 +79,8 @@ def test_ten_thousand_random_runs():
 
 @pytest.mark.parametrize("seed", [*range(30, 40), 1736, 2340, 6867])
 def test_long_random_runs_end(seed):
-    """Over 60/c: a hop has some five changes of case. The last three come to rest: no solver crawls through round-off,
-    and no ball hops by it.
-    """
+    """Over 60/c: a hop has some five changes of case. The last three come to rest: no solver crawls
+    through round-off, and no ball hops by it."""
     p, x0 = random_start(seed)
     run = simulate(p, x0, 60 / p.c, sample_interval=1 / p.c)
     assert run.header.settings["energy_residual"] <= 1e-6 * run.header.settings["energy_scale"]
@@ -85,7 +92,11 @@ def test_laws_hold_where_parameters_vanish(zeros):
     """From states at both contacts, with any of mu, eta, c, omega_0 and the slips zero."""
     mu, eta, c, omega_0, slips = zeros * np.array([0.7, 0.4, 3.0, -22.0, 30.0])
     p = P.replace(mu=mu, eta=eta, omega_0=omega_0, c=c)
-    assert_lawful(simulate(p, [0, 0, 11.0, slips, -2 * slips, slips], 0.1, restitution=0.5, sample_interval=2e-3))
+    assert_lawful(
+        simulate(
+            p, [0, 0, 11.0, slips, -2 * slips, slips], 0.1, restitution=0.5, sample_interval=2e-3
+        )
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -94,7 +105,9 @@ def test_trajectory_describes_itself(method):
     chosen = {"method": method, "timestep": 1e-3, "rtol": 1e-7, "restitution": 0.3}
     run = simulate(P, x0, 0.3, settings=Settings(**chosen), sample_interval=0.04, theta_0=2.0)
     assert run.header.engine == method
-    np.testing.assert_allclose(run.time, [0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24, 0.28, 0.3], rtol=1e-14)
+    np.testing.assert_allclose(
+        run.time, [0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24, 0.28, 0.3], rtol=1e-14
+    )
     np.testing.assert_allclose(run.x[0], x0, rtol=1e-13)
     assert run.theta[0] == pytest.approx(2.0, rel=1e-14)
     shown = json.loads(json.dumps(dict(run.header.settings)))
@@ -105,25 +118,35 @@ def test_trajectory_describes_itself(method):
     np.testing.assert_array_equal(by_names.x, run.x)
 
 
-@pytest.mark.parametrize(("method", "torque"), [("event", 0.0), ("time-stepping", 0.0), ("time-stepping", 3.0)])
+@pytest.mark.parametrize(
+    ("method", "torque"), [("event", 0.0), ("time-stepping", 0.0), ("time-stepping", 3.0)]
+)
 @pytest.mark.parametrize("x", [[0, 0, 9, 0, 0, 0, 0, 0], [0.01, 0, 20, -30, 10, 20, 0.002, -0.1]])
 def test_the_mirrored_motion(method, torque, x):
-    """Onsets of slip, landings and the fluid's torque: reflection turns omega_c, slip_x, slip_y and omega_0."""
+    """Onsets of slip, landings and the fluid's torque: reflection turns omega_c, slip_x, slip_y and
+    omega_0."""
     p, flip = P.replace(fluid_torque=torque), np.array([1, 1, -1, -1, -1, 1, 1, 1])
     there, back = (
-        simulate(p.replace(omega_0=flow), start, 2.0, method=method, sample_interval=0.1, timestep=1e-3)
+        simulate(
+            p.replace(omega_0=flow), start, 2.0, method=method, sample_interval=0.1, timestep=1e-3
+        )
         for flow, start in ((25.0, x), (-25.0, flip * x))
     )
     assert len(there.events)
     np.testing.assert_array_equal(back.events.to_case, there.events.to_case)
-    np.testing.assert_allclose(back.x, flip * there.x, rtol=0, atol=1e-7 * np.abs(there.x).max(axis=0).max())
+    np.testing.assert_allclose(
+        back.x, flip * there.x, rtol=0, atol=1e-7 * np.abs(there.x).max(axis=0).max()
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_steps_of_a_long_stretch_tell_progress_which_may_end_the_run(method, monkeypatch):
     """Without a change of case or a sample in between; the run has its samples so far."""
     for between_two_reports in ("hybrid.STRIDES", "hybrid.STEPS", "time_stepping.AT_ONCE"):
-        monkeypatch.setattr(f"analytic.simulation.{between_two_reports}", 10 if "AT_ONCE" in between_two_reports else 3)
+        monkeypatch.setattr(
+            f"analytic.simulation.{between_two_reports}",
+            10 if "AT_ONCE" in between_two_reports else 3,
+        )
     p, x0, seen = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10], []
 
     def enough(done):
@@ -157,13 +180,19 @@ def test_a_speed_into_a_closed_contact(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_ball_locked_in_the_corner_does_not_rebound(method):
-    """Where mu, eta > 1 a fall into the corner has no impulses that meet restitution at both contacts."""
-    p, given = P.replace(mu=1.3, eta=1.3), {"restitution": 0.5, "initial_impact": True, "timestep": 1e-3}
+    """Where mu, eta > 1 a fall into the corner has no impulses that meet restitution at both
+    contacts."""
+    p, given = (
+        P.replace(mu=1.3, eta=1.3),
+        {"restitution": 0.5, "initial_impact": True, "timestep": 1e-3},
+    )
     run = simulate(p, [0, -0.4, 0, 0, 0, 40, 0, -0.4], 0.05, method=method, **given)
     assert np.all(run.x[1:, [0, 1, 6, 7]] == 0)
 
 
-@pytest.mark.parametrize(("flow", "says"), [(None, "1/omega_0 = 1e-09 s"), (Flow.sine(5, 1, 1e9), "1/(2 pi f) = ")])
+@pytest.mark.parametrize(
+    ("flow", "says"), [(None, "1/omega_0 = 1e-09 s"), (Flow.sine(5, 1, 1e9), "1/(2 pi f) = ")]
+)
 def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
     """It would take hours; the first moments of it don't."""
     p = P.replace(omega_0=1e9)
@@ -177,26 +206,43 @@ def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
 
 
 def test_the_end_is_always_a_sample():
-    """Also where a stretch that ends there begins at a time from which the end can't be reached to the last digit."""
+    """Also where a stretch that ends there begins at a time from which the end can't be reached to
+    the last digit."""
     p, frequency = P.replace(omega_0=11.5), 6.550213947459355
     flow = Flow.sine(11.5, 8.0 * (1 + 2 * frequency), frequency)
-    run = simulate(p, [0, 0, 11.8, 0, 0, 0], 1 / frequency, flow, rtol=1e-6, sample_interval=1 / frequency)
+    run = simulate(
+        p, [0, 0, 11.8, 0, 0, 0], 1 / frequency, flow, rtol=1e-6, sample_interval=1 / frequency
+    )
     assert run.time.tolist() == [0.0, 1 / frequency]
 
 
 @pytest.mark.parametrize(
     ("omega_c", "given"),
     [
-        ((-3.9, -3.4), {"r": 0.024, "j": 0.653, "mu": 0.5, "eta": 0.349, "c": 0.42, "omega_0": 59.6}),
-        ((5.0, 20.0), {"r": 0.00224, "j": 0.515, "mu": 0.208, "eta": 1.028, "c": 3.59, "omega_0": 41.0}),
+        (
+            (-3.9, -3.4),
+            {"r": 0.024, "j": 0.653, "mu": 0.5, "eta": 0.349, "c": 0.42, "omega_0": 59.6},
+        ),
+        (
+            (5.0, 20.0),
+            {"r": 0.00224, "j": 0.515, "mu": 0.208, "eta": 1.028, "c": 3.59, "omega_0": 41.0},
+        ),
     ],
 )
 def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, given):
-    """Where rolling ends two solutions of Coulomb's law meet: a bisection comes as near to that as numbers go."""
+    """Where rolling ends two solutions of Coulomb's law meet: a bisection comes as near to that as
+    numbers go."""
     p, dt, (rolls, slips) = P.replace(**given), 1e-3, omega_c
     while abs(rolls - slips) > 4e-16 * abs(slips):
         middle = (rolls + slips) / 2
-        rolling = State(omega_c=middle), 0.0, p, Flow.steady(p.omega_0), Settings(), np.array([0.0, dt])
+        rolling = (
+            State(omega_c=middle),
+            0.0,
+            p,
+            Flow.steady(p.omega_0),
+            Settings(),
+            np.array([0.0, dt]),
+        )
         ball, _, constants = prepared(*rolling)
         after = step(ball, dt, p.omega_0, constants)
         assert after.residual == 0
@@ -206,17 +252,22 @@ def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, given):
 def test_settles_on_random_sets():
     """Every step of 200 runs converges."""
     sets, x0s = zip(*map(random_start, range(200)), strict=True)
-    many = simulate_many(sets, x0s, 0.5, settings=Settings(method="time-stepping"), sample_interval=0.5)
+    many = simulate_many(
+        sets, x0s, 0.5, settings=Settings(method="time-stepping"), sample_interval=0.5
+    )
     assert many.failure == ("",) * 200
 
 
 def test_no_convergence_keeps_the_samples():
     """A ball that falls through a still fluid gets too fast for quadratic drag, b |w|^2 per mass.
 
-    The iteration over smooth forces contracts by dt/2 times the slope of the drag, 2 b |w|, which has to be less than
-    one; where drag carries the weight, it is sqrt(b g) dt.
-    """
-    b, dt, p = 10 / P.R, 0.4 * math.sqrt(P.R / P.g), P.replace(drag="quadratic", nu_f=1e-6, omega_0=0.0)
+    The iteration over smooth forces contracts by dt/2 times the slope of the drag, 2 b |w|, which
+    has to be less than one; where drag carries the weight, it is sqrt(b g) dt."""
+    b, dt, p = (
+        10 / P.R,
+        0.4 * math.sqrt(P.R / P.g),
+        P.replace(drag="quadratic", nu_f=1e-6, omega_0=0.0),
+    )
     p = p.replace(c=24 * b * p.nu_f / (2 * p.r * p.C_D))
     assert math.sqrt(b * p.g) * dt > 1.2
     x0, settings = State(y=1.0, h=P.R / 2), Settings(method="time-stepping", timestep=dt)

@@ -1,4 +1,5 @@
-"""Slip dies out by its energy where forces admit rolling, though the claim after (80) fails; claims measure gamma."""
+"""Slip dies out by its energy where forces admit rolling, though the claim after (80) fails; claims
+measure gamma."""
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ RR_SS = Case.RR, Case.SS
 
 
 def directions():
-    """Slips (n, 3) of length 1 along alpha and beta, both in [-pi/2, pi/2] or both in [pi/2, 3 pi/2]: (75), (76)."""
+    """Slips (n, 3) of length 1 along alpha and beta, both in [-pi/2, pi/2] or both in [pi/2, 3
+    pi/2]: (75), (76)."""
     angle = ((np.arange(60) + 0.5) / 60 - 0.5) * np.pi
     tan_alpha, tan_beta = np.meshgrid(np.tan(angle), np.tan(angle))
     sheet = np.stack([tan_alpha, tan_beta, np.ones_like(tan_alpha)], axis=-1).reshape(-1, 3)
@@ -24,10 +26,11 @@ def directions():
 
 
 def growth_of_energy(x, n, p):
-    """gamma out of RR into SS by kinetic energy: the work done on the slip, divided by its size in that product.
+    """gamma out of RR into SS by kinetic energy: the work done on the slip, divided by its size in
+    that product.
 
-    The mass matrix of the slip in units of m r^2 is the kinetic energy with what else moves eliminated.
-    """
+    The mass matrix of the slip in units of m r^2 is the kinetic energy with what else moves
+    eliminated."""
     M = p.j / (1 + 2 * p.j) * np.array([[1 + p.j, p.j, 0], [p.j, 1 + p.j, 0], [0, 0, 1 + 2 * p.j]])
     rates, _, _ = slip.slip_rates(*RR_SS, x, n, p)
     return np.sum(n @ M * rates, axis=-1) / np.sqrt(np.sum(n @ M * n, axis=-1))
@@ -36,8 +39,8 @@ def growth_of_energy(x, n, p):
 def greatest(gamma, x, p, closed=False):
     """The direction of greatest gamma out of RR into SS, and that: the best of a grid, polished.
 
-    With `closed` only of those along which both contacts press: elsewhere the ball would lift instead of slipping.
-    """
+    With `closed` only of those along which both contacts press: elsewhere the ball would lift
+    instead of slipping."""
 
     def growth(n):
         _, A_y, B_x = slip.slip_rates(*RR_SS, x, n, p)
@@ -46,14 +49,17 @@ def greatest(gamma, x, p, closed=False):
     grid = directions()
     values = growth(grid)
     best, scale = grid[np.argmax(values)], values.max()
-    polished = minimize(lambda n: -float(gamma(x, n, p)) / abs(scale), best, method="BFGS", options={"gtol": 1e-9}).x
+    polished = minimize(
+        lambda n: -float(gamma(x, n, p)) / abs(scale), best, method="BFGS", options={"gtol": 1e-9}
+    ).x
     best = max(best, polished, key=growth)
     return best / np.linalg.norm(best), float(growth(best))
 
 
 @pytest.mark.parametrize(("mu", "eta"), [(0.2, 0.2), (0.1, 0.39), (0.9, 0.05), (0.5, 0.3)])
 def test_energy_and_forces_agree_on_omega_01(mu, eta):
-    """gamma by energy is negative in all directions, and forces are admissible, exactly up to (84)."""
+    """gamma by energy is negative in all directions, and forces are admissible, exactly up to
+    (84)."""
     p = P.replace(mu=mu, eta=eta)
     for factor, holds in ((0.5, True), (1 - 1e-6, True), (1 + 1e-6, False)):
         omega = factor * thresholds(p).omega_01
@@ -65,11 +71,11 @@ def test_energy_and_forces_agree_on_omega_01(mu, eta):
 
 
 def test_counter_example_to_the_claim_after_80():
-    """With the normal of (75), (0, 0) is not the global maximum of gamma, and gamma > 0 somewhere though RR is stable.
+    """With the normal of (75), (0, 0) is not the global maximum of gamma, and gamma > 0 somewhere
+    though RR is stable.
 
-    mu = eta = 0.2 at half of omega_01: gamma(0, 0) < 0, forces exist, and gamma_M < 0 for all n, yet the greatest
-    Euclidean gamma is positive: up to 0.61 omega_01.
-    """
+    mu = eta = 0.2 at half of omega_01: gamma(0, 0) < 0, forces exist, and gamma_M < 0 for all n,
+    yet the greatest Euclidean gamma is positive: up to 0.61 omega_01."""
     omega = 0.5 * thresholds(P).omega_01
 
     def euclidean(x, n, p):
@@ -90,20 +96,28 @@ def test_counter_example_to_the_claim_after_80():
 
 
 def test_normal_forces_while_a_slip_is_slight():
-    """Where the wall alone slips the floor bears the weight, and the wall what turns the spin, too."""
+    """Where the wall alone slips the floor bears the weight, and the wall what turns the spin,
+    too."""
     x, n = State(omega_c=5.0), np.array([1.0])
     _, A_y, B_x = slip.slip_rates(Case.RR, Case.RS, x, n, P)
     assert (A_y, B_x) == pytest.approx((P.m * P.g, (1 + P.j) * P.m * P.R * 25.0))
 
 
 def test_both_consistent_between_73_and_the_cone():
-    """Off the stationary point the floor's cone allows more drag than gamma of (73), by 1/sqrt(1 - mu^2)."""
+    """Off the stationary point the floor's cone allows more drag than gamma of (73), by 1/sqrt(1 -
+    mu^2)."""
     p, omega_c = P.replace(mu=0.9, eta=1e6), 9.0
     T = p.mu * (1 - p.j * p.R * omega_c**2 / p.g)
     lag = T * (1 + 2 * p.j) * p.g / (p.j * p.c * p.R)
-    for factor, slips, sticks in ((0.99, False, True), (1.01, True, True), (1.01 / np.sqrt(1 - p.mu**2), True, False)):
+    for factor, slips, sticks in (
+        (0.99, False, True),
+        (1.01, True, True),
+        (1.01 / np.sqrt(1 - p.mu**2), True, False),
+    ):
         q = p.replace(omega_0=omega_c + factor * lag)
-        growths = [slip.gamma(Case.RR, Case.SR, State(omega_c=omega_c), [side], q) for side in (1.0, -1.0)]
+        growths = [
+            slip.gamma(Case.RR, Case.SR, State(omega_c=omega_c), [side], q) for side in (1.0, -1.0)
+        ]
         assert (max(growths) > 0) == slips
         assert (rolling_forces.margin(omega_c, q) >= 0) == sticks
 
@@ -122,4 +136,9 @@ def test_definition_3_without_friction_or_flow():
     assert stationary_solutions(still)[0].slip_stability is SlipStability.NEUTRAL
     for neutral in (still, slow.replace(eta=0.0), slow.replace(eta=0.6, mu=0.0)):
         assert stability(Case.RR, neutral) is SlipStability.NEUTRAL
-    assert stability(Case.RS, still) is stability(Case.SS, P) is stability(Case.NS, P) is SlipStability.STABLE
+    assert (
+        stability(Case.RS, still)
+        is stability(Case.SS, P)
+        is stability(Case.NS, P)
+        is SlipStability.STABLE
+    )

@@ -1,4 +1,5 @@
-"""Each stationary solution exists, is stable and is free as its proposition says, with all its digits."""
+"""Each stationary solution exists, is stable and is free as its proposition says, with all its
+digits."""
 
 import numpy as np
 import pytest
@@ -24,13 +25,23 @@ def test_solution_of_a_case():
 
 
 def test_the_jacobian_in_rn_has_the_spin_that_goes_with_the_radial_speed():
-    """Central differences of slip_z = -v_h/r; NS and SS are held by eigenvalues, with the drag laws."""
-    p, x = P.replace(omega_0=14.0), State(omega_c=9.0, slip_y=2.0, slip_z=-0.3 / P.r, h=0.01, v_h=0.3)
+    """Central differences of slip_z = -v_h/r; NS and SS are held by eigenvalues, with the drag
+    laws."""
+    p, x = (
+        P.replace(omega_0=14.0),
+        State(omega_c=9.0, slip_y=2.0, slip_z=-0.3 / P.r, h=0.01, v_h=0.3),
+    )
     active = [VARIABLES.index(name) for name in TRAITS[Case.RN].active]
     exact, directions, step = jacobian(Case.RN, np.array(x), p), np.eye(8)[active], 1e-6
     directions[:, 5] = -directions[:, 7] / p.r
-    numeric = [vector_field(Case.RN, x + step * e, p) - vector_field(Case.RN, x - step * e, p) for e in directions]
-    assert np.abs(np.array(numeric)[:, active].T / (2 * step) - exact).max() <= 1e-7 * np.abs(exact).max()
+    numeric = [
+        vector_field(Case.RN, x + step * e, p) - vector_field(Case.RN, x - step * e, p)
+        for e in directions
+    ]
+    assert (
+        np.abs(np.array(numeric)[:, active].T / (2 * step) - exact).max()
+        <= 1e-7 * np.abs(exact).max()
+    )
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
@@ -79,7 +90,11 @@ VANISHING = [  # what exists, is how stable, and is free
     # nothing holds the ball to the wall: in NS it sinks
     (
         {"omega_0": 0.0},
-        {"RR": (True, "ASYMPTOTIC", ()), "RS": (True, "NEUTRAL", ("slip_y",)), "NS": (True, "NEUTRAL", ("y",))},
+        {
+            "RR": (True, "ASYMPTOTIC", ()),
+            "RS": (True, "NEUTRAL", ("slip_y",)),
+            "NS": (True, "NEUTRAL", ("y",)),
+        },
         "RR RS NS",
     ),
     # nothing fixes omega_c, and nothing feeds a steady slip: no SS, no steady sinking
@@ -106,7 +121,8 @@ VANISHING = [  # what exists, is how stable, and is free
 
 @pytest.mark.parametrize(("change", "expected", "those"), VANISHING)
 def test_vanishing_parameters(change, expected, those):
-    """Existence alone where the table says only that; all cases with a solution where it lists them."""
+    """Existence alone where the table says only that; all cases with a solution where it lists
+    them."""
     p = P.replace(**change)
     solutions = stationary_solutions(p)
     kinds = {s.case.name: (s.exists, s.stability.name, s.family) for s in solutions}
@@ -114,8 +130,16 @@ def test_vanishing_parameters(change, expected, those):
         assert (kinds[case][0] if isinstance(kind, bool) else kinds[case]) == kind
     assert those is None or set(kinds) == set(those.split())
     assert "SS" not in kinds or p.mu > 0 or p.eta == 0
-    # Nothing that exists moves but by sinking; without friction at the floor the ball doesn't spin about the radius.
+    # Nothing that exists moves but by sinking; without friction at the floor the ball doesn't spin
+    # about the radius.
     for s in (s for s in solutions if s.exists and p.c > 0):
         assert np.abs(vector_field(s.case, s.x, p)[1:]).max() <= 1e-11, s.case
-        assert s.state.omega_c == (0.0 if s.case is Case.RS and p.eta else p.omega_0) or s.case is Case.SS
-        assert p.mu > 0 or abs(s.state.slip_x + p.R / p.r * s.state.omega_c) <= 1e-12 or s.case is Case.NS
+        assert (
+            s.state.omega_c == (0.0 if s.case is Case.RS and p.eta else p.omega_0)
+            or s.case is Case.SS
+        )
+        assert (
+            p.mu > 0
+            or abs(s.state.slip_x + p.R / p.r * s.state.omega_c) <= 1e-12
+            or s.case is Case.NS
+        )

@@ -30,7 +30,8 @@ def lacking(_: object) -> None:
 
 @pytest.fixture(scope="module")
 def few_figures() -> Iterator[None]:
-    """Reports with two figures, of which one was not measured: each is drawn in the tests of figures."""
+    """Reports with two figures, of which one was not measured: each is drawn in the tests of
+    figures."""
     with pytest.MonkeyPatch.context() as patch:
         fig_9 = FIGURES["fig-9"]
         lost = dataclasses.replace(fig_9, title="The user's own", select=lacking, claims=())
@@ -52,9 +53,14 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (made / "meter.toml").write_text(METER)
     file = made / "results" / "measurements" / "settled.h5"
     file.parent.mkdir(parents=True)
-    rows = measured("settled", "omega_c", 11.9, 1e-9, y=0.1), measured("settled", "force_Ay", 0.1, 1e-9)
+    rows = (
+        measured("settled", "omega_c", 11.9, 1e-9, y=0.1),
+        measured("settled", "force_Ay", 0.1, 1e-9),
+    )
     record.save(Records(rows, (Missing("settled", "x", "it never settles"),)), file, {})
-    results.save(Summary.of([], Level.QUICK, {"mujoco": {1: ["measurements/settled.h5"]}}), made / "results")
+    results.save(
+        Summary.of([], Level.QUICK, {"mujoco": {1: ["measurements/settled.h5"]}}), made / "results"
+    )
     return made
 
 
@@ -69,12 +75,15 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
 def browser() -> Iterator[Any]:
     """Chromium, without a window."""
     playwright = pytest.importorskip("playwright.sync_api")
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    path = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
     if path is None:
         pytest.skip("no Chromium is installed")
     with playwright.sync_playwright() as driver:
         chromium = driver.chromium.launch(
-            executable_path=path, args=["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"]
+            executable_path=path,
+            args=["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"],
         )
         yield chromium
         chromium.close()
@@ -85,7 +94,10 @@ def tab(browser: Any) -> Iterator[Any]:
     """A page that may have nothing to complain of and asks the network for nothing."""
     page, wrong = browser.new_page(viewport={"width": 1200, "height": 844}), list[str]()
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("request", lambda request: wrong.append(request.url) if request.url.startswith("http") else None)
+    page.on(
+        "request",
+        lambda request: wrong.append(request.url) if request.url.startswith("http") else None,
+    )
     yield page
     page.close()
     assert not wrong

@@ -17,8 +17,13 @@ BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 
 
 def test_screen_and_confirmation_tell_hopping_from_rest():
-    """A ball hops on in a kept set with drag enough; in the reference set it rests whatever it starts with."""
-    row = next(r for r in Searched.load(SEARCHES[0]).confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
+    """A ball hops on in a kept set with drag enough; in the reference set it rests whatever it
+    starts with."""
+    row = next(
+        r
+        for r in Searched.load(SEARCHES[0]).confirmed
+        if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1
+    )
     p = parameters(np.array([row[name] for name in BOX]))
     hops, x, failed = screen(p, random_starts(p, 20, [0]))
     assert failed == 0
@@ -39,13 +44,23 @@ def test_intervals_of_shares():
     assert interval(0, 0) == (0.0, 1.0)
 
 
-def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):
-    """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both engines alike."""
+def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(
+    tmp_path,
+):
+    """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both
+    engines alike."""
     assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
-    given = BISTABLE, {"y": 0.002}, (Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0))), 2
+    given = (
+        BISTABLE,
+        {"y": 0.002},
+        (Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0))),
+        2,
+    )
     seen, maps = [], []
     for _ in range(2):
-        with Campaign(tmp_path, workers=0, report=lambda what, done, total, failed: seen.append(done)) as campaign:
+        with Campaign(
+            tmp_path, workers=0, report=lambda what, done, total, failed: seen.append(done)
+        ) as campaign:
             maps.append(basins(campaign, *given))
         for path in [path for path in tmp_path.glob("*.h5") if len(storage.contents(path)[1]) == 2]:
             path.unlink()  # as if it had been killed before MuJoCo's batch was whole
@@ -66,8 +81,12 @@ def test_a_ball_that_hops_on(tmp_path):
 
 
 def test_basins_count_measure_and_keep_their_points(tmp_path):
-    """Two columns of each fate: columns 1 and 2 lie at the boundary, 0 and 3 a cell farther away."""
-    axes, fates = ("omega_c", "slip_x", np.arange(4.0), np.arange(4.0)), np.array([[0, 0, 2, 2]] * 4)
+    """Two columns of each fate: columns 1 and 2 lie at the boundary, 0 and 3 a cell farther
+    away."""
+    axes, fates = (
+        ("omega_c", "slip_x", np.arange(4.0), np.arange(4.0)),
+        np.array([[0, 0, 2, 2]] * 4),
+    )
     b = Basins(BISTABLE, (0.0,) * 8, *axes, fates, 2, np.array([[2, 2], [0, 0]]), 1e-3)
     assert b.differences().tolist() == [2.0, 1.0]
     b.fates[3] = 2

@@ -1,7 +1,8 @@
-"""A campaign's results depend on nothing but its tasks, and nothing that is done is done again or lost.
+"""A campaign's results depend on nothing but its tasks, and nothing that is done is done again or
+lost.
 
-A directory has one program at a time that fills it, and a run that is taken up again gives the bits of a whole one.
-"""
+A directory has one program at a time that fills it, and a run that is taken up again gives the bits
+of a whole one."""
 
 import contextlib
 import functools
@@ -38,11 +39,15 @@ WILD = Task(engine="mujoco", parameters=P, x0=(0, 0, 1e11, 0, 0, 0), t_end=0.2)
 
 
 def tasks(count=9, t_end=0.2):
-    return [Task(engine="mujoco", parameters=P.replace(omega_0=5.0 + k), x0=REST, t_end=t_end) for k in range(count)]
+    return [
+        Task(engine="mujoco", parameters=P.replace(omega_0=5.0 + k), x0=REST, t_end=t_end)
+        for k in range(count)
+    ]
 
 
 def numbers(runs):
-    """All numbers of runs, by their parameters; a run that is stored twice, as by a worker that dies, is the same."""
+    """All numbers of runs, by their parameters; a run that is stored twice, as by a worker that
+    dies, is the same."""
     found = {}
     for run in runs:
         own = {c: getattr(run, c).tobytes() for c in columns(Trajectory)}
@@ -52,7 +57,9 @@ def numbers(runs):
 
 def data(directory):
     """All numbers of all runs of a directory."""
-    return numbers([run for path in directory.glob("*.h5") for run in storage.load_runs(path).values()])
+    return numbers(
+        [run for path in directory.glob("*.h5") for run in storage.load_runs(path).values()]
+    )
 
 
 def written(directory):
@@ -81,7 +88,9 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
         monkeypatch.setattr("compare.kit.campaign.READ", room)
         seen = []
         for _ in range(2):
-            with Campaign(tmp_path / str(room), 0, 2, report=lambda *now: told.append(now), doing="it") as campaign:
+            with Campaign(
+                tmp_path / str(room), 0, 2, report=lambda *now: told.append(now), doing="it"
+            ) as campaign:
                 for _ in range(2):
                     campaign.run(tasks(4))
                     seen.append(len(loaded))
@@ -97,7 +106,9 @@ def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path):
         campaign.label = "first"
         campaign.keep([tasks(2)[1].key])
         campaign.reduce()
-        kept = sorted((*path.name.rsplit("-", 1)[:1], *path.suffixes) for path in tmp_path.glob("*.h5"))
+        kept = sorted(
+            (*path.name.rsplit("-", 1)[:1], *path.suffixes) for path in tmp_path.glob("*.h5")
+        )
         assert kept == [("first", ".failed", ".h5"), ("first-and-more", ".h5"), ("first.h5", ".h5")]
         campaign.reduce()  # again, as after a kill: what is kept stays
         assert list(storage.load_runs(tmp_path / "first.h5")) == [tasks(2)[1].key]
@@ -105,9 +116,15 @@ def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path):
     assert len(data(tmp_path)) == 5
 
 
-def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(tmp_path, undisturbed, monkeypatch):
+def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
+    tmp_path, undisturbed, monkeypatch
+):
     """Runs of 201 samples each; the numbers are those of runs that were stored at once."""
-    for where, room, short, files in (("held", 2**18, 1e9, 0), ("tight", 500, 1e9, 3), ("slow", 2**18, 0.0, 5)):
+    for where, room, short, files in (
+        ("held", 2**18, 1e9, 0),
+        ("tight", 500, 1e9, 3),
+        ("slow", 2**18, 0.0, 5),
+    ):
         monkeypatch.setattr("compare.kit.campaign.READ", room)
         monkeypatch.setattr("compare.kit.campaign.SOON_DONE", short)
         with Campaign(tmp_path / where, workers=0, batch=2, passing=True) as campaign:
@@ -127,9 +144,15 @@ def test_runs_that_are_stored_are_not_handed_out(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "damage", [lambda whole: whole[:-100], lambda whole: whole[:4000] + bytes([whole[4000] ^ 1]) + whole[4001:]]
+    "damage",
+    [
+        lambda whole: whole[:-100],
+        lambda whole: whole[:4000] + bytes([whole[4000] ^ 1]) + whole[4001:],
+    ],
 )
-def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path, undisturbed, capsys, damage):
+def test_a_file_that_was_cut_or_edited_is_named_and_done_again(
+    tmp_path, undisturbed, capsys, damage
+):
     completed(tmp_path, batch=3)
     path = min(tmp_path.iterdir())
     path.write_bytes(damage(path.read_bytes()))
@@ -143,7 +166,8 @@ def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path, undistu
 
 
 def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
-    """Those of other versions by what they say, those of before there were batches by their names."""
+    """Those of other versions by what they say, those of before there were batches by their
+    names."""
     with monkeypatch.context() as other:
         other.setattr("model.storage.current_versions", lambda: {"dualball": "9.9"})
         completed(tmp_path, asked=tasks(2))
@@ -153,7 +177,10 @@ def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
     with Campaign(tmp_path, workers=0) as campaign:
         campaign.label = "again"
         assert campaign.complete(tasks(2)) == []
-    assert capsys.readouterr().err == f"dualball: 2 files of runs of other versions are left alone in {tmp_path}\n"
+    assert (
+        capsys.readouterr().err
+        == f"dualball: 2 files of runs of other versions are left alone in {tmp_path}\n"
+    )
     assert before.items() <= {path: path.read_bytes() for path in tmp_path.iterdir()}.items()
     assert len(before) + 1 == len(list(tmp_path.iterdir()))
 
@@ -161,8 +188,17 @@ def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
 def test_every_input_is_part_of_the_identity():
     given = {"engine": "mujoco", "parameters": P, "x0": REST, "t_end": 0.2}
     others = (
-        *({"engine": "event"}, {"parameters": P.replace(mu=0.21)}, {"x0": (*REST[:7], 1e-300)}, {"t_end": 0.3}),
-        *({"sample_interval": 0.1}, {"settings": ContactSettings.at(5e-4)}, {"flow": Flow.ramp(1, 2, 1)}),
+        *(
+            {"engine": "event"},
+            {"parameters": P.replace(mu=0.21)},
+            {"x0": (*REST[:7], 1e-300)},
+            {"t_end": 0.3},
+        ),
+        *(
+            {"sample_interval": 0.1},
+            {"settings": ContactSettings.at(5e-4)},
+            {"flow": Flow.ramp(1, 2, 1)},
+        ),
     )
     assert len({Task(**given | other).key for other in ({}, *others)}) == 1 + len(others)
     for x0 in (list(REST), np.zeros(8), np.zeros(6), [0] * 6):
@@ -175,8 +211,13 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path):
         failures = campaign.complete([*tasks(2), WILD])
         assert [failure.task for failure in failures] == [WILD]
         assert "diverged" in failures[0].reason
-        assert sorted(path.suffixes for path in tmp_path.glob("*.h5")) == [[".failed", ".h5"], [".h5"]]
-        assert [entry["key"] for entry in json.loads((tmp_path / FAILURES).read_text())] == [WILD.key]
+        assert sorted(path.suffixes for path in tmp_path.glob("*.h5")) == [
+            [".failed", ".h5"],
+            [".h5"],
+        ]
+        assert [entry["key"] for entry in json.loads((tmp_path / FAILURES).read_text())] == [
+            WILD.key
+        ]
         with pytest.raises(SimulationError, match="diverged"):
             campaign.run([WILD])
     with Campaign(tmp_path, workers=0) as again:  # it is not tried again, but told again
@@ -185,7 +226,13 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path):
 
 def test_a_run_that_takes_too_long_is_reported(tmp_path):
     endless = Task(engine="mujoco", parameters=P, x0=REST, t_end=6000.0)
-    slow = Task(engine="time-stepping", parameters=endless.parameters, x0=REST, t_end=6000.0, sample_interval=0.01)
+    slow = Task(
+        engine="time-stepping",
+        parameters=endless.parameters,
+        x0=REST,
+        t_end=6000.0,
+        sample_interval=0.01,
+    )
     failures = completed(tmp_path, limit=2, asked=[endless, *tasks(1, t_end=0.01), slow])
     assert [failure.task for failure in failures] == [endless, slow]
     assert {failure.reason for failure in failures} == {"it took longer than 2 s"}
@@ -199,7 +246,9 @@ def deadly(tasks, *where):
     return run_batch(tasks, *where)
 
 
-def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(tmp_path, undisturbed, monkeypatch):
+def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
+    tmp_path, undisturbed, monkeypatch
+):
     """Workers, batches and the order of tasks change no bit."""
     monkeypatch.setattr("compare.kit.campaign.run_batch", deadly)
     failures = completed(tmp_path, workers=2, batch=3, asked=reversed(tasks()))
@@ -218,7 +267,9 @@ def square(parent, number):
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_what_a_killed_process_was_to_do_is_done_here(count):
     with processes(count) as work:
-        assert list(work.map(functools.partial(square, os.getpid()), range(8))) == [k**2 for k in range(8)]
+        assert list(work.map(functools.partial(square, os.getpid()), range(8))) == [
+            k**2 for k in range(8)
+        ]
         assert list(work.map(abs, [-1, -2])) == [1, 2]
 
 
@@ -255,7 +306,8 @@ def test_a_killed_dask_worker_changes_no_bit(tmp_path, undisturbed):
 
 
 class Orphaned(ThreadPoolExecutor):
-    """As Dask's, whose futures are all cancelled once its scheduler is gone: here after the second."""
+    """As Dask's, whose futures are all cancelled once its scheduler is gone: here after the
+    second."""
 
     asked = 0
 
@@ -269,7 +321,9 @@ class Orphaned(ThreadPoolExecutor):
 
 
 @pytest.mark.parametrize("slow", [False, True])
-def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(slow, tmp_path, undisturbed, monkeypatch):
+def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
+    slow, tmp_path, undisturbed, monkeypatch
+):
     """Also where all that it did is there before it is missed."""
     if slow:
         monkeypatch.setattr("compare.kit.campaign.wait", lambda futures, **how: wait(futures))
@@ -296,22 +350,31 @@ def test_bad_campaigns(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageError, match="cannot write to"):
         Campaign(tmp_path / "file")
-    with pytest.raises(InputError, match=r"no engine is called 'mujuco' \(did you mean 'mujoco'\?\)"):
+    with pytest.raises(
+        InputError, match=r"no engine is called 'mujuco' \(did you mean 'mujoco'\?\)"
+    ):
         Task(engine="mujuco", parameters=P, x0=REST, t_end=1)
     with pytest.raises(InputError, match=r"a state has 6 entries .* or 8"):
         Task(engine="mujoco", parameters=P, x0=(0.0, 1.0), t_end=1)
 
 
 def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_path):
-    """Interrupted once a batch is whole, then killed, then left alone: each time it goes on from there."""
-    # Runs of some tenths of a second: however late the signal comes, some of them are still to be done.
-    sweep, kept = f"sweep --vary omega_0=5:10:16 --batch 2 --time 15 -o {tmp_path} --workers".split(), {}
+    """Interrupted once a batch is whole, then killed, then left alone: each time it goes on from
+    there."""
+    # Runs of some tenths of a second: however late the signal comes, some of them are still to be
+    # done.
+    sweep, kept = (
+        f"sweep --vary omega_0=5:10:16 --batch 2 --time 15 -o {tmp_path} --workers".split(),
+        {},
+    )
     for by in (signal.SIGINT, signal.SIGKILL):
         process = started(*sweep, 1, stderr=subprocess.STDOUT)
         while len(written(tmp_path)) == len(kept):
             time.sleep(0.02)
         process.send_signal(by)
-        said, _ = process.communicate(timeout=60)  # the pipe ends once the worker, which holds it, too, is gone
+        said, _ = process.communicate(
+            timeout=60
+        )  # the pipe ends once the worker, which holds it, too, is gone
         assert "Traceback" not in said
         assert kept.items() < written(tmp_path).items()
         kept = written(tmp_path)
@@ -326,7 +389,10 @@ def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_p
 
 
 def test_a_second_program_is_refused_until_the_first_is_dead(tmp_path, capsys):
-    line, first = f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch", Lock(tmp_path)
+    line, first = (
+        f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch",
+        Lock(tmp_path),
+    )
     in_use = rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it, or choose"
     assert re.search(in_use, refused(capsys, f"{line} 2"))
     assert [path.name for path in tmp_path.iterdir()] == [".lock"]
@@ -350,7 +416,8 @@ def test_a_lock_of_a_machine_that_is_gone_or_of_a_failed_campaign_is_nobodys(tmp
 
 @pytest.mark.parametrize("rounds", [20, pytest.param(400, marks=pytest.mark.slow)])
 def test_no_two_have_a_lock_at_once(tmp_path, rounds):
-    """Threads, of which each opens the file by itself, as programs do: who has it writes a name, and finds that."""
+    """Threads, of which each opens the file by itself, as programs do: who has it writes a name,
+    and finds that."""
     (tmp_path / "log").mkdir()
     held = tmp_path / "log" / "held"
 
@@ -387,7 +454,14 @@ ON_JOINTS, FREE = ContactSettings.at(2.5e-4), ContactSettings.rigid_at(2.5e-4)
 
 def run_of(settings, state=None):
     """Spin-up from rest through rolling into slipping, about four blocks of samples."""
-    return Run(P.replace(omega_0=25.0), np.zeros(8), 4.5, settings=settings, sample_interval=5e-3, state=state)
+    return Run(
+        P.replace(omega_0=25.0),
+        np.zeros(8),
+        4.5,
+        settings=settings,
+        sample_interval=5e-3,
+        state=state,
+    )
 
 
 def taken_up(directory, settings, blocks=None):

@@ -1,4 +1,5 @@
-"""Exact contact cases are right by equations of motion in space, integrated, and would notice a wrong engine."""
+"""Exact contact cases are right by equations of motion in space, integrated, and would notice a
+wrong engine."""
 
 import dataclasses
 import math
@@ -39,7 +40,8 @@ def test_a_case_is_whole_and_no_sample_near_a_blow(name):
     assert case.wrong
     for text, states in case.wrong.items():
         assert case.error(states) > 2.5 * TOLERANCE, text
-    # No sample is near a blow: where an engine is late by a step, it is not to be wrong by the whole jump.
+    # No sample is near a blow: where an engine is late by a step, it is not to be wrong by the
+    # whole jump.
     blows = [time for time, jumps in zip(*changes(case), strict=True) if jumps]
     if what := {"rocking-block": 7, "bounce": 5}.get(name):  # what jumps there of a state
         fine = np.arange(1, 20000) * (case.times[-1] / 20000)
@@ -55,30 +57,49 @@ def test_the_list_that_is_shown_is_that_of_the_cases():
 
 
 def newton(case, touching=None, friction=()):
-    """The rates of a body's place, quaternion, velocity and spin in world axes, (13,), by Newton and Euler.
+    """The rates of a body's place, quaternion, velocity and spin in world axes, (13,), by Newton
+    and Euler.
 
     A second way to the motions, which knows nothing of the variables in which they are known.
 
-    `touching` gives of place and quaternion for each contact its arm from the centre, its normal and the velocity of
-    what it touches; `friction` the coefficients, None for what rolls. All forces are solved for together from what
-    keeps contacts closed and, where they roll, without slip; least squares where that leaves some open.
-    """
+    `touching` gives of place and quaternion for each contact its arm from the centre, its normal
+    and the velocity of what it touches; `friction` the coefficients, None for what rolls. All
+    forces are solved for together from what keeps contacts closed and, where they roll, without
+    slip; least squares where that leaves some open."""
     body, count, near = case.body, len(friction), 1e-6  # s, half the time of a difference
 
     def rates(t, state):
         (w, *axis), velocity, spin = state[3:7], state[7:10], state[10:]
-        begin = np.concatenate([velocity, 0.5 * np.array([-spin @ axis, *(w * spin + np.cross(spin, axis))])])
+        begin = np.concatenate(
+            [velocity, 0.5 * np.array([-spin @ axis, *(w * spin + np.cross(spin, axis))])]
+        )
         axes = rotated(state[3:7], np.eye(3)).T
         inertia = axes @ np.diag(body.inertia) @ axes.T
         linear = np.array(case.force(t, state[:3], velocity)) / body.mass - case.g * UP
-        found = np.concatenate([linear, np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))])  # without contacts
+        found = np.concatenate(
+            [linear, np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))]
+        )  # without contacts
         if count:
-            now, after, before = (np.array(touching(state[:7] + d * begin)) for d in (0.0, near, -near))
+            now, after, before = (
+                np.array(touching(state[:7] + d * begin)) for d in (0.0, near, -near)
+            )
             crosses = [np.cross(arm, np.eye(3)).T for arm, _, _ in now]
-            pushed = [np.vstack([np.eye(3) / body.mass, np.linalg.solve(inertia, cross)]) for cross in crosses]
-            of_forces, rows, right = np.hstack(pushed), [], []  # rows of what all forces must come to
-            for k, ((arm, normal, under), rate) in enumerate(zip(now, (after - before) / (2 * near), strict=True)):
-                slip, of_slip = velocity + np.cross(spin, arm) - under, np.hstack([np.eye(3), -crosses[k]])
+            pushed = [
+                np.vstack([np.eye(3) / body.mass, np.linalg.solve(inertia, cross)])
+                for cross in crosses
+            ]
+            of_forces, rows, right = (
+                np.hstack(pushed),
+                [],
+                [],
+            )  # rows of what all forces must come to
+            for k, ((arm, normal, under), rate) in enumerate(
+                zip(now, (after - before) / (2 * near), strict=True)
+            ):
+                slip, of_slip = (
+                    velocity + np.cross(spin, arm) - under,
+                    np.hstack([np.eye(3), -crosses[k]]),
+                )
                 rest = rate[2] - np.cross(spin, rate[0]) - of_slip @ found
                 if friction[k] is None:
                     rows.append(of_slip @ of_forces)
@@ -87,10 +108,16 @@ def newton(case, touching=None, friction=()):
                 rows.append(normal[None] @ of_slip @ of_forces)
                 right.append([normal @ rest - rate[1] @ slip])
                 along = slip - (slip @ normal) * normal
-                law = np.eye(3) - np.outer(normal - friction[k] * along / np.linalg.norm(along), normal)
+                law = np.eye(3) - np.outer(
+                    normal - friction[k] * along / np.linalg.norm(along), normal
+                )
                 rows.append(np.kron(np.eye(count)[k], law))
                 right.append(np.zeros(3))
-            found = found + of_forces @ np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=1e-12)[0]
+            found = (
+                found
+                + of_forces
+                @ np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=1e-12)[0]
+            )
         return np.concatenate([begin, found])
 
     return rates
@@ -114,20 +141,33 @@ def switched(rates, start, times, ends, change):
             return ends(x) if t > begin + 1e-7 else 1.0
 
         falls.terminal, falls.direction = True, -1
-        found = solve_ivp(rates, (begin, times[-1]), state, events=falls, dense_output=True, max_step=0.02, **SHARP)
+        found = solve_ivp(
+            rates,
+            (begin, times[-1]),
+            state,
+            events=falls,
+            dense_output=True,
+            max_step=0.02,
+            **SHARP,
+        )
         out += [found.sol(t) for t in times[(times > begin) & (times <= found.t[-1])]]
         begin, state = found.t[-1], change and change(found.y[:, -1])
     return np.array(out)
 
 
 def ball(case, letters):
-    """A sphere, or a block that doesn't turn and bears at its centre, which touches as these letters say."""
+    """A sphere, or a block that doesn't turn and bears at its centre, which touches as these
+    letters say."""
     own = [pair for pair in zip(case.surfaces, letters, strict=True) if pair[1] != "N"]
 
     def touching(place):
         for surface, _ in own:
             inward = -place[:3] * [1, 1, 0]
-            normal = np.array(surface.normal) if surface.radius is None else inward / np.linalg.norm(inward)
+            normal = (
+                np.array(surface.normal)
+                if surface.radius is None
+                else inward / np.linalg.norm(inward)
+            )
             arm = -case.body.size[0] * (case.body.shape == "sphere") * normal
             yield arm, normal, surface.turning * np.cross(UP, place[:3] + arm)
 
@@ -159,14 +199,17 @@ def disc(case):
 
 
 def rocking(case):
-    """On an edge, to the side that is the last of the state; a blow on the other one has no moment about that."""
+    """On an edge, to the side that is the last of the state; a blow on the other one has no moment
+    about that."""
     body = case.body
 
     def corner(state, side):
         return rotated(state[3:7], np.array(body.size) * [side, 0, -1])
 
     def rates(t, state):
-        return np.append(newton(case, floor(lambda place: [corner(place, state[13])]), [None])(t, state[:13]), 0)
+        return np.append(
+            newton(case, floor(lambda place: [corner(place, state[13])]), [None])(t, state[:13]), 0
+        )
 
     def blow(state):
         arm, moment = corner(state, -state[13]), body.inertia[1]
@@ -180,11 +223,14 @@ def rocking(case):
 def bouncing(case):
     """A fall, from blow to blow."""
     back = np.where(np.arange(13) == 9, -case.surfaces[0].restitution, 1.0)
-    return moved(case, newton(case), (), lambda x: x[2] - case.body.size[0], lambda state: back * state)
+    return moved(
+        case, newton(case), (), lambda x: x[2] - case.body.size[0], lambda state: back * state
+    )
 
 
 def swinging(case):
-    """The mass on spring and slide: friction keeps its sign until the speed is zero, and then holds if it can."""
+    """The mass on spring and slide: friction keeps its sign until the speed is zero, and then holds
+    if it can."""
     dry, k, m = case.dry, case.spring, case.body.mass
 
     def begins(x):
@@ -204,9 +250,9 @@ def swinging(case):
 def sliding(case):
     """Blocks in translation: the lowest on floor or belt, the next one on it, by steps in time.
 
-    The friction of both contacts is found together from velocities at the end of a step, by projection on Coulomb's
-    bounds: nothing knows when what sticks or slides. Forces are constant but in the steps of a change.
-    """
+    The friction of both contacts is found together from velocities at the end of a step, by
+    projection on Coulomb's bounds: nothing knows when what sticks or slides. Forces are constant
+    but in the steps of a change."""
     (surface,), bodies, h = case.surfaces, case.bodies[::-1], 1e-4
     normal, masses = np.array(surface.normal), np.array([body.mass for body in bodies])
     way, press, count = np.array([normal[2], 0.0, -normal[0]]), case.g * normal[2], len(bodies)
@@ -214,7 +260,13 @@ def sliding(case):
     slips = np.eye(count) - np.eye(count, k=-1)  # of velocities: each body's past what is under it
     belt = np.eye(count)[0] * np.dot(surface.velocity, way)
     answer = h * slips / masses @ slips.T  # of slips to friction
-    v, s, f, out, done = np.array([body.velocity for body in bodies]) @ way, np.zeros(count), np.zeros(count), [], 0
+    v, s, f, out, done = (
+        np.array([body.velocity for body in bodies]) @ way,
+        np.zeros(count),
+        np.zeros(count),
+        [],
+        0,
+    )
     for t in case.times:
         for _ in range(round(t / h) - done):
             free = v - h * case.g * way[2]
@@ -228,7 +280,10 @@ def sliding(case):
             new = free + h * slips.T @ f / masses
             s, v = s + h * (v + new) / 2, new
         done = round(t / h)
-        states = [[body.position + x * way, w * way, 0 * way] for body, x, w in zip(bodies, s, v, strict=True)]
+        states = [
+            [body.position + x * way, w * way, 0 * way]
+            for body, x, w in zip(bodies, s, v, strict=True)
+        ]
         out.append(np.ravel(states[::-1]))
     return np.array(out)
 
@@ -243,8 +298,8 @@ WAYS = {
     "rocking-block": (rocking, 1e-6),
     "bounce": (bouncing, 1e-6),
 }
-"""Of the cases of version 2, and by how much each is wrong: of what starts or stops within a step, a step; of what is
-switched, the time after a switch in which none is looked for."""
+"""Of the cases of version 2, and by how much each is wrong: of what starts or stops within a step,
+a step; of what is switched, the time after a switch in which none is looked for."""
 
 
 @pytest.mark.parametrize("name", WAYS)
@@ -262,7 +317,10 @@ def changes(case):
         return np.empty(0), []
     p, x0 = case.motion
     events = analytic.simulate(p, x0, case.times[-1], rtol=1e-12).events
-    pairs = [(Kinds(a).name, Kinds(b).name) for a, b in zip(events.from_case, events.to_case, strict=True)]
+    pairs = [
+        (Kinds(a).name, Kinds(b).name)
+        for a, b in zip(events.from_case, events.to_case, strict=True)
+    ]
     return events.time, ["N" in before and before != after for before, after in pairs]
 
 
@@ -277,15 +335,21 @@ def test_a_ball_moves_so_from_every_sixth_sample_to_the_next(name):
         if changed or not np.any(case.exact[k - 1, 3:]):
             continue
         start = np.insert(case.exact[k - 1], 3, case.body.orientation)
-        found = solve_ivp(ball(case, letters), (begin, end), start, **SHARP | {"rtol": 1e-10}).y[:, -1]
-        off = np.linalg.norm((np.delete(found, range(3, 7)) - case.exact[k]).reshape(3, 3), axis=1) / case.scales
+        found = solve_ivp(ball(case, letters), (begin, end), start, **SHARP | {"rtol": 1e-10}).y[
+            :, -1
+        ]
+        off = (
+            np.linalg.norm((np.delete(found, range(3, 7)) - case.exact[k]).reshape(3, 3), axis=1)
+            / case.scales
+        )
         assert off.max() < 1e-9, (end, letters)
         checked += 1
     assert checked >= 2 or not np.any(case.exact[-1, 3:])
 
 
 @pytest.mark.parametrize(
-    ("name", "share"), [("block-rests", 0.9), ("block-slides", 1.25), ("pinched-block", 0.5), ("groove-rests", 0.9)]
+    ("name", "share"),
+    [("block-rests", 0.9), ("block-slides", 1.25), ("pinched-block", 0.5), ("groove-rests", 0.9)],
 )
 def test_rest_needs_the_share_of_friction_that_is_said(name, share):
     """Statics: normal forces balance what acts across the surfaces, and friction what is left."""

@@ -31,15 +31,23 @@ from tests.commands import COMMANDS, ROOT, carried_out, parser_of, refused, told
         ("--omega_0 25", r"the ball slips \(SS\)"),
         ("--set reference", "slip at both points"),
         ("--set high-wall-friction", "the wall can carry it"),
-        ("--set plastic-in-oil", "^Warning: the paper's model doesn't hold for this fluid.*changes its numbers by"),
-        ("--set plastic-in-oil", r"two-point rolling.* would be [\d.]+ rad/s \(-\d+ %\)"),  # by the fluid's torque
+        (
+            "--set plastic-in-oil",
+            "^Warning: the paper's model doesn't hold for this fluid.*changes its numbers by",
+        ),
+        (
+            "--set plastic-in-oil",
+            r"two-point rolling.* would be [\d.]+ rad/s \(-\d+ %\)",
+        ),  # by the fluid's torque
         ("--set steel-in-water", "the fluid's inertia .*: it would shift ω₀₁ by "),
         ("--set steel-in-water --omega-0 20 --drag stokes", r"Warning: Re = \d+ in SS, "),
         ("--set steel-in-water --omega-0 20", "^((?!Warning: Re).)*$"),
         ("--drag quadratic --nu-f 1e-6", r"within the case +algebraically +unstable"),
     ],
 )
-def test_predict_says_what_the_ball_does_what_ends_the_operating_range_and_what_to_doubt(capsys, given, said):
+def test_predict_says_what_the_ball_does_what_ends_the_operating_range_and_what_to_doubt(
+    capsys, given, said
+):
     assert re.search(said, told(capsys, f"predict {given}"))
 
 
@@ -49,24 +57,34 @@ def test_predict_says_where_the_fluid_and_a_law_of_drag_end(capsys):
     assert smooth["fluid_inertia"] is smooth["model_holds"] is None  # without a fluid
     assert {(s["Re"], s["drag_law_covers_Re"]) for s in smooth["solutions"]} == {(None, None)}
     assert json.loads(told(capsys, "predict --set plastic-in-oil --json"))["model_holds"] is False
-    water = json.loads(told(capsys, "predict --set steel-in-water --omega-0 20 --drag stokes --json"))
+    water = json.loads(
+        told(capsys, "predict --set steel-in-water --omega-0 20 --drag stokes --json")
+    )
     p, solutions = Parameters(**water["parameters"]), {s["case"]: s for s in water["solutions"]}
-    speeds = {"SS": p.R * (20.0 - solutions["SS"]["x"]["omega_c"]), "NS": -solutions["NS"]["x"]["v_y"]}
+    speeds = {
+        "SS": p.R * (20.0 - solutions["SS"]["x"]["omega_c"]),
+        "NS": -solutions["NS"]["x"]["v_y"],
+    }
     for case, solved in solutions.items():
         assert solved["Re"] == pytest.approx(2 * p.r * speeds.get(case, 0.0) / p.nu_f, rel=1e-12)
         assert solved["drag_law_covers_Re"] is (case not in speeds)
 
 
 def test_predict_waits_for_no_heavy_package():
-    """Formulas need numpy only; the engines, scipy and the figures would take most of a second to load."""
+    """Formulas need numpy only; the engines, scipy and the figures would take most of a second to
+    load."""
     code = "import sys; from compare.commands import cli; cli.main(['predict']); print(*sys.modules, file=sys.stderr)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stderr.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stderr.split()
     assert "analytic.stationary.solutions" in loaded
     assert not {"h5py", "matplotlib", "mujoco", "numba", "scipy"} & set(loaded)
 
 
 def test_the_first_lines_of_the_readme_print_what_it_says(capsys):
-    code, printed = re.findall(r"```(?:python)?\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)[:2]
+    code, printed = re.findall(
+        r"```(?:python)?\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL
+    )[:2]
     exec(code, {})
     assert capsys.readouterr().out == printed
 
@@ -83,12 +101,19 @@ for name in ("analytic", "mjsim", "compare.testing"):
 
 def test_a_foreign_model_is_named(tmp_path):
     (tmp_path / "model.py").touch()
-    run = functools.partial(subprocess.run, cwd=tmp_path, capture_output=True, text=True, check=True)
+    run = functools.partial(
+        subprocess.run, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     where = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
     said = run([sys.executable, "-c", FOREIGN], env=where).stdout.splitlines()
     assert len(said) == 3
-    assert all(line.startswith(f"{tmp_path / 'model.py'} hides the package model of dualball: rename") for line in said)
-    run([sys.executable, "-m", "compare", "--version"], env={**os.environ, "PYTHONPATH": str(ROOT)})  # has its own
+    assert all(
+        line.startswith(f"{tmp_path / 'model.py'} hides the package model of dualball: rename")
+        for line in said
+    )
+    run(
+        [sys.executable, "-m", "compare", "--version"], env={**os.environ, "PYTHONPATH": str(ROOT)}
+    )  # has its own
 
 
 def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeypatch, capsys):
@@ -106,7 +131,12 @@ def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeyp
 
 @pytest.mark.parametrize(
     ("flow", "last"),
-    [("--ramp 10 20 0.2", 20), ("--staircase 0.1 10 12 14", 14), ("--sine 10 2 2.5 1 5", 8), ("--flow flow.csv", 9)],
+    [
+        ("--ramp 10 20 0.2", 20),
+        ("--staircase 0.1 10 12 14", 14),
+        ("--sine 10 2 2.5 1 5", 8),
+        ("--flow flow.csv", 9),
+    ],
 )
 def test_flows(tmp_path, monkeypatch, capsys, flow, last):
     monkeypatch.chdir(tmp_path)
@@ -119,7 +149,9 @@ def test_flows(tmp_path, monkeypatch, capsys, flow, last):
 def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path, capsys, design):
     """Fast contacts would chatter where mu eta is large; on the other set they are the defaults."""
     told(capsys, f"sweep {design} --mu 0.5 --timestep 0.002 --time 0.05 --workers 0 -o {tmp_path}")
-    headers = [run.header for path in tmp_path.glob("*.h5") for run in storage.load_runs(path).values()]
+    headers = [
+        run.header for path in tmp_path.glob("*.h5") for run in storage.load_runs(path).values()
+    ]
     for header in headers:
         suited = ContactSettings.at(0.002).suited(header.parameters)
         assert tuple(header.settings["solref"]) == suited.solref
@@ -174,7 +206,10 @@ def test_an_interrupted_run_is_kept_and_goes_on_to_the_same_bits(tmp_path, monke
     monkeypatch.setattr(simulate, "store", pressing)
     code, _, said = carried_out(capsys, line)
     (journal,) = here.glob("*.journal")
-    assert f"kept in {here / 'run.failed.h5'}, and the same command goes on from what {journal} holds" in said
+    assert (
+        f"kept in {here / 'run.failed.h5'}, and the same command goes on from what {journal} holds"
+        in said
+    )
     part = storage.load(here / "run.failed.h5")
     assert code == 130
     assert part.header.failure == f"was stopped at t = {part.time[-1]:g} s"
@@ -187,10 +222,14 @@ def test_an_interrupted_run_is_kept_and_goes_on_to_the_same_bits(tmp_path, monke
     monkeypatch.undo()
     told(capsys, line.replace(str(here / "run.h5"), str(whole)))
     run, whole = storage.load(here / "run.h5"), storage.load(whole)
-    assert all(np.array_equal(getattr(run, name), getattr(whole, name)) for name in columns(Trajectory))
+    assert all(
+        np.array_equal(getattr(run, name), getattr(whole, name)) for name in columns(Trajectory)
+    )
 
 
-def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_right(tmp_path, monkeypatch, capsys):
+def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_right(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit, match="0"):
         cli.main(["--help"])
@@ -201,7 +240,9 @@ def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_
     for name, command in parsers.COMMANDS.items():
         parser = parser_of(name)
         assert all(action.help for action in parser._actions)
-        assert f"Example: dualball {name} {command.example}" in " ".join(parser.format_help().split())
+        assert f"Example: dualball {name} {command.example}" in " ".join(
+            parser.format_help().split()
+        )
         parser.parse_args(command.example.split())
     assert "(default 30)" in parser_of("sweep").format_help()
     designs = parser_of("design").format_help()
@@ -212,8 +253,12 @@ def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_
         assert not {each for each in known if not {each, each.removesuffix("-defaults")} & words}
 
 
-def test_every_command_is_in_the_tutorial_and_claims_and_parameters_are_listed_once(monkeypatch, capsys):
-    tutorial = re.findall(r"^!dualball (\S+)", (ROOT / "docs" / "tutorial.md").read_text("utf-8"), re.MULTILINE)
+def test_every_command_is_in_the_tutorial_and_claims_and_parameters_are_listed_once(
+    monkeypatch, capsys
+):
+    tutorial = re.findall(
+        r"^!dualball (\S+)", (ROOT / "docs" / "tutorial.md").read_text("utf-8"), re.MULTILINE
+    )
     assert {*tutorial} | {"explore"} == {*COMMANDS}  # which waits for a browser
     monkeypatch.delenv("COLUMNS", raising=False)  # names wrap in narrow terminals
     assert {claim.id for claim in CLAIMS} <= set(told(capsys, "validate --list").split())
@@ -234,40 +279,73 @@ def test_every_command_is_in_the_tutorial_and_claims_and_parameters_are_listed_o
         ("predict --omega-0 1e155", "omega_0 = 1e+155 rad s-1 is out of range"),
         ("simulate --ramp 1 -2e0 -1E-3", "duration = -0.001 s is out of range"),
         ("simulate --start slip=3", "unknown state variable 'slip' (did you mean 'slip_z'?)"),
-        ("simulate --sample-interval 100 --time 1", "sample_interval = 100 s is out of range: within this run"),
+        (
+            "simulate --sample-interval 100 --time 1",
+            "sample_interval = 100 s is out of range: within this run",
+        ),
         ("simulate -o run.csv", "'run.csv' would hold HDF5: its name must end in .h5"),
-        ("simulate --engine event --timestep 0.1", "--timestep is not for event, which takes --rtol and --restitution"),
-        ("simulate --flow broken.toml", "broken.toml, line 1: no column is called time; there are 'm', '='"),
-        ("simulate --omega-0 5 --ramp 1 2 3", "--omega-0 is for a steady flow, and can't be given beside --ramp"),
+        (
+            "simulate --engine event --timestep 0.1",
+            "--timestep is not for event, which takes --rtol and --restitution",
+        ),
+        (
+            "simulate --flow broken.toml",
+            "broken.toml, line 1: no column is called time; there are 'm', '='",
+        ),
+        (
+            "simulate --omega-0 5 --ramp 1 2 3",
+            "--omega-0 is for a steady flow, and can't be given beside --ramp",
+        ),
         ("sweep --vary omega_0=30:10:5", "omega_0 = 30:10 rad s-1 is in the wrong order"),
-        ("sweep --vary omega_0=10:30", "here omega_0 needs values: write omega_0=from:to:count or omega_0=a,b,c"),
+        (
+            "sweep --vary omega_0=10:30",
+            "here omega_0 needs values: write omega_0=from:to:count or omega_0=a,b,c",
+        ),
         ("sweep --vary omega0=10:30:5", "unknown parameter 'omega0' (did you mean 'omega_0'?)"),
         ("sweep --vary omega_0=10:30:2.5", "count of omega_0 = 2.5 points is out of range"),
-        ("sweep --vary eta=1:2:400 --vary mu=1:2:400", "the grid = 160000 runs is out of range: must be >= 1 and <= 1"),
+        (
+            "sweep --vary eta=1:2:400 --vary mu=1:2:400",
+            "the grid = 160000 runs is out of range: must be >= 1 and <= 1",
+        ),
         ("sweep --vary eta=1:2:3 --vary eta=1:2:3", "eta is given 2 ranges: one is enough"),
         ("sweep --vary eta=0.1:0.2:3 --direction up", "vary omega_0 and nothing else"),
         ("sweep --vary eta=0.1,0.2,0.3 --random 4", "here eta needs a range: write eta=from:to"),
-        ("judge absent", "absent/summary.json: No such file or directory; run 'dualball validate -o absent'"),
+        (
+            "judge absent",
+            "absent/summary.json: No such file or directory; run 'dualball validate -o absent'",
+        ),
         ("validate --claim prop-1 -o broken.toml", "cannot write to broken.toml"),
         ("attractors --follow omega_0=60", "omega_0=from:to"),
         ("attractors --c 0 --random 1", "say how long"),
-        ("basins --across y=0:1:2 --up y=0:1:3", "across and up are both y: a plane needs two state variables"),
+        (
+            "basins --across y=0:1:2 --up y=0:1:3",
+            "across and up are both y: a plane needs two state variables",
+        ),
         ("basins --across y=0:1:2 --up h=0:99:2 --results new/map", "h = 99 m is out of range"),
         ("basins --across y=0:1:2 --up h=0:0.01:2 --c 0", "there are no basins"),
         ("simulate --tme=3 --omega-0 5", "there is no option '--tme' (did you mean '--time'?)"),
         ("predict extra", "'extra' is one argument too many"),
-        ("sweep --vary eta=0.1,0.2 --workers 1e5", "--workers: 100000 is out of range: it must be a whole number >= 0"),
+        (
+            "sweep --vary eta=0.1,0.2 --workers 1e5",
+            "--workers: 100000 is out of range: it must be a whole number >= 0",
+        ),
         ("cases block-rests -o new", "-o writes all cases: 'block-rests' has no effect beside it"),
         ("simulate --start omega_c=5 omega_c=6", "--start names omega_c twice"),
         ("simulate --view --omega-0 20", "there is no display"),
         ("simulate --view --engine event", "--view shows MuJoCo, not event"),
         ("sweep --vary eta=1:2:3 --eta=0.2", "--eta has no effect: eta is varied"),
-        ("basins --across y=0:1:2 --up h=0:0.01:2 --start y=0.1", "--start y has no effect: y spans the plane"),
+        (
+            "basins --across y=0:1:2 --up h=0:0.01:2 --start y=0.1",
+            "--start y has no effect: y spans the plane",
+        ),
         ("basins --across y=0:1:2 --up h=0:0.01:2 --plot a.png", "basins --plot is -o now"),
         ("view --omega-0 3", "'dualball simulate --view' opens the viewer"),
         ("report", "no command 'report' any more: 'dualball judge'"),
         ("grade mine.xml", "league --settings FILE.xml"),
-        ("sweep --vary eta=1,2 -o all.h5", "'all.h5' would be a directory, but its name is that of a file"),
+        (
+            "sweep --vary eta=1,2 -o all.h5",
+            "'all.h5' would be a directory, but its name is that of a file",
+        ),
         ("league --engine mujco", "did you mean 'mujoco'?"),
         ("design absent.toml", "cannot read absent.toml: No such file or directory"),
         ("--print-completion dos", "takes one of bash"),
@@ -291,6 +369,9 @@ def test_shells_complete_commands_and_options(tmp_path, monkeypatch, capsys):
         assert "sample-interval" in text
     (tmp_path / "bash").write_text(text)
     words = "source ./bash; COMP_WORDS=(dualball sim); COMP_CWORD=1; _shtab_dualball; echo ${COMPREPLY[@]}"
-    assert subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True).stdout == "simulate\n"
+    assert (
+        subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True).stdout
+        == "simulate\n"
+    )
     monkeypatch.setitem(sys.modules, "shtab", None)
     assert "dualball[completion]" in refused(capsys, "--print-completion", "bash")

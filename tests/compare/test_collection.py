@@ -1,4 +1,5 @@
-"""What was measured comes back from its files; collections have what varies as coordinates, and name what they lack."""
+"""What was measured comes back from its files; collections have what varies as coordinates, and
+name what they lack."""
 
 import dataclasses
 import json
@@ -25,7 +26,10 @@ OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
 
 def ran(directory, sets, batch=64, **changes):
     """A directory with runs of these sets."""
-    tasks = [Task(**{"engine": "event", "parameters": p, "x0": (0.0,) * 8, "t_end": 0.1} | changes) for p in sets]
+    tasks = [
+        Task(**{"engine": "event", "parameters": p, "x0": (0.0,) * 8, "t_end": 0.1} | changes)
+        for p in sets
+    ]
     with Campaign(directory, workers=0, batch=batch) as campaign:
         assert not campaign.complete(tasks)
     return directory
@@ -56,7 +60,9 @@ def test_the_varied_parameters_of_a_grid_are_dimensions(grid, tmp_path):
         file, _, key = str(data.run.sel(eta=ETAS[1], omega_0=OMEGAS[0]).values).partition("/")
         run = storage.load(grid / file / key)
         assert (run.header.parameters.eta, run.header.parameters.omega_0) == (ETAS[1], OMEGAS[0])
-        assert data.omega_c.sel(eta=ETAS[1], omega_0=OMEGAS[0]) == pytest.approx(np.mean(run.omega_c[751:]), rel=1e-2)
+        assert data.omega_c.sel(eta=ETAS[1], omega_0=OMEGAS[0]) == pytest.approx(
+            np.mean(run.omega_c[751:]), rel=1e-2
+        )
         assert np.isfinite(data.omega_c).all()
         assert set(data.mu.values.flat) == {P.mu}
     about = collection.describe(tmp_path / "all.h5")
@@ -78,7 +84,9 @@ def test_the_varied_parameters_of_other_runs_are_coordinates(runs, tmp_path):
 
 
 def test_the_law_of_drag_is_kept(tmp_path):
-    collection.collect(ran(tmp_path / "runs", [P, P.replace(drag="quadratic", nu_f=1e-6)]), tmp_path / "all.h5")
+    collection.collect(
+        ran(tmp_path / "runs", [P, P.replace(drag="quadratic", nu_f=1e-6)]), tmp_path / "all.h5"
+    )
     about = collection.describe(tmp_path / "all.h5")
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
     assert collection.table(about).row_count == 6
@@ -88,7 +96,8 @@ def test_the_law_of_drag_is_kept(tmp_path):
 
 
 def test_theory_stands_beside_what_was_measured(tmp_path):
-    """For a ball that slips at both points; its height is free on the wall, and in a flow that changes all is."""
+    """For a ball that slips at both points; its height is free on the wall, and in a flow that
+    changes all is."""
     for name, omega_0, height, flow in (
         ("SS", 25.0, 0.0, None), ("NR", 40.0, 0.01, None), ("NR", 41.0, 0.0, Flow.staircase([41.0, 42.0], 0.5))
     ):  # fmt: skip
@@ -99,7 +108,9 @@ def test_theory_stands_beside_what_was_measured(tmp_path):
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         data = data.sortby("omega_0")
         np.testing.assert_allclose(data.slip_z[:2], data.slip_z_theory[:2], atol=1e-8)
-        np.testing.assert_array_equal(np.isnan([data.slip_z_theory, data.y_theory]), [[0, 0, 1], [0, 1, 1]])
+        np.testing.assert_array_equal(
+            np.isnan([data.slip_z_theory, data.y_theory]), [[0, 0, 1], [0, 1, 1]]
+        )
 
 
 def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ(runs, tmp_path):
@@ -112,7 +123,10 @@ def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ
     (tmp_path / "all.h5").unlink()
     with pytest.raises(StorageError) as caught:
         collection.collect(runs, tmp_path / "all.h5")
-    assert str(caught.value) == f"{copy / key} and {first / key} hold the same run with different numbers"
+    assert (
+        str(caught.value)
+        == f"{copy / key} and {first / key} hold the same run with different numbers"
+    )
     assert not (tmp_path / "all.h5").exists()
 
 
@@ -127,18 +141,27 @@ def test_what_is_no_run_is_left_out(runs):
 def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(tmp_path, capsys):
     (file,) = ran(tmp_path / "runs", [P.replace(omega_0=omega) for omega in OMEGAS]).iterdir()
     about = json.loads(told(capsys, f"inspect {file} --json"))
-    assert (about["varied"], about["ranges"]["omega_0"]) == (["omega_0"], [min(OMEGAS), max(OMEGAS)])
+    assert (about["varied"], about["ranges"]["omega_0"]) == (
+        ["omega_0"],
+        [min(OMEGAS), max(OMEGAS)],
+    )
     for name, omega_0 in zip(about["names"], OMEGAS, strict=True):
-        assert json.loads(told(capsys, f"inspect {name} --json"))["parameters"]["omega_0"] == omega_0
+        assert (
+            json.loads(told(capsys, f"inspect {name} --json"))["parameters"]["omega_0"] == omega_0
+        )
     assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
     names = collection.describe(tmp_path / "all.h5")["names"]
     assert [str(tmp_path / "runs" / name) for name in names] == about["names"]
 
 
-def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_path, capsys, monkeypatch):
+def test_means_alone_make_the_same_collection_in_any_number_of_processes(
+    tmp_path, capsys, monkeypatch
+):
     """In less than a third of the space; what is done is not done again."""
     monkeypatch.setattr(collection, "SHARE", 1)
-    sweep = "sweep --vary omega_0=5:10:6 --vary eta=0.1,0.3 --time 0.2 --batch 4 --workers 0 --quiet"
+    sweep = (
+        "sweep --vary omega_0=5:10:6 --vary eta=0.1,0.3 --time 0.2 --batch 4 --workers 0 --quiet"
+    )
     sizes, found = [], set()
     for name, more in (("whole", ""), ("means", "--means-only")):
         where, before = tmp_path / name, None
@@ -152,17 +175,23 @@ def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_pat
             output = tmp_path / f"{name}-{workers}.h5"
             assert collection.collect(where, output, workers) == 12
             with reading(output) as file:
-                found.add(repr({each: column(dataset(file, each)).tolist() for each in file}))  # nan, too
+                found.add(
+                    repr({each: column(dataset(file, each)).tolist() for each in file})
+                )  # nan, too
     assert len(found) == 1
     assert sizes[1] < sizes[0] / 3
     assert collection.describe(min(files))["varied"] == ["eta", "omega_0"]
-    assert "holds another sweep (means_only = True, not False)" in refused(capsys, f"{sweep} -o {tmp_path / 'means'}")
+    assert "holds another sweep (means_only = True, not False)" in refused(
+        capsys, f"{sweep} -o {tmp_path / 'means'}"
+    )
 
 
 def test_a_sweep_is_sampled_as_often_as_asked(tmp_path, capsys):
     sweep = f"sweep --vary omega_0=5,6 --time 0.2 --workers 0 --quiet -o {tmp_path / 's'} --sample-interval"
     for wrong in ("0.5", "1e-5"):
-        assert "within this run it must be >= 0.001 and <= 0.2" in refused(capsys, f"{sweep} {wrong}")
+        assert "within this run it must be >= 0.001 and <= 0.2" in refused(
+            capsys, f"{sweep} {wrong}"
+        )
     assert not (tmp_path / "s").exists()
     told(capsys, f"{sweep} 0.05")
     (file,) = (tmp_path / "s").glob("*.h5")
@@ -171,7 +200,9 @@ def test_a_sweep_is_sampled_as_often_as_asked(tmp_path, capsys):
 
 BLUNT = P.replace(drag="quadratic", nu_f=1e-6, C_D=0.5, density_ratio=0.125)
 MEASURED = (
-    dataclasses.replace(measured("settled", "omega_c", 11.9, 1e-9, case="RR"), runs=("runs/a.h5", "runs/b.h5")),
+    dataclasses.replace(
+        measured("settled", "omega_c", 11.9, 1e-9, case="RR"), runs=("runs/a.h5", "runs/b.h5")
+    ),
     measured("settled", "force_Ay", 0.1, case="SS", y=0.25),
     measured("settled", "case", 4),
     measured("settled", "slip_x", np.float64(0.1), 1e-9, BLUNT, mode=1),
@@ -180,7 +211,10 @@ MEASURED = (
 
 @pytest.mark.parametrize("rows", [MEASURED, ()])
 def test_a_file_gives_back_what_was_saved(rows, tmp_path):
-    path, records = tmp_path / "settled.h5", Records(rows, (Missing("settled", "reference", "it never settles"),))
+    path, records = (
+        tmp_path / "settled.h5",
+        Records(rows, (Missing("settled", "reference", "it never settles"),)),
+    )
     record.save(records, path, {"level": "QUICK"})
     assert record.load(path) == records
     with xarray.open_dataset(path, engine="h5netcdf") as data:

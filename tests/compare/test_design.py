@@ -1,4 +1,5 @@
-"""``dualball design`` gives its answers as data and as a page, and one clear line for what can't be asked."""
+"""``dualball design`` gives its answers as data and as a page, and one clear line for what can't be
+asked."""
 
 import json
 import math
@@ -35,7 +36,8 @@ def test_the_best_meter_as_json_and_as_a_page(tmp_path, capsys):
     values, worst = made["meter"]["values"], made["meter"]["worst"]
     assert made["material"] == "steel"
     assert made["meter"]["limit"]["omega_0"] == operating_range(p)
-    # At the best wall slip, with the smoothest contacts, is as near as unloading, with the roughest.
+    # At the best wall slip, with the smoothest contacts, is as near as unloading, with the
+    # roughest.
     slip = thresholds(p.replace(mu=0.9 * p.mu, eta=0.8 * p.eta)).omega_01
     unloading = thresholds(p.replace(eta=1.2 * p.eta)).omega_02
     assert slip == pytest.approx(unloading, rel=1e-3)
@@ -47,7 +49,8 @@ def test_the_best_meter_as_json_and_as_a_page(tmp_path, capsys):
     assert made["model_holds"] is False
     text = page.read_text("utf-8")
     assert text.index("hold for this fluid") < text.index("<i>ω</i><sub>02</sub>")
-    # The model is off by half of each number, which leaves three digits; what is chosen or given has all.
+    # The model is off by half of each number, which leaves three digits; what is chosen or given
+    # has all.
     for shown in (f"{worst['omega_0']:.3g}", f"{values['eta']:.4g}", "cork can't be used"):
         assert shown in text
     assert text.count('<figure class="plot"') == 3
@@ -60,16 +63,28 @@ BALL = {"r": 0.005, "R": 0.02, "rho_b": 7850, "mu": 0.2, "eta": 0.2}
     ("changes", "code", "said"),
     [
         (
-            {"bounds": BALL | {"R": [0.02, 0.03], "rho_b": [2000, 3000]}, "flow": {"slowest": 0, "fastest": 60}},
+            {
+                "bounds": BALL | {"R": [0.02, 0.03], "rho_b": [2000, 3000]},
+                "flow": {"slowest": 0, "fastest": 60},
+            },
             1,  # none is good enough: the best there is
-            "No meter within the bounds covers the flows up to 60 rad/s. Best: ball, r = 0.005 m, R = 0.02 m",
+            "No meter within the bounds covers the flows up to 60 rad/s. Best: ball, r = 0.005 m, "
+            "R = 0.02 m",
         ),
         (
-            {"bounds": BALL, "flow": {"slowest": 3, "fastest": 10}, "material": [{"name": "[red]"}]},
+            {
+                "bounds": BALL,
+                "flow": {"slowest": 3, "fastest": 10},
+                "material": [{"name": "[red]"}],
+            },
             0,  # Stokes' law is meant for Re < 1, a ball that slips in water has thousands
             r"Best: \[red\], r = 0.005 m.*Warning: beyond the limit the ball may lag with Re up to",
         ),
-        ({"bounds": BALL | {"mu": 0}}, 1, "no operating range: a contact without friction never makes it roll."),
+        (
+            {"bounds": BALL | {"mu": 0}},
+            1,
+            "no operating range: a contact without friction never makes it roll.",
+        ),
     ],
 )
 def test_the_best_meter_in_words(tmp_path, capsys, changes, code, said):
@@ -86,13 +101,28 @@ WRONG = [
     ({"fluid": FLUID | {"drag": "stoks"}}, "fluid.drag = 'stoks' must be one of"),
     ({"fluid": FLUID | {"rho": 1}}, "unknown entry of [fluid] 'rho' (did you mean 'rho_f'?)"),
     ({"fluid": 3}, "fluid = 3 must be a table, [fluid]"),
-    ({"flow": {"slowest": 5, "fastest": 4}}, "flow.fastest = 4 rad s-1 is out of range: must be > flow.slowest = 5"),
-    ({"flow": FLOW | {"response": 1e-3}}, "response = 0.001 s excludes everything: within the bounds"),
-    ({"fluid": FLUID | {"drag": "quadratic"}, "flow": FLOW | {"response": 9}}, "flow.response can't"),
+    (
+        {"flow": {"slowest": 5, "fastest": 4}},
+        "flow.fastest = 4 rad s-1 is out of range: must be > flow.slowest = 5",
+    ),
+    (
+        {"flow": FLOW | {"response": 1e-3}},
+        "response = 0.001 s excludes everything: within the bounds",
+    ),
+    (
+        {"fluid": FLUID | {"drag": "quadratic"}, "flow": FLOW | {"response": 9}},
+        "flow.response can't",
+    ),
     ({"bounds": BOUNDS | {"eta": [0.3, 0.1]}}, "steel: eta = [0.3, 0.1] 1 excludes everything"),
     ({"bounds": {"r": 0.01}}, "missing bound of steel: 'R', 'mu', 'eta'"),
-    ({"material": [{"name": "cork", "rho_b": 200}]}, "cork: rho_b = 200 kg m-3 is out of range: a ball not denser"),
-    ({"material": [{"name": "a", "rho_b": 2e3}] * 2}, "material.name = 'a' must be a text, and no other material's"),
+    (
+        {"material": [{"name": "cork", "rho_b": 200}]},
+        "cork: rho_b = 200 kg m-3 is out of range: a ball not denser",
+    ),
+    (
+        {"material": [{"name": "a", "rho_b": 2e3}] * 2},
+        "material.name = 'a' must be a text, and no other material's",
+    ),
     ({"material": {"name": "a"}}, "material must be a list of tables"),
     ({"tolerances": {"mu": 1.5}}, "tolerances.mu = 1.5 is out of range: must be >= 0 and < 1"),
     ({"tables": {}}, "unknown table 'tables'"),

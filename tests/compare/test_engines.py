@@ -1,7 +1,8 @@
-"""Other engines, as far as they are installed, reach their order with a free body, and make trajectories in the vessel.
+"""Other engines, as far as they are installed, reach their order with a free body, and make
+trajectories in the vessel.
 
-The same task in, the same trajectory out; what can't be had, ends, hangs or gives no numbers is said in a line.
-"""
+The same task in, the same trajectory out; what can't be had, ends, hangs or gives no numbers is
+said in a line."""
 
 import sys
 import warnings
@@ -43,8 +44,13 @@ P = Parameters.named("reference")
 
 def engines(*names):
     """Parameters of a test; those that aren't installed are skipped, and say so."""
-    marks = {name: pytest.mark.skipif(bool(ENGINES[name].missing), reason=ENGINES[name].missing) for name in names}
-    return pytest.mark.parametrize("name", [pytest.param(name, marks=mark) for name, mark in marks.items()])
+    marks = {
+        name: pytest.mark.skipif(bool(ENGINES[name].missing), reason=ENGINES[name].missing)
+        for name in names
+    }
+    return pytest.mark.parametrize(
+        "name", [pytest.param(name, marks=mark) for name, mark in marks.items()]
+    )
 
 
 ALL = [name for name, each in ENGINES.items() if each.needs]
@@ -53,14 +59,23 @@ BEST = [name for name in ALL if not name.endswith("-defaults")]
 
 def task_of(name, p, x0, t_end, step, interval=None):
     settings = ENGINES[name].at(step, p)
-    return Task(engine=name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval or step)
+    return Task(
+        engine=name,
+        parameters=p,
+        x0=x0,
+        t_end=t_end,
+        settings=settings,
+        sample_interval=interval or step,
+    )
 
 
 def simulated(*given, **more):
     return carry_out(task_of(*given, **more))
 
 
-@pytest.mark.parametrize("name", [name for name, each in ENGINES.items() if "timestep" in each.options])
+@pytest.mark.parametrize(
+    "name", [name for name, each in ENGINES.items() if "timestep" in each.options]
+)
 def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
     """By the same rule, before anything is written, and whether or not the engine is installed."""
     words = r"timestep = 0\.5 s is out of range: must be <= 0\.0357 s, half of sqrt\(R/g\), the shortest time of"
@@ -84,7 +99,9 @@ def test_errors_of_a_stationary_state_fall_with_the_step(name):
         assert seen.complete
         assert seen.cases[-1] is state.case
         assert seen.theta[-1] == pytest.approx(10.0 * x[2], rel=0.02)  # the azimuth isn't wrapped
-        forces = np.concatenate([seen.force_A[-1] - truth.force_A, seen.force_B[-1] - truth.force_B])
+        forces = np.concatenate(
+            [seen.force_A[-1] - truth.force_A, seen.force_B[-1] - truth.force_B]
+        )
         errors.append([seen.omega_c[-1] / x[2] - 1, np.abs(forces).max() / (p.m * p.g)])
     assert np.abs(errors[1]).max() < 2e-3
     assert np.abs(errors[1]) == pytest.approx(np.abs(errors[0]) / 2, rel=0.2, abs=2e-4)
@@ -95,7 +112,10 @@ def test_a_ball_lands_slips_and_sticks_when_it_should(name):
     """Where forces are not known cases are told by gaps and slip."""
     step, told = 1e-3, name in TOLD
     lasts = 0.3 if told else 0.5
-    truth, seen = analytic.simulate(P, LANDING.x0, lasts), simulated(name, P, LANDING.x0, lasts, step)
+    truth, seen = (
+        analytic.simulate(P, LANDING.x0, lasts),
+        simulated(name, P, LANDING.x0, lasts, step),
+    )
     assert seen.header.settings["cases_by"] == ("contact forces" if told else "gaps and slip")
     if told:
         assert seen.events.to_case.tolist() == truth.events.to_case.tolist()
@@ -117,8 +137,19 @@ def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
     # The step is of first order: a speed lacks up to what a step of the largest acceleration gives.
     slowed = resistance(np.hypot(x0[1], p.R * p.omega_0), p) * np.hypot(x0[1], p.R * p.omega_0)
     speed = step * np.hypot(p.g, slowed)
-    spin = 2 * speed / p.r + np.linalg.norm(to_world(x0, 0.0, p).spin) * lasts * speed / p.R  # keeps its way in space
-    allowed = [lasts * speed, 2 * speed, 2 * speed / (p.R - x0[6]), spin, spin, spin, lasts * speed, 2 * speed]
+    spin = (
+        2 * speed / p.r + np.linalg.norm(to_world(x0, 0.0, p).spin) * lasts * speed / p.R
+    )  # keeps its way in space
+    allowed = [
+        lasts * speed,
+        2 * speed,
+        2 * speed / (p.R - x0[6]),
+        spin,
+        spin,
+        spin,
+        lasts * speed,
+        2 * speed,
+    ]
     assert (np.abs(seen.x[-1] - truth.x[-1]) <= allowed).all()
     assert seen.theta[-1] == pytest.approx(truth.theta[-1], abs=lasts * speed / p.R)
 
@@ -137,7 +168,10 @@ def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name, monkeypatch):
 
     monkeypatch.setattr(adapter, "STIFFNESS", 1e12)
     seen = simulated(name, P.replace(omega_0=25.0), State(), 8.0, 4e-3)
-    assert "could not go on (MultibodyPlant's discrete update solver failed to converge" in seen.header.failure
+    assert (
+        "could not go on (MultibodyPlant's discrete update solver failed to converge"
+        in seen.header.failure
+    )
     assert 0 < len(seen.time) < 2000
 
 
@@ -146,8 +180,16 @@ def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name, monkeypatch):
     [
         ("pybullet", "", "pybullet is not installed: pip install pybullet"),
         ("dart-defaults", "", "dartpy is not installed: pip install dartpy"),
-        ("siconos", "", "siconos is not installed: on Debian or Ubuntu, apt-get install python3-siconos"),
-        ("siconos", "absent", "siconos is not installed for absent, which DUALBALL_SICONOS_PYTHON names"),
+        (
+            "siconos",
+            "",
+            "siconos is not installed: on Debian or Ubuntu, apt-get install python3-siconos",
+        ),
+        (
+            "siconos",
+            "absent",
+            "siconos is not installed for absent, which DUALBALL_SICONOS_PYTHON names",
+        ),
     ],
 )
 def test_what_is_not_installed_says_what_to_do(name, named, says, monkeypatch, capsys):
@@ -164,7 +206,9 @@ def test_what_is_not_installed_says_what_to_do(name, named, says, monkeypatch, c
 
 def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
     asked = []
-    monkeypatch.setattr("compare.validation.validate", lambda output, **given: asked.append(given["engine"]) or [])
+    monkeypatch.setattr(
+        "compare.validation.validate", lambda output, **given: asked.append(given["engine"]) or []
+    )
     for words in ("--engine drake", ""):
         assert told(capsys, f"validate {words} --workers 0 --json") == "[]"
     assert asked == [ENGINES["drake"], None]
@@ -175,14 +219,17 @@ OWN = "compare.adapters"
 
 @pytest.mark.parametrize("name", ["dart", "drake", "pybullet", "rapier", "sapien"])
 def test_an_engine_reaches_its_order(name):
-    """Semi-implicit steps are leapfrog where a sphere slides; a block that friction can hold rests."""
+    """Semi-implicit steps are leapfrog where a sphere slides; a block that friction can hold
+    rests."""
     pytest.importorskip(f"{OWN}.{name}")
     steps = {"sphere-slips-down": None, "block-rests": None, "cylinder": (4e-3, 2e-3)}
     with closing(EngineProcess(f"{OWN}.{name}:best")) as trial:
         falls, rests, turns = (trial.result(CASES[case], those) for case, those in steps.items())
     assert falls.error < 2e-3  # substeps of Rapier, and single precision
     assert rests.passed
-    assert turns.error < 2e-4 or turns.engine.precision == "f32"  # a wall that moves along is a cylinder to (omega h)^2
+    assert (
+        turns.error < 2e-4 or turns.engine.precision == "f32"
+    )  # a wall that moves along is a cylinder to (omega h)^2
     assert turns.error < 5e-3
     assert run(CASES["lands"], f"{OWN}.{name}:defaults", steps=(2e-3,)).error < 2
 
@@ -192,11 +239,13 @@ def test_under_coulombs_law_mujoco_is_right_in_every_case():
     with closing(EngineProcess(f"{OWN}.mujoco_free:best")) as mujoco:
         for case in cases():
             assert mujoco.result(case, (2e-3,)).error < TOLERANCE / 2, case.name
-        # A disc on its rim, whose gyroscopic moments are as large as those of its contact: 1.6e-2 without these.
+        # A disc on its rim, whose gyroscopic moments are as large as those of its contact: 1.6e-2
+        # without these.
         coarse, fine = mujoco.result(CASES["rolling-disc"], (4e-3, 2e-3)).errors
         assert coarse < 1e-3
         assert coarse / fine > 3.5
-        # A blow that lifts the ball off its floor: else gravity has it for up to a step and a half before, 2e-2.
+        # A blow that lifts the ball off its floor: else gravity has it for up to a step and a half
+        # before, 2e-2.
         assert max(mujoco.result(CASES["hits-the-wall"], (1.09e-3, 1e-3, 0.93e-3)).errors) < 2.5e-3
 
 
@@ -207,14 +256,18 @@ def test_engines_on_warp(engine):
     assert run(CASES["sphere-slips-down"], f"{OWN}.{engine}", steps=(2e-3,), limit=600).passed
 
 
-@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])
+@pytest.mark.parametrize(
+    "normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)]
+)
 def test_turns(normal):
     assert rotated(np.array(upright(normal)), np.array([0, 0, 1])) == pytest.approx(normal)
 
 
 def test_a_python_without_its_libraries_is_the_person_s_error(monkeypatch):
     monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
-    with pytest.raises(InputError, match=r"siconos ended \(ModuleNotFoundError: No module named 'siconos"):
+    with pytest.raises(
+        InputError, match=r"siconos ended \(ModuleNotFoundError: No module named 'siconos"
+    ):
         siconos.best.build(Vessel.of(P, State(), Flow.steady(1.0)), 1e-3)
 
 
@@ -223,20 +276,31 @@ def test_a_python_without_its_libraries_is_the_person_s_error(monkeypatch):
     [
         ("import os; os.abort()", "ended (exit code -6)"),
         ("raise ValueError('too much')", "ended (ValueError: too much)"),
-        ("""print('{"error": "RuntimeError: singular"}')""", "could not go on (RuntimeError: singular)"),
+        (
+            """print('{"error": "RuntimeError: singular"}')""",
+            "could not go on (RuntimeError: singular)",
+        ),
         ("import time; time.sleep(60)", "gave no answer for 2 s"),
-        ("for _ in range(3): print(STATE, flush=True), input(), print([], flush=True), input()", "diverged"),
+        (
+            "for _ in range(3): print(STATE, flush=True), input(), print([], flush=True), input()",
+            "diverged",
+        ),
     ],
 )
 def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monkeypatch):
     """Whatever it does in the first step; it is gone after that."""
     script, started, popen = tmp_path / "program.py", [], siconos.subprocess.Popen
     state = "STATE = '[[0, NaN, 0], [0, 0, 0], [0, 0, 0]]'"
-    script.write_text(f"{state}\nfor _ in range(2):\n    input()\n    print('null', flush=True)\ninput()\n{program}\n")
+    script.write_text(
+        f"{state}\nfor _ in range(2):\n    input()\n    print('null', "
+        f"flush=True)\ninput()\n{program}\n"
+    )
     monkeypatch.setattr(siconos, "PROGRAM", script)
     monkeypatch.setattr(siconos, "PATIENCE", 2)  # a loaded machine takes half a second to begin
     monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
-    monkeypatch.setattr(siconos.subprocess, "Popen", lambda *a, **b: started.append(popen(*a, **b)) or started[-1])
+    monkeypatch.setattr(
+        siconos.subprocess, "Popen", lambda *a, **b: started.append(popen(*a, **b)) or started[-1]
+    )
     task = Task(engine="siconos", parameters=P, x0=(0.0,) * 6, t_end=0.01, settings=Settings())
     run = carry_out(task)
     assert run.header.failure.startswith(says)
@@ -249,23 +313,32 @@ AGREE = 0.005  # difference of omega_c at the end, in units of omega_0, up to wh
 
 
 def ends(seed, step=1.25e-4):
-    """omega_c/omega_0 after a run of 2 s by each simulator, and by theory if the ball rolls on as long as it can."""
+    """omega_c/omega_0 after a run of 2 s by each simulator, and by theory if the ball rolls on as
+    long as it can."""
     p, x0 = random_start(seed, on_wall=True)
-    warnings.simplefilter("ignore", UserWarning)  # of contacts that chatter: what comes of it is to be seen
+    warnings.simplefilter(
+        "ignore", UserWarning
+    )  # of contacts that chatter: what comes of it is to be seen
     simulators = (
         analytic.simulate,
         partial(analytic.simulate, method="time-stepping", timestep=step),
         partial(mjsim.simulate, settings=ContactSettings.for_problem(p, step)),
         partial(analytic.simulate, leave_rolling="infeasible"),
     )
-    return [float(simulate(p, x0, 2.0, sample_interval=0.02).omega_c[-1]) / p.omega_0 for simulate in simulators]
+    return [
+        float(simulate(p, x0, 2.0, sample_interval=0.02).omega_c[-1]) / p.omega_0
+        for simulate in simulators
+    ]
 
 
 @pytest.mark.slow
 def test_three_simulators_agree_on_random_sets():
-    """But for two, at any step: undisturbed, a ball may roll on where a slight slip would grow (theory, section 7)."""
+    """But for two, at any step: undisturbed, a ball may roll on where a slight slip would grow
+    (theory, section 7)."""
     with ProcessPoolExecutor() as pool:
         found = np.array(list(pool.map(ends, range(250))))
     (differ,) = np.nonzero(np.ptp(found[:, :3], axis=1) > AGREE)
     assert len(differ) <= 2, differ
-    assert (np.abs(found[differ, 3] - found[differ, 0]) > AGREE).all()  # it is a question of rolling on
+    assert (
+        np.abs(found[differ, 3] - found[differ, 0]) > AGREE
+    ).all()  # it is a question of rolling on

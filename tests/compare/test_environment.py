@@ -1,4 +1,5 @@
-"""The program works in environments that are not a developer's: encodings, backends, closed outputs, no home."""
+"""The program works in environments that are not a developer's: encodings, backends, closed
+outputs, no home."""
 
 import codecs
 import os
@@ -22,10 +23,18 @@ def here(tmp_path_factory, stocked):
 
 
 def dualball(where, *words, before="", **environment):
-    """The program in a shell, after redirections; without what pytest's own environment says of output."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "LC_", "LANG"))}
+    """The program in a shell, after redirections; without what pytest's own environment says of
+    output."""
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHON", "LC_", "LANG"))
+    }
     shell = ["bash", "-c", f'"$@" {before}', "bash", sys.executable, "-m", "compare", *words]
-    own = {"PYTHONPATH": str(ROOT), "NUMBA_DISABLE_JIT": "1"} | environment  # to load what is compiled takes longer
+    own = {
+        "PYTHONPATH": str(ROOT),
+        "NUMBA_DISABLE_JIT": "1",
+    } | environment  # to load what is compiled takes longer
     done = subprocess.run(shell, cwd=where, env=kept | own, capture_output=True, timeout=120)
     assert b"Traceback" not in done.stdout + done.stderr, done.stderr
     assert b"Exception ignored" not in done.stderr
@@ -43,16 +52,24 @@ def test_any_encoding(here, encoding):
 
 
 def test_any_backend_and_no_home(here):
-    wild = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "MUJOCO_GL": "x", "HOME": "/nonexistent"}
+    wild = {
+        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+        "MUJOCO_GL": "x",
+        "HOME": "/nonexistent",
+    }
     assert dualball(here, "inspect", "run é.h5", "--plot", "run ü.png", **wild).returncode == 0
     assert (here / "run ü.png").stat().st_size > 10_000
 
 
 @pytest.mark.slow
 def test_no_place_for_what_is_compiled(here):
-    """As for a user without a home, of a package that root has installed: it is compiled each time."""
+    """As for a user without a home, of a package that root has installed: it is compiled each
+    time."""
     pytest.importorskip("numba")
-    nowhere = {"NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator", "NUMBA_CACHE_DIR": "/proc/nowhere"}
+    nowhere = {
+        "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator",
+        "NUMBA_CACHE_DIR": "/proc/nowhere",
+    }
     done = dualball(here, "simulate", "--time", "0.05", NUMBA_DISABLE_JIT="0", **nowhere)
     assert (done.returncode, done.stderr) == (0, b"")
 
@@ -61,7 +78,10 @@ def test_no_place_for_what_is_compiled(here):
 def test_a_full_output_is_said(here, words):
     done = dualball(here, words, before=">/dev/full")
     assert (done.returncode, done.stdout) == (2, b"")
-    assert done.stderr == b"dualball: error: cannot write to standard output: No space left on device\n"
+    assert (
+        done.stderr
+        == b"dualball: error: cannot write to standard output: No space left on device\n"
+    )
 
 
 def test_a_reader_that_has_gone_is_no_error(here):
@@ -71,9 +91,12 @@ def test_a_reader_that_has_gone_is_no_error(here):
 
 @pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
 def test_closed_outputs_take_nothing_with_them(here, closed):
-    """A file that is opened next would have their numbers, and what a library prints would go into it."""
+    """A file that is opened next would have their numbers, and what a library prints would go into
+    it."""
     path = here / "closed.h5"
-    assert dualball(here, "simulate", "--time", "0.05", "-o", str(path), before=closed).returncode == 0
+    assert (
+        dualball(here, "simulate", "--time", "0.05", "-o", str(path), before=closed).returncode == 0
+    )
     assert storage.load(path).complete
     assert dualball(here, "predict", "--nonsense", before=closed).returncode == 2
 
@@ -87,10 +110,16 @@ def test_a_directory_in_which_nothing_can_be_written(monkeypatch, capsys):
 
 
 def test_names_beyond_ascii_in_the_c_locale(here):
-    (here / "Würfel.xml").write_text(SCENE.replace("<geom type", '<geom name="Tür" type', 1), "utf-8")
+    (here / "Würfel.xml").write_text(
+        SCENE.replace("<geom type", '<geom name="Tür" type', 1), "utf-8"
+    )
     assert dualball(here, "forecast", "Würfel.xml", "-o", "Würfel.html", LC_ALL="C").returncode == 0
     assert "Würfel.xml" in (here / "Würfel.html").read_text("utf-8")
-    strict = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}  # as Python takes it only if it is told to
+    strict = {
+        "LC_ALL": "C",
+        "PYTHONUTF8": "0",
+        "PYTHONCOERCECLOCALE": "0",
+    }  # as Python takes it only if it is told to
     assert dualball(here, "simulate", "--time", "0.05", "-o", "läuft.h5", **strict).returncode == 0
     assert storage.load(here / "läuft.h5").complete
     assert dualball(here, "forecast", "Würfel.xml", **strict).returncode == 0

@@ -1,4 +1,5 @@
-"""Figures show theory by itself where nothing is measured, say their parameters, and put points on curves."""
+"""Figures show theory by itself where nothing is measured, say their parameters, and put points on
+curves."""
 
 import dataclasses
 import functools
@@ -30,7 +31,8 @@ DEPENDS = dict.fromkeys(FIGURES, "μηjκ") | {"fig-7": "μjκ", "fig-8": "jκ"}
 
 @pytest.fixture(autouse=True, scope="module")
 def few_points():
-    """A few orbits of the branch of hops, frequencies of pulsation and starts of hops: theory takes long for each."""
+    """A few orbits of the branch of hops, frequencies of pulsation and starts of hops: theory takes
+    long for each."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(attractors, "STARTS", 2)
         patch.setattr(orbit_branch, "follow", functools.partial(orbit_branch.follow, most=2))
@@ -66,7 +68,9 @@ def test_special_points_lie_on_curves(name):
         begin = np.concatenate([xy[:-1] for xy in curves])
         step = np.concatenate([np.diff(xy, axis=0) for xy in curves])
         for dot in dots:
-            along = np.clip(np.sum((dot - begin) * step, 1) / np.maximum(np.sum(step**2, 1), 1e-300), 0, 1)
+            along = np.clip(
+                np.sum((dot - begin) * step, 1) / np.maximum(np.sum(step**2, 1), 1e-300), 0, 1
+            )
             assert np.linalg.norm(begin + along[:, None] * step - dot, axis=1).min() < 1e-3
 
 
@@ -101,7 +105,9 @@ def test_names_of_curves_stay_within_the_axes(name):
 
 
 def test_deviations_are_drawn_over_tolerance():
-    near, far, equal, count = (check(10.0, predicted) for predicted in (10.0 - 1.5e-9, 9.0, 10.0, 10.0))
+    near, far, equal, count = (
+        check(10.0, predicted) for predicted in (10.0 - 1.5e-9, 9.0, 10.0, 10.0)
+    )
     count = dataclasses.replace(count, tolerance=0.0)
     drawing = figures_of("x")["claim-x"]
     figure, caption = drawing.draw(drawing.select(Evidence({"x": (near, far, equal, count)})))
@@ -119,13 +125,17 @@ def test_a_fall_that_did_not_happen_is_a_gap():
     p = Parameters.named("high-wall-friction")
     run = analytic.simulate(p, [0, 0, p.omega_0, 0, 0, 0], 0.1)
     with pytest.raises(GapError, match="never landed"):
-        flowmeter.draw_fall(Diagram("unloading", p, motions=(Motion("rolling", "event", p, lambda: run),)))
+        flowmeter.draw_fall(
+            Diagram("unloading", p, motions=(Motion("rolling", "event", p, lambda: run),))
+        )
 
 
 def test_claims_have_their_own_figures_or_deviations():
     assert list(figures_of("slip-NR-NS")) == ["fig-4", "fig-5", "claim-slip-NR-NS"]
     assert list(figures_of("fig-13-right")) == ["fig-13-right", "unloading"]
-    assert {name for drawing in FIGURES.values() for name in drawing.claims} <= {claim.id for claim in CLAIMS}
+    assert {name for drawing in FIGURES.values() for name in drawing.claims} <= {
+        claim.id for claim in CLAIMS
+    }
     pickle.dumps(FIGURES)  # other processes draw them for the report
 
 
@@ -136,7 +146,11 @@ def test_figures_are_written_and_gaps_named(tmp_path, monkeypatch):
         "fig-9": "",
         "characteristic": "not drawn: no settled states were measured with its parameter sets",
     }
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-9.png", "fig-9.svg"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "captions.txt",
+        "fig-9.png",
+        "fig-9.svg",
+    ]
     assert "Stationary solutions off the floor" in (tmp_path / "captions.txt").read_text("utf-8")
     with pytest.raises(InputError, match="bmp"):
         list(registry.write(tmp_path, registry.of_results(Evidence()), ("bmp",)))
@@ -146,12 +160,27 @@ def test_figures_are_written_and_gaps_named(tmp_path, monkeypatch):
 
 
 def test_figures_of_a_set_of_ones_own(tmp_path, capsys, monkeypatch):
-    """All that theory alone can draw, by the friction of its wall, and why the others aren't drawn."""
-    monkeypatch.setattr("compare.kit.drawing.save", lambda figure, path: path.touch())  # takes half of the time
-    drawn = {"fig-4", "fig-5", "fig-7", "fig-8", "fig-9", "fig-11", "fig-13-right", "unloading", "pulsation"}
+    """All that theory alone can draw, by the friction of its wall, and why the others aren't
+    drawn."""
+    monkeypatch.setattr(
+        "compare.kit.drawing.save", lambda figure, path: path.touch()
+    )  # takes half of the time
+    drawn = {
+        "fig-4",
+        "fig-5",
+        "fig-7",
+        "fig-8",
+        "fig-9",
+        "fig-11",
+        "fig-13-right",
+        "unloading",
+        "pulsation",
+    }
     said = told(capsys, f"figures --set high-wall-friction -o {tmp_path / 'rough'}")
     assert {path.stem for path in (tmp_path / "rough").glob("*.svg")} == drawn
-    assert said.count(": not drawn: ") == len(registry.of_set(Parameters.named("reference"))) - len(drawn)
+    assert said.count(": not drawn: ") == len(registry.of_set(Parameters.named("reference"))) - len(
+        drawn
+    )
     Parameters.named("reference").replace(mu=0.0, eta=0.0).save(tmp_path / "slick.toml")
     said = told(capsys, f"figures --parameters {tmp_path / 'slick.toml'} -o {tmp_path / 'slick'}")
     assert said.count("has not all thresholds") >= 5
@@ -178,7 +207,10 @@ def test_functions_draw_into_axes_that_are_given_or_new():
 @pytest.mark.parametrize(
     ("draw", "said"),
     [
-        (lambda p, run: plot.figure("fig-11", p), "fig-11 can't be drawn of this set: it is for η > j"),
+        (
+            lambda p, run: plot.figure("fig-11", p),
+            "fig-11 can't be drawn of this set: it is for η > j",
+        ),
         (lambda p, run: plot.motion(run, "y", "omega_c"), "different units"),
         (lambda p, run: plot.motion(run, "force_A"), "unknown quantity of a motion"),
         (lambda p, run: plot.motion(run.to_xarray().drop_dims("axis")), "makes a table of it"),

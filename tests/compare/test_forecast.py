@@ -1,4 +1,5 @@
-"""Forecasts of contacts stand beside what MuJoCo does in small scenes, and their advice does what it says.
+"""Forecasts of contacts stand beside what MuJoCo does in small scenes, and their advice does what
+it says.
 
 Settings of an MJCF file reach the engine of the league as MuJoCo itself reads them.
 """
@@ -36,7 +37,9 @@ def mjcf(world, option="", geom='friction=".6"', rest="", flag=""):
 
 
 ON_SLOPE = SLOPE + box()
-STACK = SLOPE + "".join(box(f"{0.0135 + k * 0.0263} 0 {0.0525 + k * 0.0967}", name=f"box{k}") for k in range(4))
+STACK = SLOPE + "".join(
+    box(f"{0.0135 + k * 0.0263} 0 {0.0525 + k * 0.0967}", name=f"box{k}") for k in range(4)
+)
 FINGER = (
     '<body name="{0}" pos="{1} 0 .2"><joint name="{0}" type="slide" axis="1 0 0" damping="20"/>'
     '<geom name="{0}" type="box" size=".01 .03 .03" mass=".2"/></body>'
@@ -51,31 +54,41 @@ WHEEL = (
     '<body pos="{0} {1} 0"><joint axis="0 1 0" frictionloss="1"/>'
     '<geom name="wheel{2}" type="cylinder" size=".05 .02" euler="90 0 0" mass=".3"/></body>'
 )
-WHEELS = "".join(WHEEL.format(x, y, k) for k, (x, y) in enumerate(itertools.product((-0.1, 0.1), (-0.11, 0.11))))
+WHEELS = "".join(
+    WHEEL.format(x, y, k) for k, (x, y) in enumerate(itertools.product((-0.1, 0.1), (-0.11, 0.11)))
+)
 CART = (
-    f'<body pos=".013 0 .0515" euler="0 15 0"><freejoint/><geom type="box" size=".15 .08 .02" mass="2"/>{WHEELS}</body>'
+    '<body pos=".013 0 .0515" euler="0 15 0"><freejoint/><geom type="box" size=".15 .08 .02" '
+    f'mass="2"/>{WHEELS}</body>'
 )
 SCENES = {
     "slope": mjcf(ON_SLOPE, 'cone="elliptic"'),
     "slope, pyramidal": mjcf(ON_SLOPE),
     "slope, pyramidal, condim 4": mjcf(ON_SLOPE, geom='friction=".6" condim="4"'),
     "slope, pyramidal, springs": mjcf(ON_SLOPE, geom='friction=".6" solref="-5000 -100"'),
-    "slope, pyramidal, discrete": mjcf(ON_SLOPE, 'integrator="discrete"', 'friction=".6" solref=".01 .7"'),
+    "slope, pyramidal, discrete": mjcf(
+        ON_SLOPE, 'integrator="discrete"', 'friction=".6" solref=".01 .7"'
+    ),
     "slope, implicitfast, wide impedance": mjcf(
-        ON_SLOPE, 'cone="elliptic" integrator="implicitfast"', 'friction=".6" solimp=".3 .9 .004 .4 3"'
+        ON_SLOPE,
+        'cone="elliptic" integrator="implicitfast"',
+        'friction=".6" solimp=".3 .9 .004 .4 3"',
     ),
     "slope, RK4": mjcf(ON_SLOPE, 'cone="elliptic" integrator="RK4"'),
     "slope, PGS": mjcf(ON_SLOPE, 'cone="elliptic" solver="PGS" iterations="400" tolerance="0"'),
     "slope, noslip": mjcf(ON_SLOPE, 'cone="elliptic" noslip_iterations="30" noslip_tolerance="0"'),
     "slope, pair": mjcf(ON_SLOPE, 'cone="elliptic" impratio="3"', rest=PAIR.format("-1 -60")),
-    "slope, margin": mjcf(ON_SLOPE, 'cone="elliptic" integrator="implicit"', 'friction=".6" margin=".002"'),
+    "slope, margin": mjcf(
+        ON_SLOPE, 'cone="elliptic" integrator="implicit"', 'friction=".6" margin=".002"'
+    ),
     "stack": mjcf(STACK, 'cone="elliptic" impratio="5"'),
     "gripper": mjcf(GRIPPER, 'cone="elliptic" impratio="10"', rest=SQUEEZE),
     "ball held by rolling friction": mjcf(BALL, 'cone="elliptic" impratio="3"'),
     "ball held by rolling friction, pyramidal": mjcf(BALL),
     "wheels held by dry friction": mjcf(SLOPE + CART, 'cone="elliptic" impratio="20"'),
     "hidden mix": mjcf(
-        FLOOR.format('solref=".004 1" friction=".3" euler="0 12 0"') + box(".01 0 .0525", angle="0 12 0")
+        FLOOR.format('solref=".004 1" friction=".3" euler="0 12 0"')
+        + box(".01 0 .0525", angle="0 12 0")
     ),
 }
 
@@ -86,7 +99,11 @@ def settled(text, limit=10.0, control=None):
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
-    return model, data, forecast.forecast(model, data, settle(model, data, limit, control), control=control)
+    return (
+        model,
+        data,
+        forecast.forecast(model, data, settle(model, data, limit, control), control=control),
+    )
 
 
 @pytest.fixture
@@ -102,7 +119,9 @@ def forecasts(tmp_path, capsys):
     return forecasts
 
 
-UNADVISED = mock.patch.object(forecast.advice, "best_change", mock.Mock(return_value=(None, {"creep": np.zeros(1)})))
+UNADVISED = mock.patch.object(
+    forecast.advice, "best_change", mock.Mock(return_value=(None, {"creep": np.zeros(1)}))
+)
 """Without advice, whose search takes most of the time."""
 
 
@@ -116,11 +135,16 @@ def test_depth_creep_and_turning_are_as_predicted(scene):
         assert pair.depth == pytest.approx(pair.depth_measured, rel=5e-2)
         # Round-off of a place, over the window.
         assert pair.creep == pytest.approx(pair.creep_measured, rel=1e-2, abs=1e-11)
-        assert pair.turning == pytest.approx(pair.turning_measured, rel=1e-2, abs=STILL, nan_ok=True)
+        assert pair.turning == pytest.approx(
+            pair.turning_measured, rel=1e-2, abs=STILL, nan_ok=True
+        )
 
 
-# A body that a moving floor drags under a guide; how far its place is from where it was put, and its pair.
-GUIDED = '<body pos="0 0 .0495"><joint type="slide" axis="0 0 1"/><geom name="box" {} mass="1"/></body>'
+# A body that a moving floor drags under a guide; how far its place is from where it was put, and
+# its pair.
+GUIDED = (
+    '<body pos="0 0 .0495"><joint type="slide" axis="0 0 1"/><geom name="box" {} mass="1"/></body>'
+)
 SLIDING = {
     "elliptic": ('cone="elliptic"', 'friction=".6"', SPHERE),
     "springs": ('cone="elliptic"', 'friction=".3" solref="-3000 -80"', SPHERE),
@@ -140,7 +164,11 @@ def test_contact_is_lost_from_the_predicted_speed_on(name):
     model, data, found = settled(mjcf(floor + GUIDED.format(shape), option, geom, rest))
     predicted = found.pairs[0].hover
     first, second = data.contact.frame[0].reshape(3, 3)[1:]
-    direction = (first + second) / math.sqrt(2) if model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL else first
+    direction = (
+        (first + second) / math.sqrt(2)
+        if model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+        else first
+    )
     for share, lost in ((0.95, False), (1.05, True)):
         for speed in np.linspace(0.1, share, 20) * predicted:
             model.geom_surfacevel[0, :3] = speed * direction
@@ -159,7 +187,9 @@ STEPS = {
     "springs, pyramidal": mjcf(LEVEL, geom='solref="-5000 -100"'),
     "springs, little damping": mjcf(LEVEL, 'cone="elliptic"', 'solref="-5000 -10"'),
     "springs, RK4": mjcf(LEVEL, 'cone="elliptic" integrator="RK4"', 'solref="-5000 -100"'),
-    "springs, gripper": mjcf(GRIPPER, 'cone="elliptic" impratio="10"', 'friction=".6" solref="-20000 -200"', SQUEEZE),
+    "springs, gripper": mjcf(
+        GRIPPER, 'cone="elliptic" impratio="10"', 'friction=".6" solref="-20000 -200"', SQUEEZE
+    ),
     "friction": mjcf(LEVEL, 'cone="elliptic"', rest=PAIR.format("-1 -90")),
     "refsafe off": mjcf(LEVEL, 'cone="elliptic"', 'solref=".004 1"', flag=UNSAFE),
     "low impedance": mjcf(LEVEL, 'cone="elliptic"', 'solimp=".1 .1 .001"'),
@@ -193,7 +223,9 @@ QUICK = ("slope", "gripper", "ball held by rolling friction", "deep", "slope, py
 ADVISED = [name for name in SCENES | DEEP if name != "slope, noslip"]
 
 
-@pytest.mark.parametrize("scene", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in ADVISED])
+@pytest.mark.parametrize(
+    "scene", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in ADVISED]
+)
 def test_advice_does_what_it_says(scene):
     model, data, found = settled((SCENES | DEEP)[scene])
     found, after, held = forecast.follow_advice(model, data, found, 10.0)
@@ -202,7 +234,11 @@ def test_advice_does_what_it_says(scene):
     assert change
     assert change.found == pytest.approx(change.after, rel=0.2)
     assert change.found < change.before / 1.4
-    assert bool(found.remedy) == bool(held) == (max(pair.creep for pair in after.pairs) > forecast.CREEP)
+    assert (
+        bool(found.remedy)
+        == bool(held)
+        == (max(pair.creep for pair in after.pairs) > forecast.CREEP)
+    )
     for pair in held.pairs if held else ():
         assert pair.creep == 0
         assert pair.creep_measured < 1e-3 * forecast.CREEP
@@ -237,9 +273,14 @@ def test_the_page_the_json_and_what_the_engine_replaces(forecasts, tmp_path):
     text = SCENES["hidden mix"].replace("<option ", '<option timestep=".008" ')
     shown = forecasts(text, "--try", "--json", "-o", str(page := tmp_path / "page.html"))
     (pair,) = shown["before"]["pairs"]
-    assert shown["after"]["pairs"][0]["creep_measured"] == pytest.approx(shown["before"]["change"]["after"], rel=0.2)
+    assert shown["after"]["pairs"][0]["creep_measured"] == pytest.approx(
+        shown["before"]["change"]["after"], rel=0.2
+    )
     assert [kind.partition(" ")[0] for kind in pair["replaced"]] == ["solref", "solref", "friction"]
-    assert pair["replaced"]["solref too short for the time step"] == "0.012 s: 0.016 s is taken (refsafe)"
+    assert (
+        pair["replaced"]["solref too short for the time step"]
+        == "0.012 s: 0.016 s is taken (refsafe)"
+    )
     assert "To paste: MJCF" in page.read_text("utf-8")
 
 
@@ -250,7 +291,13 @@ def test_eighty_contacts_stay_readable():
     _, _, found = settled(mjcf(FLOOR.format('solref=".03 1"') + boxes), limit=2.0)
     assert sum(len(pair.members) for pair in found.pairs) == 80
     assert [len(rows) for _, rows in forecast_page.tables(found)] == [forecast.SHOWN + 1] * 2
-    assert sum("replaces solref" in line and "at 19 more" in line for line in forecast_page.sentences(found)) == 1
+    assert (
+        sum(
+            "replaces solref" in line and "at 19 more" in line
+            for line in forecast_page.sentences(found)
+        )
+        == 1
+    )
 
 
 TURNING = f'<body pos="0 0 .0499"><joint axis="0 0 1"/><geom name="box" {BLOCK} mass="1"/></body>'
@@ -258,7 +305,9 @@ ACROSS = TURNING.replace("<joint ", '<joint type="slide" ').replace("0 0 1", "1 
 ODD = {
     mjcf(GROUND + TURNING): "No joint can part these",
     mjcf(GROUND + ACROSS): "No joint can part these",
-    mjcf(ON_SLOPE, 'cone="elliptic" sleep_tolerance=".01"', flag='<flag sleep="enable"/>'): "sleep.* body 'box'",
+    mjcf(
+        ON_SLOPE, 'cone="elliptic" sleep_tolerance=".01"', flag='<flag sleep="enable"/>'
+    ): "sleep.* body 'box'",
 }
 
 
@@ -273,7 +322,9 @@ def test_what_no_joint_can_part_or_sleeps_has_a_forecast_nevertheless(text):
 
 
 def test_what_rattles_is_measured_by_means_and_ends_with_1(forecasts):
-    (pair,) = forecasts(mjcf(LEVEL, geom='solref="-5000 0"'), "--settle", "1", "--json", code=1)["before"]["pairs"]
+    (pair,) = forecasts(mjcf(LEVEL, geom='solref="-5000 0"'), "--settle", "1", "--json", code=1)[
+        "before"
+    ]["pairs"]
     assert pair["moves"]
     assert pair["creep"] is None
     assert pair["load"] == pytest.approx(9.81, rel=2e-2)
@@ -322,7 +373,9 @@ def test_controls_come_by_number_name_or_keyframe_and_bad_ones_get_one_line(fore
         assert said in error
         assert error.count("\n") == 1
     words = ["--keyframe", "held", "--max-creep"]
-    assert re.search(r"rod / left: creep 0.000\d+ m/s, more than 1e-06", forecasts(text, *words, "1e-6", code=1))
+    assert re.search(
+        r"rod / left: creep 0.000\d+ m/s, more than 1e-06", forecasts(text, *words, "1e-6", code=1)
+    )
     forecasts(text, *words, "1e-3", "--max-depth", "1e-3")
 
 
@@ -330,10 +383,13 @@ def test_controls_come_by_number_name_or_keyframe_and_bad_ones_get_one_line(fore
 def test_a_contact_counts_from_a_thousandth_of_the_lighter_bodys_weight():
     wall = '<geom name="wall" type="plane" size="1 1 .1" euler="0 90 0"/>'
     leaning = (
-        '<body pos=".05 0 1"><joint type="slide" axis="1 0 0" stiffness="1" damping="1" springref="{}"/>'
+        '<body pos=".05 0 1"><joint type="slide" axis="1 0 0" stiffness="1" damping="1" '
+        'springref="{}"/>'
         '<geom name="ball" size=".05" mass="1"/></body>'
     )
-    assert settled(mjcf(wall + leaning.format(-0.02)))[2].pairs[0].load == pytest.approx(0.02, rel=1e-2)
+    assert settled(mjcf(wall + leaning.format(-0.02)))[2].pairs[0].load == pytest.approx(
+        0.02, rel=1e-2
+    )
     with pytest.raises(InputError, match="nothing touches"):
         settled(mjcf(wall + leaning.format(-0.005)))
 
@@ -356,13 +412,22 @@ def read(tmp_path, text):
 
 
 def test_the_league_takes_the_settings_of_a_file(tmp_path, capsys, monkeypatch):
-    """A block on a slope creeps as MuJoCo comes and holds with a cone; the step is that of the file."""
-    monkeypatch.setattr("compare.bench.league.cases", lambda: [CASES["block-rests"], CASES["rolls-on-both"]])
-    (tmp_path / "mine.xml").write_text(mjcf(GROUND + SMALL, 'timestep="0.001" cone="elliptic" impratio="100"'))
-    words = f"league --settings {tmp_path / 'mine.xml'} --engine mujoco-defaults -o {tmp_path} --json"
+    """A block on a slope creeps as MuJoCo comes and holds with a cone; the step is that of the
+    file."""
+    monkeypatch.setattr(
+        "compare.bench.league.cases", lambda: [CASES["block-rests"], CASES["rolls-on-both"]]
+    )
+    (tmp_path / "mine.xml").write_text(
+        mjcf(GROUND + SMALL, 'timestep="0.001" cone="elliptic" impratio="100"')
+    )
+    words = (
+        f"league --settings {tmp_path / 'mine.xml'} --engine mujoco-defaults -o {tmp_path} --json"
+    )
     found = json.loads(told(capsys, words))["engines"]
     assert list(found) == ["mine", "mujoco-defaults"]
-    mine, usual = ({result["case"]: result for result in results}["block-rests"] for results in found.values())
+    mine, usual = (
+        {result["case"]: result for result in results}["block-rests"] for results in found.values()
+    )
     assert mine["steps"] == [0.001]
     assert "no wall" in mine["engine"]["note"]
     assert mine["errors"][-1] < usual["errors"][-1] / 30
@@ -372,24 +437,39 @@ def test_settings_come_through_to_the_engine_and_geoms_are_mixed_as_it_does(tmp_
     """Against the contacts that MuJoCo itself makes."""
     text = mjcf(
         '<geom name="floor" type="plane" size="1 1 1" solref="0.01 0.9" solmix="3" margin="0.001"/>'
-        '<geom name="wall" type="box" size="0.1 1 1" pos="0.1095 0 0" solimp="0.5 0.6 0.01" priority="1"/>'
-        '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 1.1"/></body>',
-        'integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" tolerance="1e-5" '
+        '<geom name="wall" type="box" size="0.1 1 1" pos="0.1095 0 0" solimp="0.5 0.6 0.01" '
+        'priority="1"/>'
+        '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 '
+        '1.1"/></body>',
+        'integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" '
+        'tolerance="1e-5" '
         'noslip_iterations="2"',
     )
-    given, body = mujoco.MjModel.from_xml_string(text), Bodies("mine", "", tune=read(tmp_path, text).tune)
+    given, body = (
+        mujoco.MjModel.from_xml_string(text),
+        Bodies("mine", "", tune=read(tmp_path, text).tune),
+    )
     data = mujoco.MjData(given)
     mujoco.mj_forward(given, data)
     assert data.ncon == 2
     body.build(CASES["rolls-on-both"], 0.0015)
     model, option = body.model, body.model.opt
     assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
-    assert (option.impratio, option.iterations, option.cone) == (7.0, 33, mujoco.mjtCone.mjCONE_ELLIPTIC)
-    assert (option.integrator, option.solver) == (mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtSolver.mjSOL_CG)
+    assert (option.impratio, option.iterations, option.cone) == (
+        7.0,
+        33,
+        mujoco.mjtCone.mjCONE_ELLIPTIC,
+    )
+    assert (option.integrator, option.solver) == (
+        mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+        mujoco.mjtSolver.mjSOL_CG,
+    )
     assert model.npair >= 2
     for k, geom in enumerate(model.pair_geom1):
         floor = model.geom(geom).name == "floor"
-        (contact,) = (each for each in data.contact if (given.geom("floor").id in each.geom) == floor)
+        (contact,) = (
+            each for each in data.contact if (given.geom("floor").id in each.geom) == floor
+        )
         assert model.pair_solref[k] == pytest.approx(contact.solref)
         assert model.pair_solimp[k] == pytest.approx(contact.solimp)
         assert model.pair_margin[k] == pytest.approx(contact.includemargin)
@@ -401,7 +481,10 @@ def test_settings_come_through_to_the_engine_and_geoms_are_mixed_as_it_does(tmp_
         (mjcf(GROUND), "there is no ball"),
         (mjcf(SMALL), "the ball has no contacts"),
         (mjcf(GROUND + SMALL, flag='<flag contact="disable"/>'), "the ball has no contacts"),
-        (mjcf(GROUND + SMALL.replace("ball", "a") + SMALL.replace("ball", "b")), "there are 2 spheres that move"),
+        (
+            mjcf(GROUND + SMALL.replace("ball", "a") + SMALL.replace("ball", "b")),
+            "there are 2 spheres that move",
+        ),
         (mjcf(GROUND + SMALL, 'tolerance="-1"'), "tolerance = -1 is out of range: must be >= 0"),
     ],
 )
@@ -414,7 +497,10 @@ def test_files_without_such_contacts(tmp_path, text, message):
 @pytest.mark.parametrize(
     ("world", "lacks"),
     [
-        *((GROUND + SMALL.replace(">", f' pos="0 0 {z}">', 1), "no wall .* floor") for z in (-0.004, 0, 0.0099, 1)),
+        *(
+            (GROUND + SMALL.replace(">", f' pos="0 0 {z}">', 1), "no wall .* floor")
+            for z in (-0.004, 0, 0.0099, 1)
+        ),
         (WALL + SMALL, "no floor .* its wall"),
         (GROUND + WALL + SMALL, "^$"),
     ],

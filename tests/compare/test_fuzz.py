@@ -1,4 +1,5 @@
-"""Damaged files: one clear line or the right result, never a traceback, a wrong number or a file elsewhere."""
+"""Damaged files: one clear line or the right result, never a traceback, a wrong number or a file
+elsewhere."""
 
 import re
 import shutil
@@ -27,13 +28,23 @@ ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.
 
 
 def mutated(data, rng):
-    """A few stretches of bytes changed, zeroed, removed, doubled or replaced by a word, rarely the end cut off."""
+    """A few stretches of bytes changed, zeroed, removed, doubled or replaced by a word, rarely the
+    end cut off."""
     content = bytearray(data)
     for _ in range(rng.integers(1, 4)):
         at, length = int(rng.integers(len(content) + 1)), int(rng.integers(1, 33))
         old = content[at : at + length]
-        word = rng.choice([b"=", b"\n", b"nan", b"-", b"1e999", b"[x]", b'"', b"\0", b"\xff", b"inf"])
-        new = [bytes(byte ^ 1 for byte in old[:1]) + old[1:], rng.bytes(len(old)), bytes(len(old)), b"", 2 * old, word]
+        word = rng.choice(
+            [b"=", b"\n", b"nan", b"-", b"1e999", b"[x]", b'"', b"\0", b"\xff", b"inf"]
+        )
+        new = [
+            bytes(byte ^ 1 for byte in old[:1]) + old[1:],
+            rng.bytes(len(old)),
+            bytes(len(old)),
+            b"",
+            2 * old,
+            word,
+        ]
         content[at : at + length] = new[rng.integers(len(new))]
         if rng.random() < 0.03:
             del content[at:]
@@ -44,7 +55,9 @@ def mutated(data, rng):
 def files(tmp_path_factory, stocked):
     """A file of every kind, by what it is; the run of theory has several chunks."""
     made = tmp_path_factory.mktemp("whole")
-    kept = {name: made / f"{name}.h5" for name in ("theory", "mujoco", "batch", "collection", "means")}
+    kept = {
+        name: made / f"{name}.h5" for name in ("theory", "mujoco", "batch", "collection", "means")
+    }
     theory = analytic.simulate(P, State(), 5.0, sample_interval=1e-3)
     runs = {"a": theory, "b": analytic.simulate(P.replace(mu=0.3), State(), 1.0)}
     storage.save(theory, kept["theory"])
@@ -66,7 +79,8 @@ def edited(path):
 
 
 def refusals(path, mutants, read):
-    """What is said where damaged contents of a file are refused: a line that names a file there; nothing is left."""
+    """What is said where damaged contents of a file are refused: a line that names a file there;
+    nothing is left."""
     said, beside = [], sorted(path.parent.iterdir())
     for content in mutants:
         path.write_bytes(content)
@@ -133,7 +147,9 @@ def test_every_command_names_the_damaged_file(tmp_path, stocked, files, capsys, 
 
 @pytest.mark.parametrize("count", [20, pytest.param(500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("engine", ["theory", "mujoco"])
-def test_a_header_that_says_something_else_is_shown_or_refused(tmp_path, files, capsys, engine, count):
+def test_a_header_that_says_something_else_is_shown_or_refused(
+    tmp_path, files, capsys, engine, count
+):
     """With a checksum that fits, so that what the header says is read."""
     if engine == "mujoco":
         told(capsys, f"simulate --time 0.05 -o {files[engine]}")
@@ -148,7 +164,10 @@ def test_a_header_that_says_something_else_is_shown_or_refused(tmp_path, files, 
                 file.attrs[name] = text.replace("\0", "?")
             yield path.read_bytes()
 
-    assert len(refusals(path, headers(), lambda path: motions.table(motions.describe(path)))) > count / 4
+    assert (
+        len(refusals(path, headers(), lambda path: motions.table(motions.describe(path))))
+        > count / 4
+    )
 
 
 @pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.slow)])
@@ -183,13 +202,18 @@ def foreign(tmp_path):
     """A motion as another program keeps it, without a checksum."""
     path = tmp_path / "foreign.h5"
     with h5py.File(path, "w") as file:
-        file["time"], file["omega_c"] = np.linspace(0.0, 1.0, SAMPLES), np.linspace(10.0, 11.0, SAMPLES)
+        file["time"], file["omega_c"] = (
+            np.linspace(0.0, 1.0, SAMPLES),
+            np.linspace(10.0, 11.0, SAMPLES),
+        )
     return path
 
 
 @ENOUGH
 def test_a_damaged_file_of_another_program_is_read_or_refused_in_a_line(foreign, count):
-    assert len(refusals(foreign, mutants(foreign.read_bytes(), 5, count), testing.read)) > count / 10
+    assert (
+        len(refusals(foreign, mutants(foreign.read_bytes(), 5, count), testing.read)) > count / 10
+    )
 
 
 def virtual(file, secret):
@@ -221,7 +245,8 @@ def test_nothing_in_a_run_is_followed_to_another_file(tmp_path, stocked, capsys,
     [
         *((outside, "'y'") for outside in (virtual, link, external)),
         (lambda file, _: file.create_dataset("y", (4 * 10**9,), float, chunks=(1000,)), "4e+09 samples, and 1e+07 are"),
-        *((lambda file, _, data=data: file.create_dataset("y", data=data), "'y' is no column of numbers")
+        *((lambda file, _, data=data: file.create_dataset("y", data=data), "'y' is no column of "
+                                                                           "numbers")
           for data in (["a", "b"], np.ones((SAMPLES, 3)), 1.0)),
     ],
 )  # fmt: skip
@@ -229,4 +254,7 @@ def test_what_is_no_column_of_a_foreign_file_is_said(foreign, stocked, capsys, a
     told(capsys, f"compare {foreign} {foreign}")
     with h5py.File(foreign, "r+") as file:
         add(file, stocked / "runs" / "one.h5")
-    assert re.search(f"cannot read {foreign}: .*{re.escape(says)}", refused(capsys, f"compare {foreign} {foreign}"))
+    assert re.search(
+        f"cannot read {foreign}: .*{re.escape(says)}",
+        refused(capsys, f"compare {foreign} {foreign}"),
+    )

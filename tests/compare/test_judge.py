@@ -1,4 +1,5 @@
-"""A verdict is computed from the numbers, and can be lost in every way; what bears on claims is listed whole."""
+"""A verdict is computed from the numbers, and can be lost in every way; what bears on claims is
+listed whole."""
 
 from __future__ import annotations
 
@@ -52,7 +53,10 @@ def test_a_verdict_is_computed_from_the_numbers(value, uncertainty, expected):
 
 
 def test_without_measurements_it_was_not_run_and_the_reason_is_kept():
-    why, other = Missing("settled", "mine", "nothing settles"), Missing("other", "mine", "no matter")
+    why, other = (
+        Missing("settled", "mine", "nothing settles"),
+        Missing("other", "mine", "no matter"),
+    )
     (verdict,) = judge([claim()], Records((), (why, other, why)))
     assert verdict.outcome is Outcome.NOT_RUN
     assert verdict.missing == (replace(why, rows=2),)
@@ -71,7 +75,11 @@ def test_most_numbers_must_be_fine_enough_to_tell():
 def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only():
     claims = [claim(lambda m: {}["no such state"]), claim(lambda m: 1 / 0), claim()]
     unknown, broken, right = judge(claims, measured(P.omega_0, FINE))
-    assert [v.outcome for v in (unknown, broken, right)] == [Outcome.REFUTED, Outcome.ERROR, Outcome.CONFIRMED]
+    assert [v.outcome for v in (unknown, broken, right)] == [
+        Outcome.REFUTED,
+        Outcome.ERROR,
+        Outcome.CONFIRMED,
+    ]
     assert unknown.worst == math.inf
     assert "division by zero" in broken.error
 
@@ -87,7 +95,9 @@ def test_bounds_hold_on_one_side_and_what_must_be_equal_has_no_tolerance():
 
 
 def test_a_prediction_may_be_uncertain_itself():
-    (verdict,) = judge([claim(lambda m: Measured(P.omega_0 + 1e-7, 1e-7))], measured(P.omega_0, FINE / 100))
+    (verdict,) = judge(
+        [claim(lambda m: Measured(P.omega_0 + 1e-7, 1e-7))], measured(P.omega_0, FINE / 100)
+    )
     assert verdict.outcome is Outcome.CONFIRMED
     assert verdict.checks[0].tolerance == pytest.approx(COVERAGE * 1e-7, rel=1e-3)
 
@@ -111,7 +121,9 @@ def test_predictions_are_forgotten_between_judgements():
 def test_claims_that_are_none_are_refused():
     with pytest.raises(InputError, match="omega_c"):
         claim(quantity="omega_cc")
-    assert Claim(id="it", section="", source="", statement="", algebra=lambda: []).text is Text.FORMAL
+    assert (
+        Claim(id="it", section="", source="", statement="", algebra=lambda: []).text is Text.FORMAL
+    )
     with pytest.raises(ValueError, match="formal"):
         Claim(id="it", section="", source="", statement="")
     with pytest.raises(InputError, match="did you mean"):
@@ -119,14 +131,18 @@ def test_claims_that_are_none_are_refused():
 
 
 def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
-    false, (row,) = replace(claim(), expected=Outcome.REFUTED), measured(P.omega_0, FINE).measurements
+    false, (row,) = (
+        replace(claim(), expected=Outcome.REFUTED),
+        measured(P.omega_0, FINE).measurements,
+    )
     for name, passed in (("mine", True), ("reference", False)):
         (verdict,) = judge([false], Records((replace(row, set=name),)))
         assert (verdict.outcome, verdict.passed) == (Outcome.CONFIRMED, passed)
 
 
 def test_judging_a_claim_takes_no_longer_than_it_may(monkeypatch):
-    """Whatever the files say; the judge takes every `Exception` of a prediction for a breakdown of the theory."""
+    """Whatever the files say; the judge takes every `Exception` of a prediction for a breakdown of
+    the theory."""
     endless = claim(lambda m: sum(0 for _ in itertools.count()))
     monkeypatch.setattr(validation, "JUDGING", 0.1)
     told = validation._in_time(endless, {"mujoco": {1: measured(P.omega_0, FINE)}})
@@ -141,7 +157,13 @@ def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols():
     assert len(NAMES) == len(PROTOCOLS)
     assert len({claim.id for claim in CLAIMS}) == len(CLAIMS)
     assert {name for claim in CLAIMS for name in claim.protocols} == NAMES == ASSIGNMENTS.keys()
-    asked = {name for each in ASSIGNMENTS.values() for name in (*each.quick, *each.limit, *each.as_it_comes)}
+    asked = {
+        name
+        for each in ASSIGNMENTS.values()
+        for name in (*each.quick, *each.limit, *each.as_it_comes)
+    }
     assert asked <= sets(Level.QUICK).keys()
-    said = [claim for claim in CLAIMS if claim.text is Text.CORRECTED or claim.expected != "confirmed"]
+    said = [
+        claim for claim in CLAIMS if claim.text is Text.CORRECTED or claim.expected != "confirmed"
+    ]
     assert all(claim.reason for claim in said)

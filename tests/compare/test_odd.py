@@ -1,8 +1,9 @@
-"""No odd command line gives a traceback, loses or half writes anything, or doesn't end; lines come from the parsers.
+"""No odd command line gives a traceback, loses or half writes anything, or doesn't end; lines come
+from the parsers.
 
-Beside bad values, an option at a time (`drawn`), whole lines (`lines`): several options, each with a value that may be
-right, wrong, absurd, a file that is damaged, a directory, a link, an input of the same line.
-"""
+Beside bad values, an option at a time (`drawn`), whole lines (`lines`): several options, each with
+a value that may be right, wrong, absurd, a file that is damaged, a directory, a link, an input of
+the same line."""
 
 import argparse
 import contextlib
@@ -25,12 +26,51 @@ import pytest
 from compare.commands import cli, options
 from tests.commands import COMMANDS, NEEDED, parser_of, refused
 
-ODD = ("x", "", "nan", "-inf", "0", "-1", "1e300", "1e-300", "1,5", "½", "1_000", "0x10", "99999999999999999999")
+ODD = (
+    "x",
+    "",
+    "nan",
+    "-inf",
+    "0",
+    "-1",
+    "1e300",
+    "1e-300",
+    "1,5",
+    "½",
+    "1_000",
+    "0x10",
+    "99999999999999999999",
+)
 USUAL = ("1", "2", "0.01", "0.3")
 AXES = ("eta=0.1:0.3:2", "omega_0=10,20", "eta=0.1:0.3", "mu=", "=3", "eta", "omega_0=nan:1:2", "eta=1e300:2e300:2",
         "y=0:0.01:2", "omega_c=-5:5:2", "slip_x=3:1:2", "eta=0.2,0.2", "mu=0.1:0.2:0", "ω=1:2:3")  # fmt: skip
-WORDS = ("", "x", "ω ₀", "prop-1", "mujoco", "event", "reference", "svg", "1", "a=1", "--", "-", "y=0.1", "omega_c=1e9")
-READ = ["run.h5", "link.h5", "hard.h5", "öl_ω.h5", "set.toml", "bom.toml", "flow.csv", "scene.xml", "meter.toml"]
+WORDS = (
+    "",
+    "x",
+    "ω ₀",
+    "prop-1",
+    "mujoco",
+    "event",
+    "reference",
+    "svg",
+    "1",
+    "a=1",
+    "--",
+    "-",
+    "y=0.1",
+    "omega_c=1e9",
+)
+READ = [
+    "run.h5",
+    "link.h5",
+    "hard.h5",
+    "öl_ω.h5",
+    "set.toml",
+    "bom.toml",
+    "flow.csv",
+    "scene.xml",
+    "meter.toml",
+]
 MINE = [*READ, "mine.html", "mine.md", "mine.json", "mine.png", "mine.svg"]
 """Files of the user."""
 ABSURD = ["cut.h5", "empty.h5", "folder.h5", "loop.h5", "dangling.h5", "cut.toml", "cut.csv", "bytes.csv", "cut.xml",
@@ -42,7 +82,9 @@ CUT = {"cut.h5": "run.h5", "cut.toml": "set.toml", "cut.csv": "flow.csv", "cut.x
 
 def furnish(here: Path, stocked: Path) -> None:
     """A directory of a user, with all that commands read, whole and damaged."""
-    shutil.copytree(stocked, here, ignore=shutil.ignore_patterns("results"))  # which would be judged for seconds
+    shutil.copytree(
+        stocked, here, ignore=shutil.ignore_patterns("results")
+    )  # which would be judged for seconds
     shutil.copy(here / "run.h5", here / "öl_ω.h5")
     (here / "link.h5").symlink_to("run.h5")
     (here / "hard.h5").hardlink_to(here / "run.h5")
@@ -68,7 +110,11 @@ def values(action: argparse.Action) -> tuple[Sequence[str], Sequence[str]]:
     if isinstance(action.type, options.Number):
         return USUAL, ODD
     if isinstance(action.type, options.Output):
-        return [f"{name}{action.type.suffixes[0]}" for name in ("new", "mine")], [*MINE, *ABSURD, *NEW]
+        return [f"{name}{action.type.suffixes[0]}" for name in ("new", "mine")], [
+            *MINE,
+            *ABSURD,
+            *NEW,
+        ]
     if action.type is options.results:
         return ["new"], [*MINE, *ABSURD, *NEW]
     if action.type is Path or action.metavar in ("FILE", "OTHER"):
@@ -77,8 +123,8 @@ def values(action: argparse.Action) -> tuple[Sequence[str], Sequence[str]]:
 
 
 def drawn(command: str) -> Iterator[list[str]]:
-    """Lines of a command that are wrong: each option with a wrong type, sign or size, nothing, or what isn't there; and
-    options that have no effect."""
+    """Lines of a command that are wrong: each option with a wrong type, sign or size, nothing, or
+    what isn't there; and options that have no effect."""
     given, parser = [command, *NEEDED.get(command, "").split()], parser_of(command)
     yield [*given, "--nonsense"]
     for option, other, together in parser.rules:
@@ -95,11 +141,17 @@ def drawn(command: str) -> Iterator[list[str]]:
             numbers = ["x", "nan", "inf", "1" * 400]
             numbers += ["1e300", "1e-300"] * action.dest.startswith("parameter_")
             numbers += ["1e300"] * (action.dest in ("ramp", "staircase", "sine"))
-            bad = [[text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in numbers]
+            bad = [
+                [text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in numbers
+            ]
         if action.dest == "start":
             bad += [[f"omega_c={text}"] for text in ("x", "nan", "1e300", "")]
         if isinstance(action.type, options.Output):  # a name that promises something else
-            bad += [[name] for name in ("mine", "mine.py", *MINE) if Path(name).suffix not in action.type.suffixes]
+            bad += [
+                [name]
+                for name in ("mine", "mine.py", *MINE)
+                if Path(name).suffix not in action.type.suffixes
+            ]
         if action.option_strings:
             yield from ([*given, action.option_strings[-1], *text] for text in [[], *bad])
         else:
@@ -120,11 +172,16 @@ def lines(command: str, rng: np.random.Generator) -> Iterator[list[str]]:
         words = [command, *NEEDED.get(command, "").split()]
         if places and rng.random() < 0.5:
             words[1 : 1 + len(places)] = [value(each) for each in places]
-        for k in rng.choice(len(optional), min(int(rng.integers(1, 4)), len(optional)), replace=False):
+        for k in rng.choice(
+            len(optional), min(int(rng.integers(1, 4)), len(optional)), replace=False
+        ):
             action = optional[k]
             several = {0: 0, None: 1, "+": int(rng.integers(1, 4))}
             count = several[action.nargs] if action.nargs in several else int(action.nargs or 1)
-            words += [str(rng.choice(action.option_strings)), *(value(action) for _ in range(count))]
+            words += [
+                str(rng.choice(action.option_strings)),
+                *(value(action) for _ in range(count)),
+            ]
         yield words
 
 
@@ -132,7 +189,9 @@ def contents(here: Path) -> dict[str, tuple[int, ...]]:
     """What is there, by name; a file that is written anew is another one."""
     found = {str(path.relative_to(here)): path.lstat() for path in here.rglob("*")}
     return {
-        name: (of.st_mode,) if stat.S_ISDIR(of.st_mode) else (of.st_mode, of.st_ino, of.st_size, of.st_mtime_ns)
+        name: (of.st_mode,)
+        if stat.S_ISDIR(of.st_mode)
+        else (of.st_mode, of.st_ino, of.st_size, of.st_mtime_ns)
         for name, of in found.items()
     }
 
@@ -143,13 +202,20 @@ def outputs_of(words: list[str]) -> set[str]:
     for action in parser_of(words[0])._actions:
         if isinstance(action.type, options.Output) or action.type is options.results:
             named |= {str(action.default)} - {"None"}
-            named |= {word for before, word in itertools.pairwise(words) if before in action.option_strings}
-    named |= {str(Path(name).with_suffix(".failed.h5")) for name in named if name.endswith(".h5")}  # samples so far
+            named |= {
+                word
+                for before, word in itertools.pairwise(words)
+                if before in action.option_strings
+            }
+    named |= {
+        str(Path(name).with_suffix(".failed.h5")) for name in named if name.endswith(".h5")
+    }  # samples so far
     return {os.path.normpath(name) for name in named}
 
 
 def carried_out(words: list[str], patience: float) -> tuple[int, str, str]:
-    """The exit code of a line, what it prints and says of trouble; Ctrl-C comes after so many seconds, if need be.
+    """The exit code of a line, what it prints and says of trouble; Ctrl-C comes after so many
+    seconds, if need be.
 
     Raises `TimeoutError` if it doesn't end then within 3 s of processor time.
     """
@@ -178,11 +244,17 @@ def carried_out(words: list[str], patience: float) -> tuple[int, str, str]:
         if time.process_time() - pressed[0] > 3.0:
             raise TimeoutError
         gc.collect()  # what it broke off may have left a file open: that is heard here, where it is ignored
-    said = "".join(line for line in err.getvalue().splitlines(True) if not line.startswith("dualball: warning: "))
+    said = "".join(
+        line
+        for line in err.getvalue().splitlines(True)
+        if not line.startswith("dualball: warning: ")
+    )
     return code, out.getvalue(), said
 
 
-def problems(words: list[str], here: Path, codes: Sequence[int], patience: float = 10.0) -> list[str]:
+def problems(
+    words: list[str], here: Path, codes: Sequence[int], patience: float = 10.0
+) -> list[str]:
     """All that is wrong with what a line does, which may end with one of these exit codes."""
     before, wrong = contents(here), list[str]()
     try:
@@ -191,16 +263,25 @@ def problems(words: list[str], here: Path, codes: Sequence[int], patience: float
         return [f"{type(error).__name__}: {error}"]
     if code not in codes:
         wrong.append(f"exit code {code}")
-    if code == 2 and (out or said.count("\n") != 1 or not said.startswith("dualball: error: ") or "\ufffd" in said):
+    if code == 2 and (
+        out or said.count("\n") != 1 or not said.startswith("dualball: error: ") or "\ufffd" in said
+    ):
         wrong.append(f"more than a line: {out!r} {said!r}")
     after, asked = contents(here), outputs_of(words)
-    for name in (name for name in before.keys() | after.keys() if before.get(name) != after.get(name)):
+    for name in (
+        name for name in before.keys() | after.keys() if before.get(name) != after.get(name)
+    ):
         belongs = any(name == own or name.startswith(f"{own}/") for own in asked)
         if code == 2 or not belongs or (name in before and name not in asked):
-            wrong.append(f"{name}: {before.get(name, 'nothing')} -> {after.get(name, 'nothing')}, exit code {code}")
+            wrong.append(
+                f"{name}: {before.get(name, 'nothing')} -> {after.get(name, 'nothing')}, exit code "
+                f"{code}"
+            )
         elif name in before and sum(os.path.normpath(word) == name for word in words) > 1:
             wrong.append(f"{name} was read and is lost")
-        elif name.endswith(".part") or ((here / name).is_dir() and not any((here / name).iterdir())):
+        elif name.endswith(".part") or (
+            (here / name).is_dir() and not any((here / name).iterdir())
+        ):
             wrong.append(f"{name} is left")
     return wrong
 
@@ -224,13 +305,21 @@ def test_bad_inputs_drawn_from_the_parsers_are_refused(command: str, here: Path)
     assert not {line: of for line, of in wrong.items() if of}
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # Ctrl-C between open() and with
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # Ctrl-C between open() and with
 @pytest.mark.parametrize("count", [8, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("command", COMMANDS)
-def test_odd_lines(command: str, count: int, here: Path, stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.validation.validate", lambda *_, **__: [])  # `test_signals` ends that
+def test_odd_lines(
+    command: str, count: int, here: Path, stocked: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "compare.validation.validate", lambda *_, **__: []
+    )  # `test_signals` ends that
     whole, wrong = contents(here), dict[str, list[str]]()
-    for words in itertools.islice(lines(command, np.random.default_rng(COMMANDS.index(command))), count):
+    for words in itertools.islice(
+        lines(command, np.random.default_rng(COMMANDS.index(command))), count
+    ):
         wrong[shlex.join(words)] = problems(words, here, [0, 1, 2, 130], patience=1.0)
         if contents(here) != whole:
             shutil.rmtree(here)
@@ -254,7 +343,8 @@ OUTPUTS = [
     if isinstance(action.type, options.Output)
     for suffix in action.type.suffixes
 ]
-"""Every command with each of its options that names a file to be written, and what that may end in."""
+"""Every command with each of its options that names a file to be written, and what that may end
+in."""
 
 
 @pytest.mark.parametrize(("command", "option", "suffix"), OUTPUTS)
@@ -265,7 +355,9 @@ def test_an_output_that_is_read_is_refused(command, option, suffix, tmp_path, ca
     soft.symlink_to(mine)
     hard.hardlink_to(mine)
     for output in (mine, tmp_path / ".." / tmp_path.name / mine.name, soft, hard):
-        assert "is read and would be lost" in refused(capsys, *reading(command, mine), option, output)
+        assert "is read and would be lost" in refused(
+            capsys, *reading(command, mine), option, output
+        )
     assert {path.read_text() for path in (mine, soft, hard)} == {"mine"}
     assert soft.is_symlink()
 
@@ -279,13 +371,15 @@ def test_an_output_that_is_read_is_refused(command, option, suffix, tmp_path, ca
         "inspect run.h5 --plot run.svg",
         "compare run.h5 run.h5 --plot new.svg",
         "attractors --set hopping --start omega_c=20 --time 0.1 -o new.md",
-        "basins --across omega_c=1:2:2 --up y=0:0.01:2 --workers 0 --quiet --results new/map -o new.json",
+        "basins --across omega_c=1:2:2 --up y=0:0.01:2 --workers 0 --quiet --results new/map -o "
+        "new.json",
         "cases -o new/cases",
         "sweep --vary eta=0.1,0.2 --time 0.01 --workers 0 --quiet -o new/runs",
     ],
 )
 def test_a_full_disk_leaves_nothing_behind(words, stocked, tmp_path, monkeypatch, capsys):
-    """Nor does it touch what was there; a limit on the size of files plays the disk that is full."""
+    """Nor does it touch what was there; a limit on the size of files plays the disk that is
+    full."""
     monkeypatch.chdir(shutil.copytree(stocked, tmp_path / "here"))
     Path("run.svg").write_text("mine")
     before = {path: path.is_file() and path.read_bytes() for path in Path().rglob("*")}
@@ -310,7 +404,11 @@ def test_runs_are_not_gathered_into_one_of_themselves(stocked, tmp_path, capsys)
 
 @pytest.mark.parametrize(
     ("command", "name"),
-    [("cases", "README.md"), ("league --engine mujoco-plain --workers 1", "league.html"), ("validate", "report.html")],
+    [
+        ("cases", "README.md"),
+        ("league --engine mujoco-plain --workers 1", "league.html"),
+        ("validate", "report.html"),
+    ],
 )
 def test_a_page_of_somebody_else_is_left_alone(command, name, tmp_path, capsys):
     (tmp_path / name).write_text("mine")

@@ -1,4 +1,5 @@
-"""Assertions about one's own motions fail just where they should, and two motions are told apart."""
+"""Assertions about one's own motions fail just where they should, and two motions are told
+apart."""
 
 import json
 from pathlib import Path
@@ -28,11 +29,15 @@ def wrong(run, error):
 def test_a_ball_that_settles(theory):
     for case in (None, "SS"):
         assert_settles(*wrong(theory, 0.9e-3), P, case=case, rtol=1e-3)
-        with pytest.raises(AssertionError, match=r"does not settle in SS.* within 0\.001 of 13\.85"):
+        with pytest.raises(
+            AssertionError, match=r"does not settle in SS.* within 0\.001 of 13\.85"
+        ):
             assert_settles(*wrong(theory, 1.1e-3), P, case=case, rtol=1e-3)
     with pytest.raises(AssertionError, match=r"does not settle in SS: .*; it settles in NS"):
         assert_settles(np.linspace(0, 60, 500), np.full(500, 25.0), P, rtol=1e-3)
-    steel = Parameters.named("steel-in-water").replace(omega_0=23.0)  # 30 s are enough, as slip lets drag grow
+    steel = Parameters.named("steel-in-water").replace(
+        omega_0=23.0
+    )  # 30 s are enough, as slip lets drag grow
     run = analytic.simulate(steel, [0.0] * 6, 30.0)
     assert_settles(run.time, run.omega_c, steel, case="SS", rtol=1e-3)
 
@@ -50,7 +55,11 @@ def test_a_ball_that_settles(theory):
     ],
 )
 def test_what_cannot_be_judged(theory, given, message):
-    part, spoilt, w = given.pop("part", slice(None)), given.pop("spoilt", 0.0), theory.omega_c.copy()
+    part, spoilt, w = (
+        given.pop("part", slice(None)),
+        given.pop("spoilt", 0.0),
+        theory.omega_c.copy(),
+    )
     w[7] += spoilt
     with pytest.raises(InputError, match=message):
         assert_settles(theory.time[part], w[part], **{"p": P, "rtol": 1e-3} | given)
@@ -58,15 +67,29 @@ def test_what_cannot_be_judged(theory, given, message):
 
 def test_tracking(theory):
     assert_tracks(wrong(theory, 0.9e-3), theory, rms=1e-3)
-    with pytest.raises(AssertionError, match=r"does not track event: rms .*e-03 > 0.001 .*; farthest off at t = "):
+    with pytest.raises(
+        AssertionError, match=r"does not track event: rms .*e-03 > 0.001 .*; farthest off at t = "
+    ):
         assert_tracks(wrong(theory, 1.1e-3), theory, rms=1e-3)
     with pytest.raises(AssertionError, match="slip_x of x"):
-        assert_tracks(read({"time": theory.time, "slip_x": theory.slip_x + 1}, "x"), theory, quantity="slip_x", rms=0.1)
+        assert_tracks(
+            read({"time": theory.time, "slip_x": theory.slip_x + 1}, "x"),
+            theory,
+            quantity="slip_x",
+            rms=0.1,
+        )
     coarse = (theory.time[::40], theory.omega_c[::40])
-    for part, message in ((slice(20, -20, 40), "too far apart"), (slice(5), "5 samples while both last")):
+    for part, message in (
+        (slice(20, -20, 40), "too far apart"),
+        (slice(5), "5 samples while both last"),
+    ):
         with pytest.raises(InputError, match=message):
-            assert_tracks((theory.time[part], theory.omega_c[part]), coarse if part.step else theory, rms=1e-4)
-    with pytest.raises(InputError, match="the reference lasts from 0 to 12 s, but the motion from 0 to 24"):
+            assert_tracks(
+                (theory.time[part], theory.omega_c[part]), coarse if part.step else theory, rms=1e-4
+            )
+    with pytest.raises(
+        InputError, match="the reference lasts from 0 to 12 s, but the motion from 0 to 24"
+    ):
         assert_tracks((theory.time * 2, theory.omega_c), theory, rms=1.0)
     with pytest.raises(InputError, match=r"no omega_x.*did you mean 'omega_"):
         assert_tracks(theory, theory, quantity="omega_x", rms=1.0)
@@ -80,7 +103,9 @@ def test_the_doubt_is_what_interpolation_adds(theory):
 
 
 def test_motions_in_files(theory, tmp_path):
-    own, foreign, table, bare = (tmp_path / name for name in ("own.h5", "foreign.h5", "table.csv", "bare.csv"))
+    own, foreign, table, bare = (
+        tmp_path / name for name in ("own.h5", "foreign.h5", "table.csv", "bare.csv")
+    )
     storage.save(theory, own)
     with h5py.File(foreign, "w") as file:
         file["t"], file["omega_c"] = theory.time, theory.omega_c
@@ -120,9 +145,14 @@ def test_two_runs_side_by_side(theory, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     storage.save(theory, "a.h5")
     storage.save(analytic.simulate(P.replace(omega_0=24.0), [0.0] * 6, 9.0), "b.h5")
-    Path("c.csv").write_text("\n".join(f"{t} {w + 0.5}" for t, w in zip(theory.time, theory.omega_c, strict=True)))
+    Path("c.csv").write_text(
+        "\n".join(f"{t} {w + 0.5}" for t, w in zip(theory.time, theory.omega_c, strict=True))
+    )
     shown = told(capsys, "compare a.h5 b.h5 --plot d.png")
     assert Path("d.png").stat().st_size > 10_000
-    assert all(text in shown for text in ("omega_0 = 25.0 in a, 24.0 in b", "RR 0.", "from 0 to 9 s", "force_Bx"))
+    assert all(
+        text in shown
+        for text in ("omega_0 = 25.0 in a, 24.0 in b", "RR 0.", "from 0 to 9 s", "force_Bx")
+    )
     (difference,) = json.loads(told(capsys, "compare c.csv a.h5 --json"))["differences"]
     assert difference["rms"] == pytest.approx(0.5)

@@ -1,4 +1,5 @@
-"""Protocols find what is known to be there, and say what broke down, did not settle or isn't there."""
+"""Protocols find what is known to be there, and say what broke down, did not settle or isn't
+there."""
 
 import math
 from dataclasses import replace
@@ -41,14 +42,19 @@ PROTOCOLS = {
     "lift": lambda lab: onset.lift(lab, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
     "impacts": lambda lab: motions.impacts(lab, SETS, Records()),
     "pulsation": lambda lab: unsteady.pulsation(
-        lab, WALL, known("rough-wall", QUICK["rough-wall"], "omega_01", "omega_02", "omega_04", uncertainty=0.0)
+        lab,
+        WALL,
+        known(
+            "rough-wall", QUICK["rough-wall"], "omega_01", "omega_02", "omega_04", uncertainty=0.0
+        ),
     ),
 }
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, monkeypatch):
-    """The first group is said to, in pulsations the first run; validation shows what all of them measure."""
+    """The first group is said to, in pulsations the first run; validation shows what all of them
+    measure."""
     groups, tried = Lab.groups, []
 
     def breaking(lab, asked):
@@ -59,10 +65,19 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, mo
 
     monkeypatch.setattr(Lab, "groups", breaking)
     left = Records.of(PROTOCOLS[name](lab))
-    assert ["the run diverged at once" in missing.reason for missing in left.missing].count(True) == 1
-    assert sum(missing.rows for missing in left.missing if "at once" in missing.reason) < len(left.measurements)
+    assert ["the run diverged at once" in missing.reason for missing in left.missing].count(
+        True
+    ) == 1
+    assert sum(missing.rows for missing in left.missing if "at once" in missing.reason) < len(
+        left.measurements
+    )
     if name == "pulsation":
-        assert {m.quantity for m in left.measurements} == {"gain", "phase_lag", "slip_amplitude", "mean_error"}
+        assert {m.quantity for m in left.measurements} == {
+            "gain",
+            "phase_lag",
+            "slip_amplitude",
+            "mean_error",
+        }
 
 
 @pytest.mark.parametrize(
@@ -70,10 +85,22 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, mo
     [
         (growth.measure, P.replace(eta=0.0), growth.FRICTIONLESS),
         (onset.bounds, P.replace(eta=0.0), growth.FRICTIONLESS),
-        (unsteady.pulsation, ROUGH, "no flow was measured at which two-point rolling ends by slipping"),
-        (unsteady.jumps, ROUGH, "no flows were measured between which the ball slips at both points"),
+        (
+            unsteady.pulsation,
+            ROUGH,
+            "no flow was measured at which two-point rolling ends by slipping",
+        ),
+        (
+            unsteady.jumps,
+            ROUGH,
+            "no flows were measured between which the ball slips at both points",
+        ),
         (thresholds.measure, P, "ends two-point rolling"),
-        (flowmeter.hysteresis, THICK, "no flow at which slipping on the floor gives way to riding the wall"),
+        (
+            flowmeter.hysteresis,
+            THICK,
+            "no flow at which slipping on the floor gives way to riding the wall",
+        ),
     ],
 )
 def test_what_is_not_there_is_said(lab, measure, p, said):
@@ -97,7 +124,8 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
 
 @pytest.mark.slow
 def test_a_mean_may_depend_on_more_than_the_state(lab):
-    """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is none, blind."""
+    """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is
+    none, blind."""
     p, f, a = sets(Level.DEFAULT)["design-5"].replace(omega_0=11.7694), 4.0, 199.89
     theory, rules = analytic.flowmeter.pulsation, ("slip-stability", "infeasible")
     early, late = (theory.mean_error(p, a, f, leave_rolling=rule) for rule in rules)
@@ -118,11 +146,22 @@ def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
         for coefficient, first, second in ((ROUGH.mu, w_z, -w_x), (ROUGH.eta, -w_z, w_y))
     )
     A, B = np.stack([A_x, normal, A_z], axis=-1), np.stack([normal, B_y, B_z], axis=-1)
-    right = {"slip_x": w_x, "slip_y": w_y, "slip_z": w_z, "force_A": A, "force_B": B, "case": Case.SS}
+    right = {
+        "slip_x": w_x,
+        "slip_y": w_y,
+        "slip_z": w_z,
+        "force_A": A,
+        "force_B": B,
+        "case": Case.SS,
+    }
 
     def found(law, contact, **changes):
         of = laws.deviations([motion(ROUGH, np.linspace(0.0, 1.0, SAMPLES), **right | changes)])
-        return next(value for (_, name, point), value in of.items() if name.startswith(law) and point == contact)
+        return next(
+            value
+            for (_, name, point), value in of.items()
+            if name.startswith(law) and point == contact
+        )
 
     ratio, law, rolls = "friction over normal force", "(14), (15)", "where it rolls it doesn't slip"
     for contact, coefficient in (("A", ROUGH.mu), ("B", ROUGH.eta)):
@@ -133,7 +172,9 @@ def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
     assert found(ratio, "A", force_A=A * [0.99, 1.0, 0.99]) == pytest.approx(0.99 * ROUGH.mu)
     one = np.where(np.arange(SAMPLES)[:, None] == 7, [1.0, -1.0, 1.0], 1.0)
     assert found(law, "B", force_B=B * one) > 0.1 * ROUGH.eta
-    assert found("where it is closed there is no gap", "A", gap_A=1e-3 * ROUGH.R) == pytest.approx(1e-3)
+    assert found("where it is closed there is no gap", "A", gap_A=1e-3 * ROUGH.R) == pytest.approx(
+        1e-3
+    )
     assert found(rolls, "A", slip_z=1e-3 * w_z, slip_x=1e-3 * w_x, case=Case.RS) > 0
 
 
@@ -154,7 +195,10 @@ def make(patch, **effort):
 
 
 def measure_settled(lab, patch, p, *flows):
-    make(patch, settled_starts=tuple((how, flows) for how in ("rest", "with the fluid", "on the wall")))
+    make(
+        patch,
+        settled_starts=tuple((how, flows) for how in ("rest", "with the fluid", "on the wall")),
+    )
     return Records.of(settled.measure(lab, {"thick": p}, Records()))
 
 
@@ -182,7 +226,9 @@ def test_a_state_that_depends_on_the_step_is_missing(lab, monkeypatch):
     found = measure_settled(lab, monkeypatch, THICK, 0.6)
     assert {m.quantity for m in found.measurements} == {"case"}
     assert len(found.missing) == 3
-    assert all("is SN with half the time step" in each.reason and each.rows > 10 for each in found.missing)
+    assert all(
+        "is SN with half the time step" in each.reason and each.rows > 10 for each in found.missing
+    )
 
 
 def test_what_quadratic_drag_does_not_settle_has_no_values(lab, monkeypatch):
@@ -194,7 +240,8 @@ def test_what_quadratic_drag_does_not_settle_has_no_values(lab, monkeypatch):
 
 
 def test_what_swings_for_ever_settles_by_going_on_from_its_mean(lab, monkeypatch):
-    """A ball that sinks along the wall: also where a round is rounded to another length than the usual one."""
+    """A ball that sinks along the wall: also where a round is rounded to another length than the
+    usual one."""
     make(monkeypatch, settling_rounds=(0.45, 1.0, 1.0), settling_steps=512)
     p = QUICK["rough-floor"].replace(omega_0=21.74)
     (state,) = settling.settle(lab, [settling.named_start("rough-floor", p, "on the wall")])
@@ -222,18 +269,33 @@ def test_a_ball_keeps_to_its_branch_of_the_loop(Omega_0, case, before, outcome):
     s = next(s for s in analytic.stable_solutions(q) if s.case is case)
     at = {"case": case.name, "before": before, "side": "up", "level": 1.0}
     values = {"case": (float(case), 0.0), "omega_c": (float(s.x[2]), 1e-9 * q.omega_0)}
-    rows = (measured("hysteresis", what, *value, q, "slipping", **at) for what, value in values.items())
+    rows = (
+        measured("hysteresis", what, *value, q, "slipping", **at) for what, value in values.items()
+    )
     assert outcome_of("fig-13-left", *rows) is outcome
 
 
 def test_numbers_that_no_quick_set_has_are_judged_too():
     strong, smooth = P.replace(c=20 * P.c), P.replace(eta=0.99 * P.j)
-    born, end = analytic.bifurcation.diagram.critical_drag(strong), analytic.thresholds(smooth).omega_01
-    unknown = measured("slope", "slope", 1.0, 1e-6, P.replace(omega_0=24.0), by="neighbours", case="NR")
+    born, end = (
+        analytic.bifurcation.diagram.critical_drag(strong),
+        analytic.thresholds(smooth).omega_01,
+    )
+    unknown = measured(
+        "slope", "slope", 1.0, 1e-6, P.replace(omega_0=24.0), by="neighbours", case="NR"
+    )
     for claim, row, outcome in (
         # The drag at which a fold is born, of a set whose own is too strong for one.
-        ("double-points", measured("birth", "critical_drag", born, 1e-4 * born, strong), Outcome.CONFIRMED),
-        ("double-points", measured("birth", "critical_drag", 1.01 * born, 1e-4 * born, strong), Outcome.REFUTED),
+        (
+            "double-points",
+            measured("birth", "critical_drag", born, 1e-4 * born, strong),
+            Outcome.CONFIRMED,
+        ),
+        (
+            "double-points",
+            measured("birth", "critical_drag", 1.01 * born, 1e-4 * born, strong),
+            Outcome.REFUTED,
+        ),
         ("slope-rolling", unknown, Outcome.REFUTED),
         # A range that another threshold may end is not held against the tolerances of this one.
         ("design-limit", measured("thresholds", "omega_01", end, 1e-9, smooth), Outcome.CONFIRMED),
@@ -242,7 +304,8 @@ def test_numbers_that_no_quick_set_has_are_judged_too():
 
 
 def narrowed(answer, width, task=lambda v, b, attempt: (v, attempt), careful=True):
-    """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a lab whose tasks are their runs."""
+    """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a lab whose tasks
+    are their runs."""
     lab = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
     (bracket,) = narrow(lab, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
     return bracket
@@ -256,7 +319,9 @@ def test_bisection_closes_in_on_the_change_unless_runs_are_undecided_or_break_do
     # An end that was taken for granted is asked: it has a run if it was right.
     assert narrowed(lambda run: run[0] < 0.95, 0.5, careful=False).runs[1] == (1.0, USUAL)
     assert narrowed(lambda run: True, 0.5, careful=False).runs[1] is None
-    moves = narrowed(lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4)  # with the time step
+    moves = narrowed(
+        lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4
+    )  # with the time step
     assert moves.low < 0.3 < moves.high
     assert moves.place.uncertainty >= moves.shift > 0
 
@@ -269,12 +334,16 @@ def test_bisection_closes_in_on_the_change_unless_runs_are_undecided_or_break_do
     bracket = narrowed(answer, 1e-3, careful=False)
     assert 0.4 < bracket.low < 0.47 <= 0.5 < bracket.high
     assert bracket.high - bracket.low > 0.1
-    broken = narrowed(lambda v: v < 0.5, 1e-3, lambda v, b, attempt: v if abs(v - 0.5) > 0.1 else "broke")
+    broken = narrowed(
+        lambda v: v < 0.5, 1e-3, lambda v, b, attempt: v if abs(v - 0.5) > 0.1 else "broke"
+    )
     assert broken.low < 0.4 < 0.6 < broken.high
     assert broken.failure == "broke"
 
 
-@pytest.mark.parametrize(("eta", "end", "lost"), [(0.99, "omega_01", False), (1.01, "omega_03", True)])
+@pytest.mark.parametrize(
+    ("eta", "end", "lost"), [(0.99, "omega_01", False), (1.01, "omega_03", True)]
+)
 def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(eta, end, lost):
     """Beyond the end of rolling, on walls a little smoother and rougher than the inertia j."""
     p = P.replace(eta=eta * P.j)
@@ -312,10 +381,23 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monke
         floor = next(case for case in (Case.RR, Case.SS, Case.NR) if case in cases)
         wall = Case.NR if Case.NR in cases else Case.NS
         for start, case in (("rest", floor), ("with the fluid", floor), ("on the wall", wall)):
-            rows.append(measured("settled", "case", float(case), 0.0, q, "thick-fluid", start=start, case=case.name))
+            rows.append(
+                measured(
+                    "settled",
+                    "case",
+                    float(case),
+                    0.0,
+                    q,
+                    "thick-fluid",
+                    start=start,
+                    case=case.name,
+                )
+            )
     records = Records.of(thresholds.measure(lab, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
-    assert [m.value for m in records.select("thresholds", "folds")] == [1.0]  # an end is seen, and no smooth one
+    assert [m.value for m in records.select("thresholds", "folds")] == [
+        1.0
+    ]  # an end is seen, and no smooth one
 
 
 def run_of(time, y, theta):
@@ -323,11 +405,14 @@ def run_of(time, y, theta):
 
 
 def test_which_balls_hop_and_how_high():
-    """Those that come down again and again, but none that swings on the wall, sinks, or hardly leaves the floor."""
+    """Those that come down again and again, but none that swings on the wall, sinks, or hardly
+    leaves the floor."""
     t = np.arange(0, 5, 1e-3)
     hop = 4e-3 * np.abs(np.sin(12 * t))
     assert all(hops(run_of(t, y, t)) for y in (hop, np.exp(-t) * hop))
-    assert not any(hops(run_of(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000))
+    assert not any(
+        hops(run_of(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000)
+    )
     # Parabolas of one period and height: the tops come out between the samples.
     period, height = 0.2217, 4e-3
     phase = np.mod(t, period) / period - 0.5
@@ -342,7 +427,8 @@ def test_which_balls_hop_and_how_high():
 
 @pytest.mark.parametrize("size", [0.9, 1.05])
 def test_map_from_hop_to_hop(size):
-    """States that follow a linear map with a complex pair and a fast root: how they change, and what stays."""
+    """States that follow a linear map with a complex pair and a fast root: how they change, and
+    what stays."""
     cos, sin = size * math.cos(0.23), size * math.sin(0.23)
     turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 0.03]])
     mixed = np.array([[1, 0.3, 0.2], [0.1, 1, 0.4], [0.5, -0.2, 1]])
@@ -359,8 +445,12 @@ def test_where_hopping_begins_and_ends():
     """At no height; and where disturbances neither grow nor shrink."""
     flows = (58.0, 56.0, 54.0)
     curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
-    place = with_step_error(attractors.birth(flows, curved).value, attractors.birth(flows, straight))
+    place = with_step_error(
+        attractors.birth(flows, curved).value, attractors.birth(flows, straight)
+    )
     assert place.value == pytest.approx(52.0, abs=1e-9)
     assert 0 < place.uncertainty < 0.1
-    place = attractors.death([0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)])
+    place = attractors.death(
+        [0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)]
+    )
     assert (place.value, place.uncertainty) == pytest.approx((0.1, 5e-3))

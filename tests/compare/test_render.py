@@ -1,4 +1,5 @@
-"""Pictures, films, pages, the viewer and the page to play with show the ball where it is, or say why they can't."""
+"""Pictures, films, pages, the viewer and the page to play with show the ball where it is, or say
+why they can't."""
 
 import base64
 import dataclasses
@@ -51,7 +52,10 @@ def test_a_picture_shows_the_case_and_the_ball_moves(run, draws, tmp_path):
     assert early.size == (WIDTH, WIDTH * 10 // 16)
     for image, k in ((early, np.searchsorted(run.time, 0.1)), (late, -1)):
         beside_letters = image.getpixel((round(27 * unit), round(50 * unit)))
-        assert "#{:02x}{:02x}{:02x}".format(*beside_letters) == style.COLOURS[Case(run.case[k])].lower()
+        assert (
+            "#{:02x}{:02x}{:02x}".format(*beside_letters)
+            == style.COLOURS[Case(run.case[k])].lower()
+        )
     assert np.mean(np.asarray(early) != np.asarray(late)) > 0.01
     assert picture(run, None, force_arrow=0.0, slip_arrow=0.0) != late
     # A run of another engine is shown in the scene of its parameters.
@@ -63,7 +67,9 @@ def test_a_picture_shows_the_case_and_the_ball_moves(run, draws, tmp_path):
 def test_the_command_writes_pictures_and_films(run, draws, tmp_path, capsys):
     file, film, picture = tmp_path / "run.h5", tmp_path / "film.gif", tmp_path / "p.png"
     storage.save(run, file)
-    told(capsys, f"render {file} -o {film} --at 0.2 --time 0.4 --speed 0.5 --rate 10 --width {WIDTH}")
+    told(
+        capsys, f"render {file} -o {film} --at 0.2 --time 0.4 --speed 0.5 --rate 10 --width {WIDTH}"
+    )
     with Image.open(film) as frames:
         assert frames.n_frames == 5  # both ends of 0.4 s at 10 a second
         assert frames.info["duration"] == 100
@@ -73,12 +79,17 @@ def test_the_command_writes_pictures_and_films(run, draws, tmp_path, capsys):
 def test_a_film_as_mp4(run, draws, tmp_path, monkeypatch):
     """Of even size, as its standard wants it: 330 × 206 of 331 × 206."""
     av, film = pytest.importorskip("av"), tmp_path / "film.mp4"
-    assert render.write(run, film, at=0.2, time=0.4, speed=0.5, rate=10, width=331) == f"{film}: 5 frames"
+    assert (
+        render.write(run, film, at=0.2, time=0.4, speed=0.5, rate=10, width=331)
+        == f"{film}: 5 frames"
+    )
     with av.open(film) as read:
         shown = [frame.to_image() for frame in read.decode(video=0)]
         assert read.streams.video[0].average_rate == 10
     assert [image.size for image in shown] == 5 * [(330, 206)]
-    assert np.mean(np.abs(np.asarray(shown[0], float) - np.asarray(shown[-1], float)) > 20) > 0.01  # it moves
+    assert (
+        np.mean(np.abs(np.asarray(shown[0], float) - np.asarray(shown[-1], float)) > 20) > 0.01
+    )  # it moves
     film.unlink()
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(InputError, match=r"an mp4 needs PyAV: pip install 'dualball\[film\]'"):
@@ -87,16 +98,21 @@ def test_a_film_as_mp4(run, draws, tmp_path, monkeypatch):
 
 
 def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
-    """Frames, numbers and the case follow the slider; where a contact is open there is no slip to tell."""
+    """Frames, numbers and the case follow the slider; where a contact is open there is no slip to
+    tell."""
     pytest.importorskip("nicegui")
     file = tmp_path / "run.html"
-    assert render.write(run, file, at=0.1, speed=0.5, rate=50).endswith(": 71 frames")  # ends of 0.7 s of the run
+    assert render.write(run, file, at=0.1, speed=0.5, rate=50).endswith(
+        ": 71 frames"
+    )  # ends of 0.7 s of the run
     assert file.stat().st_size < 3e6
     tab.goto(file.as_uri())
     tab.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
     for k, time in ((0, 0.1), (70, 0.8)):
         tab.locator("#place").fill(str(k))
-        tab.wait_for_function(f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')")
+        tab.wait_for_function(
+            f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')"
+        )
         now = geometry.resampled(run, np.array([time]))
         assert tab.locator("#case").inner_text() == Case(now.case[0]).name
         assert f"ωc = {now.omega_c[0]:.2f} rad/s" in tab.locator("#numbers").inner_text()
@@ -105,7 +121,9 @@ def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
     flies = analytic.simulate(P, [0.05, 0, 8.0, 0, 0, 0, 0.03, -0.3], 0.05)
     render.write(flies, file)
     tab.goto(file.as_uri())
-    tab.wait_for_function("document.querySelector('#numbers').innerText.includes('slip: floor –, wall –')")
+    tab.wait_for_function(
+        "document.querySelector('#numbers').innerText.includes('slip: floor –, wall –')"
+    )
     seen = Image.open(io.BytesIO(tab.locator("#view").screenshot())).convert("RGB")
     edge = np.asarray(seen)[3:6, seen.width // 2 :]
     assert edge[:, :-20].min() == 255
@@ -119,13 +137,17 @@ def test_a_ball_that_rolls_turns_about_its_contacts():
     turned = (seen.turns[1:] * seen.turns[:-1].inv()).as_matrix()
     arms = np.einsum("nab,cnb->cna", turned, (seen.contacts - seen.centres)[:, :-1])
     moved = seen.centres[1:] + arms - seen.contacts[:, :-1]
-    assert np.abs(moved).max() < 0.1 * np.abs(np.diff(seen.centres, axis=0)).max()  # to the second order of the step
+    assert (
+        np.abs(moved).max() < 0.1 * np.abs(np.diff(seen.centres, axis=0)).max()
+    )  # to the second order of the step
 
 
 def test_a_run_is_shown_between_its_samples(run):
     k = int(np.flatnonzero(np.diff(run.case))[0])
     between = geometry.resampled(run, np.array([0.6 * run.time[k] + 0.4 * run.time[k + 1], 0.8]))
-    assert between.omega_c == pytest.approx([0.6 * run.omega_c[k] + 0.4 * run.omega_c[k + 1], run.omega_c[-1]])
+    assert between.omega_c == pytest.approx(
+        [0.6 * run.omega_c[k] + 0.4 * run.omega_c[k + 1], run.omega_c[-1]]
+    )
     assert between.force_A[1] == pytest.approx(run.force_A[-1])
     assert between.case.tolist() == [run.case[k], run.case[-1]]
 
@@ -133,18 +155,34 @@ def test_a_run_is_shown_between_its_samples(run):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("film.avi", {}, r"cannot write film\.avi: a picture is a \.png, a film a \.gif or \.mp4, a page"),
+        (
+            "film.avi",
+            {},
+            r"cannot write film\.avi: a picture is a \.png, a film a \.gif or \.mp4, a page",
+        ),
         ("nowhere/p.png", {}, "there is no directory nowhere"),
         ("p.png", {"rate": 5}, "a picture has no rate"),
         ("p.html", {"width": 640}, "a page has no width"),
-        ("p.png", {"at": 9.0}, r"at = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$"),
+        (
+            "p.png",
+            {"at": 9.0},
+            r"at = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$",
+        ),
         ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
         ("p.gif", {"at": 2.0}, "at = 2 s is out of range"),
         ("p.gif", {"speed": 0.0}, "speed = 0 is out of range"),
-        ("p.html", {"speed": 0.05, "rate": 1000}, r"1\.6e\+04 frames are more than 8000: choose a shorter time, or"),
+        (
+            "p.html",
+            {"speed": 0.05, "rate": 1000},
+            r"1\.6e\+04 frames are more than 8000: choose a shorter time, or",
+        ),
         ("p.png", {"mjcf": "<mujoco/>"}, "no geom named 'ball'"),
         ("p.png", {"mjcf": "<mujoco"}, "no valid MJCF"),
-        ("p.html", {"rate": 10}, r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'"),
+        (
+            "p.html",
+            {"rate": 10},
+            r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'",
+        ),
     ],
 )
 def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name, options, message):
@@ -166,7 +204,8 @@ def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch):
 
 
 def viewed(monkeypatch, x0, flow, pictures, takes=1 / 64):
-    """Steps until the window closes, after so many pictures, and the ball; its clock tells how long each takes, s."""
+    """Steps until the window closes, after so many pictures, and the ball; its clock tells how long
+    each takes, s."""
     window = mock.MagicMock(spec=["is_running", "lock", "sync", "monotonic", "sleep"])
     window.is_running = lambda: window.sync.call_count < pictures
     window.monotonic = lambda: window.sync.call_count * takes
@@ -178,14 +217,20 @@ def viewed(monkeypatch, x0, flow, pictures, takes=1 / 64):
 def test_the_loop_is_that_of_a_simulation(monkeypatch):
     x0, flow = [0, 0, 13.0, 0, 0, 0], Flow.ramp(20.0, 25.0, 0.3)
     steps, ball = viewed(monkeypatch, x0, flow, 33)
-    assert steps == 500  # half a second: the first of the 33 pictures, of 1/64 s without round-off, shows the start
+    assert (
+        steps == 500
+    )  # half a second: the first of the 33 pictures, of 1/64 s without round-off, shows the start
     run = mjsim.simulate(P, x0, 0.5, flow, SETTINGS, sample_interval=0.5)
     qpos, qvel = np.array(ball.data.qpos), np.array(ball.data.qvel)
-    place = qpos[:3] - SETTINGS.midpoint * SETTINGS.timestep * qvel[:3]  # positions are ahead of velocities
+    place = (
+        qpos[:3] - SETTINGS.midpoint * SETTINGS.timestep * qvel[:3]
+    )  # positions are ahead of velocities
     qvel[3:] = rotated(qpos[3:], qvel[3:])
     # Equal but for the round-off of turning one state into the paper's variables, or many at once.
     scale = np.maximum(np.abs(run.x[-1]), [P.r, 1, 1, 60, 60, 60, P.r, 1])
-    np.testing.assert_array_less(np.abs(recorder.state(place, qvel, P) - run.x[-1]), 4 * np.finfo(float).eps * scale)
+    np.testing.assert_array_less(
+        np.abs(recorder.state(place, qvel, P) - run.x[-1]), 4 * np.finfo(float).eps * scale
+    )
 
 
 def test_a_slow_machine_does_not_run_after_the_clock(monkeypatch):
@@ -220,7 +265,8 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     expect.set_options(timeout=60_000)  # until theory is compiled
     page, other = (browser.new_page(viewport={"width": 1500, "height": 900}) for _ in range(2))
     other.goto(address)
-    # A run is saved that is not simulated yet: two files are asked for at once, as soon as there are buttons.
+    # A run is saved that is not simulated yet: two files are asked for at once, as soon as there
+    # are buttons.
     with (
         other.expect_download(lambda each: each.suggested_filename == "run.h5", timeout=60_000),
         other.expect_download(lambda each: each.suggested_filename == "set.toml", timeout=60_000),
@@ -232,7 +278,9 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
         tab.wait_for_selector(".map .nsewdrag", timeout=60_000)
 
     def shows(text):
-        page.wait_for_function("t => document.querySelector('.said').innerText.includes(t)", arg=text)
+        page.wait_for_function(
+            "t => document.querySelector('.said').innerText.includes(t)", arg=text
+        )
 
     def click(where, x, y, tab=page):
         box = tab.locator(where).bounding_box()
@@ -273,7 +321,8 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
 
 @pytest.mark.slow
 def test_a_browser_that_is_busy_keeps_its_set(browser, address):
-    """As one that draws in 3-D without a graphics card on a busy machine: its connection is lost meanwhile."""
+    """As one that draws in 3-D without a graphics card on a busy machine: its connection is lost
+    meanwhile."""
     page = browser.new_page()
     page.goto(address)
     page.wait_for_function("document.querySelector('.said')?.innerText.includes('RR')")
@@ -301,7 +350,9 @@ def test_without_the_extra_it_is_named(monkeypatch):
         explore.serve(P, 8080, show=False)
 
 
-@pytest.mark.parametrize("changes", [{}, {"eta": 0.6}, {"mu": 0.0, "eta": 0.0}, {"c": 0.0}, {"drag": "quadratic"}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"eta": 0.6}, {"mu": 0.0, "eta": 0.0}, {"c": 0.0}, {"drag": "quadratic"}]
+)
 def test_every_set_has_its_figures_and_a_motion(changes):
     p = P
     for name, value in changes.items():

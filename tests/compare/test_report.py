@@ -1,4 +1,5 @@
-"""Pages say what was found, show where results are missing, and hold pictures that a real browser plays with."""
+"""Pages say what was found, show where results are missing, and hold pictures that a real browser
+plays with."""
 
 import base64
 import dataclasses
@@ -34,31 +35,55 @@ P = Parameters.named("reference")
 
 
 def claim(name: str, **others: Any) -> Claim:
-    return made.claim(name, source=f"Prop. {name}", statement=f"What {name} states of slip & <roll>.", **others)
+    return made.claim(
+        name, source=f"Prop. {name}", statement=f"What {name} states of slip & <roll>.", **others
+    )
 
 
 def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple[Check, ...]:
     """Made-up numbers, each with the same tolerance, the k-th off by k parts of `deviation`."""
-    conditions = {"case": "RR", "start": "a start with a name that is rather long", "y": 0.02, "v_y": 0.0}
+    conditions = {
+        "case": "RR",
+        "start": "a start with a name that is rather long",
+        "y": 0.02,
+        "v_y": 0.0,
+    }
     sets = [P.replace(omega_0=12.0 + k) for k in range(count)]
     rows = [made.measured("settled", "omega_c", 12.0, 1e-9, p, **conditions) for p in sets]
     return tuple(
-        Check(measurement=m, predicted=12.0 - deviation * (k + 1) / count, tolerance=tolerance, scale=12.0)
+        Check(
+            measurement=m,
+            predicted=12.0 - deviation * (k + 1) / count,
+            tolerance=tolerance,
+            scale=12.0,
+        )
         for k, m in enumerate(rows)
     )
 
 
 VERDICTS = (
     Verdict(claim=claim("good"), outcome=Outcome.CONFIRMED, checks=checks(report.ROWS + 40)),
-    Verdict(claim=claim("bad", text=Text.CORRECTED, reason="A sign."), outcome=Outcome.REFUTED, checks=checks(3, 1e-3)),
-    Verdict(claim=claim("coarse", section="Stability"), outcome=Outcome.INCONCLUSIVE, checks=checks(2, 0.0, 1.0)),
+    Verdict(
+        claim=claim("bad", text=Text.CORRECTED, reason="A sign."),
+        outcome=Outcome.REFUTED,
+        checks=checks(3, 1e-3),
+    ),
+    Verdict(
+        claim=claim("coarse", section="Stability"),
+        outcome=Outcome.INCONCLUSIVE,
+        checks=checks(2, 0.0, 1.0),
+    ),
     Verdict(
         claim=claim("broken", section="Stability"),
         outcome=Outcome.ERROR,
         error="ValueError: diverged & <so> on",
         missing=(Missing("thresholds", "rough-wall", "no flow <at which> it slips"),),
     ),
-    Verdict(claim=claim("doubted", expected=Outcome.REFUTED), outcome=Outcome.REFUTED, checks=checks(2, 1e-3)),
+    Verdict(
+        claim=claim("doubted", expected=Outcome.REFUTED),
+        outcome=Outcome.REFUTED,
+        checks=checks(2, 1e-3),
+    ),
     Verdict(claim=claim("deeper", section="Laws and cases"), outcome=Outcome.NOT_RUN),
 )
 RAN = [verdict for verdict in VERDICTS if verdict.outcome is not Outcome.NOT_RUN]
@@ -80,7 +105,11 @@ def row(text: str, name: str) -> str:
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ("", "2 of 5 claims did not come out as expected: bad, broken; 1 of 5 claims can&#39;t be told"),
+        (
+            "",
+            "2 of 5 claims did not come out as expected: bad, broken; 1 of 5 claims can&#39;t be "
+            "told",
+        ),
         ("", "Not drawn: The user&#39;s own: it was not measured"),
         ("", r"Not part of this run: <code[^>]*>deeper</code>"),
         ("good", "What good states of slip &amp; &lt;roll&gt;."),
@@ -113,7 +142,9 @@ def test_the_worst_numbers_come_first_no_section_is_empty_and_nothing_is_fetched
 def test_every_number_is_on_the_page():
     both = *checks(1), *checks(1, 0.5)
     m = dataclasses.replace(both[0].measurement, value=12.3456789, uncertainty=2.3e-4)
-    alone = dataclasses.replace(m, quantity="case", value=1.0, uncertainty=0.0, conditions={"start": "rest"})
+    alone = dataclasses.replace(
+        m, quantity="case", value=1.0, uncertainty=0.0, conditions={"start": "rest"}
+    )
     check, far = (dataclasses.replace(each, measurement=m) for each in both)
     again = dataclasses.replace(m)  # a copy, as another process returns it
     columns = report.columns(Records((again, alone)), {"good": (check,), "bad": (far,)})
@@ -134,26 +165,46 @@ def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(
             assert f"{heading.lower()} {found}" in validate.line(verdict).plain
             assert f"<dt>{heading}</dt>" in row(text, verdict.claim.id)
             assert html.unescape(typeset(found)) in row(text, verdict.claim.id)
-    for said in (wording.headline(RAN), wording.coarse_and_missing(RAN), *map(" ".join, wording.totals(RAN))):
+    for said in (
+        wording.headline(RAN),
+        wording.coarse_and_missing(RAN),
+        *map(" ".join, wording.totals(RAN)),
+    ):
         assert said in summary
         assert said in re.sub("</?b>", " ", text)
     m = dataclasses.replace(checks(1)[0].measurement, quantity="case")
-    for predicted, said in (12.0, "none: all equal"), (1.0, "not equal: case, reference"):  # counts have no tolerance
+    for predicted, said in (
+        (12.0, "none: all equal"),
+        (1.0, "not equal: case, reference"),
+    ):  # counts have no tolerance
         check = Check(measurement=m, predicted=predicted, tolerance=0.0, scale=1.0)
-        assert wording.findings(dataclasses.replace(RAN[0], checks=(check,))) == {"Largest deviation": said}
+        assert wording.findings(dataclasses.replace(RAN[0], checks=(check,))) == {
+            "Largest deviation": said
+        }
     bad = results.load(page.parent).verdicts["bad"]
-    assert (bad["id"], bad["verdict"], bad["passed"], bad["expected"]) == ("bad", "refuted", False, "confirmed")
+    assert (bad["id"], bad["verdict"], bad["passed"], bad["expected"]) == (
+        "bad",
+        "refuted",
+        False,
+        "confirmed",
+    )
     assert (bad["checks"], bad["agrees"]) == (len(VERDICTS[1].checks), 0)
     assert results.described(VERDICTS[1])["checks"][0]["conditions"]["y"] == 0.02
 
 
 def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypatch):
     figures = {
-        "fall": Drawing("A fall", lambda _: None, lambda _: (Figure(figsize=(1, 1)), ""), ("good", "bad")),
-        "gap": Drawing("A gap", lambda _: None, mock.Mock(side_effect=GapError("the run <is> lost")), ("good",)),
+        "fall": Drawing(
+            "A fall", lambda _: None, lambda _: (Figure(figsize=(1, 1)), ""), ("good", "bad")
+        ),
+        "gap": Drawing(
+            "A gap", lambda _: None, mock.Mock(side_effect=GapError("the run <is> lost")), ("good",)
+        ),
     }
     monkeypatch.setattr(report, "FIGURES", {})
-    monkeypatch.setattr(report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims})
+    monkeypatch.setattr(
+        report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims}
+    )
     page = report.write(Evidence(directory=tmp_path), VERDICTS[:2], Summary.of([], Level.QUICK, {}))
     text = page.read_text("utf-8")
     assert text.count('<figure class="plot"') == 1
@@ -164,7 +215,11 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("part", "other", "message"),
     [
-        ('"schema_version": 5', '"schema_version": 4', "holds no summary that this program reads: .* another format"),
+        (
+            '"schema_version": 5',
+            '"schema_version": 4',
+            "holds no summary that this program reads: .* another format",
+        ),
         ('"dualball": "[^"]*"', '"dualball": "0.0.0"', "holds results of dualball 0.0.0"),
     ],
 )
@@ -225,7 +280,10 @@ def test_claims_are_found_and_sorted_and_numbers_found(tab, page):
     tab.select_option("#outcome", "inconclusive")
     assert shown() == ["coarse"]
     tab.select_option("#outcome", "")
-    for order in (["bad", "doubted", "good", "broken", "coarse"], ["good", "doubted", "bad", "coarse", "broken"]):
+    for order in (
+        ["bad", "doubted", "good", "broken", "coarse"],
+        ["good", "doubted", "bad", "coarse", "broken"],
+    ):
         tab.click("[data-sort=id]")
         assert shown() == order  # within each section
 
@@ -241,13 +299,29 @@ def test_claims_are_found_and_sorted_and_numbers_found(tab, page):
     tab.click("[data-claim=good]")
     assert tab.input_value("#words") == "good"
     first = found("", "good")[0]
-    assert first[:3] + first[4:] == ["reference", "12", "ωc rad/s", "mujoco", "12", "1e-9", "12", "0", "3e-9", "good"]
+    assert first[:3] + first[4:] == [
+        "reference",
+        "12",
+        "ωc rad/s",
+        "mujoco",
+        "12",
+        "1e-9",
+        "12",
+        "0",
+        "3e-9",
+        "good",
+    ]
 
 
-def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_legible_and_prints(tab, page):
-    """All rows open, on a phone, too; text against its ground has the contrast 4.5 of WCAG AA, light and dark."""
+def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_legible_and_prints(
+    tab, page
+):
+    """All rows open, on a phone, too; text against its ground has the contrast 4.5 of WCAG AA,
+    light and dark."""
     tab.goto(f"{page.as_uri()}#good")
-    assert tab.locator("details.claim[open]").evaluate_all("rows => rows.map(row => row.id)") == ["good"]
+    assert tab.locator("details.claim[open]").evaluate_all("rows => rows.map(row => row.id)") == [
+        "good"
+    ]
     for width in (390, 1200):
         tab.set_viewport_size({"width": width, "height": 844})
         assert tab.evaluate(OPEN) <= width
@@ -267,9 +341,18 @@ def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_leg
     [
         ("ω̃_x, ω₀₂ > A_z", "<i>ω̃</i><sub>x</sub>, <i>ω</i><sub>02</sub> &gt; <i>A</i><sub>z</sub>"),
         ("(g - Rω₀²)/c", "(<i>g</i> − <i>R</i><i>ω</i><sub>0</sub>²)/<i>c</i>"),
-        ("r = 0.2 m, 8πρ_fνr/(jm)", "<i>r</i> = 0.2 m, 8<i>π</i><i>ρ</i><sub>f</sub><i>ν</i><i>r</i>/(<i>jm</i>)"),
-        ("y = -3 m, it doesn't, K ρ^(2/3)", "<i>y</i> = −3 m, it doesn&#39;t, <i>K</i> <i>ρ</i><sup>2/3</sup>"),
-        ("slip_x of run_of(m), test_j, RR, kg/m³, 2 cm", "slip_x of run_of(m), test_j, RR, kg/m³, 2 cm"),
+        (
+            "r = 0.2 m, 8πρ_fνr/(jm)",
+            "<i>r</i> = 0.2 m, 8<i>π</i><i>ρ</i><sub>f</sub><i>ν</i><i>r</i>/(<i>jm</i>)",
+        ),
+        (
+            "y = -3 m, it doesn't, K ρ^(2/3)",
+            "<i>y</i> = −3 m, it doesn&#39;t, <i>K</i> <i>ρ</i><sup>2/3</sup>",
+        ),
+        (
+            "slip_x of run_of(m), test_j, RR, kg/m³, 2 cm",
+            "slip_x of run_of(m), test_j, RR, kg/m³, 2 cm",
+        ),
         ("it rolls (R); A. R. Champneys", "it rolls (R); A. R. Champneys"),
     ],
 )
@@ -282,7 +365,9 @@ def figure_of_two():
     axes = figure.add_subplot()
     axes.plot([1.0, 10.0], [0.0, 4.0], label="_a line")
     axes.errorbar([1.0, 10.0], [1.0, 3.0], [0.1, 0.2], ls="none", marker="o", label="$ω_0$ marks")
-    axes.set(xscale="log", xlabel="$\\omega_0$ (rad/s)", ylabel="height", xlim=(0.5, 20), ylim=(-1, 5))
+    axes.set(
+        xscale="log", xlabel="$\\omega_0$ (rad/s)", ylabel="height", xlim=(0.5, 20), ylim=(-1, 5)
+    )
     return figure
 
 
@@ -318,7 +403,10 @@ def test_series_and_scales_are_in_the_picture_and_letters_are_shared():
 def test_the_league_page_answers(browser, tab, tmp_path, capsys):
     """Values under the pointer, a series switched off, zoom; without scripts the picture."""
     names = [f"tests.compare.test_runner:{name}" for name in ("EXACT", "ROUGH")]
-    told(capsys, f"league --quick --engine {names[0]} --engine {names[1]} --workers 1 --quiet -o {tmp_path}")
+    told(
+        capsys,
+        f"league --quick --engine {names[0]} --engine {names[1]} --workers 1 --quiet -o {tmp_path}",
+    )
     page = tmp_path / LEAGUE_PAGE
     assert "Copyright Timmy Willison" in page.read_text("utf-8")  # of what zooms
     tab.goto(page.as_uri())

@@ -1,4 +1,5 @@
-"""An engine that breaks loses its case and not the run, in pytest, too; files hold the whole set of cases."""
+"""An engine that breaks loses its case and not the run, in pytest, too; files hold the whole set of
+cases."""
 
 import json
 import os
@@ -22,8 +23,14 @@ BREAKS = {
     "sphere-rolls-down": ("hangs", "took longer than 3 s at a step of 4 ms"),
     "block-rests": ("dies", "crashed (exit code 3) at a step of 4 ms"),
     "cylinder": ("raises", "ValueError: singular matrix"),
-    "sphere-slips-down": ("shapes", "state() must return position, velocity and spin, not shapes [(3,), (2,), (3,)]"),
-    "sphere-slides-rolls": ("none", "state() must return position, velocity and spin, not shapes []"),
+    "sphere-slips-down": (
+        "shapes",
+        "state() must return position, velocity and spin, not shapes [(3,), (2,), (3,)]",
+    ),
+    "sphere-slides-rolls": (
+        "none",
+        "state() must return position, velocity and spin, not shapes []",
+    ),
     "box-stops": ("nan", "diverged by t = 0.04 s at a step of 4 ms"),
 }
 """How an engine breaks in a case, and what is said of it."""
@@ -31,7 +38,8 @@ BREAKS = {
 
 @dataclass
 class Exact:
-    """Knows the answer, and gives it with an error of first order; may break in the cases of `BREAKS`."""
+    """Knows the answer, and gives it with an error of first order; may break in the cases of
+    `BREAKS`."""
 
     breaks: bool = False
     PRECISION: str = "f64"
@@ -54,7 +62,11 @@ class Exact:
     def state(self):
         k = int(np.argmin(np.abs(self.case.times - self.done * self.timestep)))
         position, velocity, spin = self.case.exact[k].reshape(3, 3)
-        broken = {"shapes": (position, velocity[:2], spin), "nan": (position, velocity * np.nan, spin), "none": None}
+        broken = {
+            "shapes": (position, velocity[:2], spin),
+            "nan": (position, velocity * np.nan, spin),
+            "none": None,
+        }
         if self.how in broken:
             return broken[self.how]
         return position + self.timestep * self.case.times[k] * np.eye(3)[0], velocity, spin
@@ -66,7 +78,9 @@ EXACT, ROUGH = Exact(), Exact(PRECISION="f32")
 
 def test_what_breaks_loses_the_case_and_not_the_run():
     first, *broken, last = run_all(
-        [CASES[name] for name in ("block-slides", *BREAKS, "turntable")], Exact(breaks=True), limit=3.0
+        [CASES[name] for name in ("block-slides", *BREAKS, "turntable")],
+        Exact(breaks=True),
+        limit=3.0,
     )
     assert first.passed
     assert last.passed
@@ -89,9 +103,15 @@ def test_errors_order_creep_and_cost():
 @pytest.mark.parametrize(
     ("engine", "says"),
     [
-        ("no.such.module", "no.such.module can't be used: ModuleNotFoundError: No module named 'no'"),
+        (
+            "no.such.module",
+            "no.such.module can't be used: ModuleNotFoundError: No module named 'no'",
+        ),
         ("compare.bench.runner", "compare.bench.runner has no function build nor step nor state"),
-        (SimpleNamespace(build=print, step=print), "SimpleNamespace has no function state; an engine has build, step"),
+        (
+            SimpleNamespace(build=print, step=print),
+            "SimpleNamespace has no function state; an engine has build, step",
+        ),
         ("compare.adapters.dart:gone", " (dartpy "),
         (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
     ],
@@ -125,9 +145,17 @@ def test_the_set_as_files(tmp_path, capsys):
         for case in cases():
             again = read(tmp_path / f"{case.name}.json")
             assert again.error(case.exact) == 0
-            assert (again.bodies, again.surfaces, again.needs) == (case.bodies, case.surfaces, case.needs)
+            assert (again.bodies, again.surfaces, again.needs) == (
+                case.bodies,
+                case.surfaces,
+                case.needs,
+            )
             assert np.array_equal(file[case.name]["exact"], case.exact)
-            assert file[case.name]["contacts"].asstr()[:].tolist() == list(case.contacts) == list(again.contacts)
+            assert (
+                file[case.name]["contacts"].asstr()[:].tolist()
+                == list(case.contacts)
+                == list(again.contacts)
+            )
     assert "a hollow sphere" in told(capsys, "cases lands")
     refused(capsys, "cases land")
 
@@ -136,14 +164,24 @@ def test_a_file_of_version_1_is_read_and_what_is_none_refused(tmp_path):
     data = CASES["box-stops"].to_mapping()
     new = ("spring", "joint", "dry", "under", "between")
     data = {key: value for key, value in data.items() if key not in new} | {"version": 1}
-    data["surfaces"] = [{k: v for k, v in s.items() if k not in ("velocity", "restitution")} for s in data["surfaces"]]
+    data["surfaces"] = [
+        {k: v for k, v in s.items() if k not in ("velocity", "restitution")}
+        for s in data["surfaces"]
+    ]
     (path := tmp_path / "case.json").write_text(json.dumps(data))
     assert read(path).bodies == CASES["box-stops"].bodies
     newer = f"is of version {VERSION + 1} of the exact cases; this program reads 1 to {VERSION}"
     for text, error, says in (
         (json.dumps(data | {"version": VERSION + 1}), InputError, newer),
-        (json.dumps(data | {"schema": "other"}), InputError, "is no exact case: its schema is 'other'"),
-        *((text, StorageError, "holds no exact case") for text in ("[]", "{}", "no", '{"schema": "dualball-case"}')),
+        (
+            json.dumps(data | {"schema": "other"}),
+            InputError,
+            "is no exact case: its schema is 'other'",
+        ),
+        *(
+            (text, StorageError, "holds no exact case")
+            for text in ("[]", "{}", "no", '{"schema": "dualball-case"}')
+        ),
     ):
         path.write_text(text)
         with pytest.raises(error, match=says):
@@ -160,10 +198,14 @@ def state():
 """
 
 
-def test_adapters_of_a_file_are_asked_for_what_they_can_do_and_name_a_version_that_broke(tmp_path, monkeypatch):
+def test_adapters_of_a_file_are_asked_for_what_they_can_do_and_name_a_version_that_broke(
+    tmp_path, monkeypatch
+):
     (tmp_path / "of_version_1.py").write_text(OLD)
     (tmp_path / "of_version_2.py").write_text(f"FEATURES = ('two bodies',){OLD}")
-    (tmp_path / "broke.py").write_text(f"KNOWN = 'numpy 0.1'{OLD}def build(*given): raise RuntimeError('gone')")
+    (tmp_path / "broke.py").write_text(
+        f"KNOWN = 'numpy 0.1'{OLD}def build(*given): raise RuntimeError('gone')"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     assert run(CASES["box-stops"], "of_version_1").passed
     asked = run(CASES["plank"], "of_version_1")
@@ -181,7 +223,11 @@ def state():
     if case.name == "cylinder":
         return [0.0], [0.0], [0.0]
     return exact() * (1.2 if case.name == "box-stops" else 1.0)
-""".replace("    globals", "    if case.name == 'turntable': raise NotImplementedError('no tables')\n    globals", 1)
+""".replace(
+    "    globals",
+    "    if case.name == 'turntable': raise NotImplementedError('no tables')\n    globals",
+    1,
+)
 FIXTURES = """
 from model import Parameters
 def test_theory(dualball_theory):
@@ -196,28 +242,50 @@ INSTALLED = ("-p", "compare", "-p", "no:cacheprovider")
 
 @pytest.fixture(autouse=True, scope="module")
 def loaded():
-    """What the cases need: numba, which a test would take out of memory with all that it loads, can't load twice."""
+    """What the cases need: numba, which a test would take out of memory with all that it loads,
+    can't load twice."""
     bench.cases()
 
 
 def test_an_engine_on_the_exact_cases_beside_tests_of_ones_own(pytester):
     pytester.makepyfile(adapter=ADAPTER, test_mine=FIXTURES)
     known = pytester.makefile(".txt", known="# ours\ncylinder   it has no wall\nblock-rests\n")
-    given = "test_mine.py", "--dualball-engine", "adapter", "--dualball-known", str(known), "-rx", "-n", "1"
+    given = (
+        "test_mine.py",
+        "--dualball-engine",
+        "adapter",
+        "--dualball-known",
+        str(known),
+        "-rx",
+        "-n",
+        "1",
+    )
     found = pytester.runpytest_subprocess(*INSTALLED, *given)
-    found.stdout.fnmatch_lines(["*box that is pushed off*errors*allowed is 0.01*", "*exact cases:*"])
-    found.stdout.re_match_lines([r"case +error +order", r"sphere-slides-rolls +0 .* passed", r"box-stops .* failed"])
+    found.stdout.fnmatch_lines(
+        ["*box that is pushed off*errors*allowed is 0.01*", "*exact cases:*"]
+    )
+    found.stdout.re_match_lines(
+        [r"case +error +order", r"sphere-slides-rolls +0 .* passed", r"box-stops .* failed"]
+    )
     found.stdout.fnmatch_lines(["*XFAIL adapter::cylinder - it has no wall*"])
     outcomes = found.parseoutcomes()
     new = sum(bool(case.needs) for case in bench.cases())  # of which the adapter says nothing
-    assert (outcomes["failed"], outcomes["xfailed"], outcomes["xpassed"], outcomes["skipped"]) == (1, 1, 1, 1 + new)
+    assert (outcomes["failed"], outcomes["xfailed"], outcomes["xpassed"], outcomes["skipped"]) == (
+        1,
+        1,
+        1,
+        1 + new,
+    )
     assert outcomes["passed"] == 2 * len(bench.cases()) - new - 3  # and the tests that are named
 
 
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        ("--dualball-engine nosuch", "*nosuch can't be used: ModuleNotFoundError: No module named 'nosuch'*"),
+        (
+            "--dualball-engine nosuch",
+            "*nosuch can't be used: ModuleNotFoundError: No module named 'nosuch'*",
+        ),
         ("--dualball-engine half", "*half has no function state*"),
         ("--dualball-engine half --dualball-known half.py", "*no case is called 'build'*"),
         ("--dualball-engine half --dualball-known none", "*cannot read none*"),

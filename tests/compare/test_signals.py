@@ -1,4 +1,5 @@
-"""Ctrl-C and SIGTERM end every command and every long call, with one line, and leave nothing that is half written."""
+"""Ctrl-C and SIGTERM end every command and every long call, with one line, and leave nothing that
+is half written."""
 
 import contextlib
 import os
@@ -41,11 +42,18 @@ def catches(process, number):
         status = Path(f"/proc/{process.pid}/status").read_text()
     except FileNotFoundError:
         return True
-    caught = next((line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), "f" * 16)
+    caught = next(
+        (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), "f" * 16
+    )
     return bool(int(caught, 16) >> (number - 1) & 1)
 
 
-ALL = [(command, number, after) for command in COMMANDS for number in SIGNALS for after in (0.0, 0.4, 1.5, 4.0, 10.0)]
+ALL = [
+    (command, number, after)
+    for command in COMMANDS
+    for number in SIGNALS
+    for after in (0.0, 0.4, 1.5, 4.0, 10.0)
+]
 
 
 @pytest.mark.parametrize(
@@ -58,7 +66,8 @@ ALL = [(command, number, after) for command in COMMANDS for number in SIGNALS fo
     ],
 )
 def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, after):
-    """To all that belongs to it, as a terminal and a cluster send it, so many seconds after it first can answer."""
+    """To all that belongs to it, as a terminal and a cluster send it, so many seconds after it
+    first can answer."""
     here = Path(shutil.copytree(stocked, tmp_path / "here"))
     before = set(here.rglob("*"))
     line = command, *LONG.get(command, "").split()
@@ -76,10 +85,20 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
         assert process.returncode == 128 + number, err
         (said,) = (line for line in err.splitlines() if line.startswith("dualball"))
         assert "interrupted" in said or "was stopped at t =" in said
-        if out and command not in ("simulate", "validate", "figures", "judge", "explore"):  # then it had just been done
+        if out and command not in (
+            "simulate",
+            "validate",
+            "figures",
+            "judge",
+            "explore",
+        ):  # then it had just been done
             assert out.rstrip() == started(*line, cwd=here).communicate()[0].rstrip()
     new = set(here.rglob("*")) - before
-    assert not [path for path in new if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))]
+    assert not [
+        path
+        for path in new
+        if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))
+    ]
 
 
 INTERRUPTED = """
@@ -145,8 +164,11 @@ def test_a_signal_that_python_loses_comes_again(heard):
 
 @pytest.mark.parametrize(("lasts", "then"), [("0.2", 60), ("60", 60), ("0", 0)])
 def test_an_import_is_not_cut_short(heard, lasts, then, tmp_path, monkeypatch):
-    """Unless it doesn't end; and what ends just after it doesn't leave the signal to whoever comes next."""
-    text = f"import os, time\nos.kill(os.getpid(), {int(heard)})\ntime.sleep({lasts})\nwhole = True\n"
+    """Unless it doesn't end; and what ends just after it doesn't leave the signal to whoever comes
+    next."""
+    text = (
+        f"import os, time\nos.kill(os.getpid(), {int(heard)})\ntime.sleep({lasts})\nwhole = True\n"
+    )
     (tmp_path / f"slow_{heard}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
 

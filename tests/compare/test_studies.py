@@ -1,4 +1,5 @@
-"""Tables of pages have each their place, formulas are what MuJoCo does, and a ladder changes one thing at a time."""
+"""Tables of pages have each their place, formulas are what MuJoCo does, and a ladder changes one
+thing at a time."""
 
 import dataclasses
 import itertools
@@ -17,11 +18,14 @@ ROWS = [["a", "b"], ["1", "2"], ["3", "4"]]
 
 def test_a_table_is_put_in_its_place(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("before\n<!-- begin: x -->\nold\n<!-- end: x -->\nafter <!-- begin: y --><!-- end: y -->\n")
+    page.write_text(
+        "before\n<!-- begin: x -->\nold\n<!-- end: x -->\nafter <!-- begin: y --><!-- end: y -->\n"
+    )
     for _ in range(2):
         tables.write(page, "x", ROWS)
         assert page.read_text() == (
-            "before\n<!-- begin: x -->\n| a | b |\n| --- | --: |\n| 1 | 2 |\n| 3 | 4 |\n<!-- end: x -->\n"
+            "before\n<!-- begin: x -->\n| a | b |\n| --- | --: |\n| 1 | 2 |\n| 3 | 4 |\n<!-- end: "
+            "x -->\n"
             "after <!-- begin: y --><!-- end: y -->\n"
         )
     with pytest.raises(InputError, match="must have the lines '<!-- begin: z -->'"):
@@ -47,9 +51,18 @@ def test_formulas_are_what_mujoco_does_and_one_that_is_off_is_noticed():
 
 
 def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time():
-    rungs = list(settings.rungs(1e-3).values())[1:]  # below them MuJoCo as it comes, an engine of its own
+    rungs = list(settings.rungs(1e-3).values())[
+        1:
+    ]  # below them MuJoCo as it comes, an engine of its own
     assert rungs[-1] == ContactSettings()
-    contact = {"solref", "solreffriction", "solimp", "impratio"}  # one thing: what makes it stiff and continuous
+    contact = {
+        "solref",
+        "solreffriction",
+        "solimp",
+        "impratio",
+    }  # one thing: what makes it stiff and continuous
     for low, high in itertools.pairwise(rungs):
-        changed = {f.name for f in dataclasses.fields(low) if getattr(low, f.name) != getattr(high, f.name)}
+        changed = {
+            f.name for f in dataclasses.fields(low) if getattr(low, f.name) != getattr(high, f.name)
+        }
         assert len(changed) == 1 or changed == contact

@@ -19,13 +19,18 @@ from tests.commands import carried_out
 from tests.measured import claim, measured
 
 pytestmark = pytest.mark.usefixtures("few_figures")
-SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("reference").replace(c=0.0)}
+SETS = {
+    "mine": Parameters.named("reference"),
+    "undamped": Parameters.named("reference").replace(c=0.0),
+}
 
 
 def going_round(lab, sets, records):
     """A measurement of every set, made up."""
     for name, p in sets.items():
-        yield dataclasses.replace(measured("round", "omega_c", p.omega_0, 1e-9, p, name), engine=lab.engine.name)
+        yield dataclasses.replace(
+            measured("round", "omega_c", p.omega_0, 1e-9, p, name), engine=lab.engine.name
+        )
 
 
 def after(lab, sets, records):
@@ -49,7 +54,8 @@ NEEDS = {"next": ("broken",), "after": ("round",)}
 
 @pytest.fixture
 def counted(monkeypatch):
-    """Some protocols and their claims in the place of the real ones; the names of those that were carried out."""
+    """Some protocols and their claims in the place of the real ones; the names of those that were
+    carried out."""
     done = []
 
     def counting(name, measure):
@@ -69,8 +75,11 @@ def run(directory, sets=SETS, **how):
     return validation.validate(directory, level=Level.QUICK, sets=sets, workers=0, **how)
 
 
-def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_named(tmp_path, counted):
-    """What needs a broken protocol isn't measured: it would be kept, and taken for whole once the other is mended."""
+def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_named(
+    tmp_path, counted
+):
+    """What needs a broken protocol isn't measured: it would be kept, and taken for whole once the
+    other is mended."""
     verdicts = run(tmp_path)
     assert [verdict.outcome for verdict in verdicts] == ["confirmed", "error", "error", "not run"]
     assert (tmp_path / results.REPORT).exists()
@@ -80,7 +89,10 @@ def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_na
 
 
 def test_an_engine_that_is_named_is_heard_alone(tmp_path, counted):
-    for engine, heard in ((None, ["mujoco", "mujoco-plain", "mujoco-defaults"]), (MUJOCO, ["mujoco"])):
+    for engine, heard in (
+        (None, ["mujoco", "mujoco-plain", "mujoco-defaults"]),
+        (MUJOCO, ["mujoco"]),
+    ):
         (said,) = run(tmp_path, engine=engine, claims=["of-round"])
         assert [witness.engine for witness in said.witnesses] == heard
 
@@ -124,7 +136,9 @@ def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
         assert first.wait(30)
         yield from ()
 
-    monkeypatch.setattr(validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("waiting", waiting)))
+    monkeypatch.setattr(
+        validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("waiting", waiting))
+    )
     monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, about("waiting")))
     assert run(tmp_path, announce=announce)[-1].outcome == "not run"
     assert set(seen) == {each.id for each in validation.CLAIMS}
@@ -147,14 +161,22 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab):
     assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
-def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(tmp_path, lab):
+def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
+    tmp_path, lab
+):
     for engine in (None, MUJOCO):  # what one measured is not taken for the other's
         protocol = Protocol("round", going_round, engine=engine)
-        (row,) = programme.carry_out(Job(protocol, lab, tmp_path, {"mine": SETS["mine"]}), Records()).measurements
+        (row,) = programme.carry_out(
+            Job(protocol, lab, tmp_path, {"mine": SETS["mine"]}), Records()
+        ).measurements
         assert row.engine == (engine or EVENT).name
     for name, count in (("mine", 1), ("reference", 0)):
-        protocol = Protocol(f"of-{name}", lambda lab, sets, records: (), alone="it is that of the reference")
-        missing = programme.carry_out(Job(protocol, lab, tmp_path, {name: SETS["mine"]}), Records()).missing
+        protocol = Protocol(
+            f"of-{name}", lambda lab, sets, records: (), alone="it is that of the reference"
+        )
+        missing = programme.carry_out(
+            Job(protocol, lab, tmp_path, {name: SETS["mine"]}), Records()
+        ).missing
         assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
 
 
@@ -182,7 +204,9 @@ def test_the_command_line(command, tmp_path, counted, capsys):
         ("mine", Outcome.ERROR, 1),
     ],
 )
-def test_what_a_set_of_ones_own_is_too_rough_for_is_no_failure(of, outcome, code, monkeypatch, tmp_path, capsys):
+def test_what_a_set_of_ones_own_is_too_rough_for_is_no_failure(
+    of, outcome, code, monkeypatch, tmp_path, capsys
+):
     row = measured("round", "omega_c", 12.0, 1.0, set=of)
     check = Check(measurement=row, predicted=12.0, tolerance=1.0, scale=12.0)
     found = Verdict(claim=about("round"), outcome=outcome, checks=(check,))

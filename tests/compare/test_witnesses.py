@@ -1,4 +1,5 @@
-"""What other engines say is judged in limits of no step that contain the truth, of all that they were asked."""
+"""What other engines say is judged in limits of no step that contain the truth, of all that they
+were asked."""
 
 import math
 
@@ -20,19 +21,28 @@ STEPS = RATIOS / 20
 
 def seen(error, **conditions):
     """A measurement of omega_c with a relative error."""
-    return Records((measured("settled", "omega_c", P.omega_0 * (1 + error), 1e-12, P, "mine", **conditions),))
+    return Records(
+        (measured("settled", "omega_c", P.omega_0 * (1 + error), 1e-12, P, "mine", **conditions),)
+    )
 
 
 def said(steps, trial=None, of=None, witness="mujoco-plain"):
-    """What a witness says by its measurements at steps that are so many times shorter, beside the engine on trial."""
-    return full_verdict(of or claim(), {"mujoco": {1: trial or seen(0.0)}, witness: steps}).witnesses[1]
+    """What a witness says by its measurements at steps that are so many times shorter, beside the
+    engine on trial."""
+    return full_verdict(
+        of or claim(), {"mujoco": {1: trial or seen(0.0)}, witness: steps}
+    ).witnesses[1]
 
 
 SERIES = (
     (0.3 * RATIOS, 1e-12, 1.0),
     (0.3 * RATIOS**2, 1e-12, 2.0),
     (0.1 * RATIOS + 0.02 * RATIOS**2, 1e-12, 1.13),
-    ([1.28e-3, -3.7e-4, -4.7e-4], 1e-14, None),  # terms of two orders cancel: -2.8e-3 h + 4.1e-3 h^2
+    (
+        [1.28e-3, -3.7e-4, -4.7e-4],
+        1e-14,
+        None,
+    ),  # terms of two orders cancel: -2.8e-3 h + 4.1e-3 h^2
     (0.01 * np.sqrt(RATIOS), 1.4e-4, ...),
     ([1.102e-2, 6.33e-3, 5.39e-3, 4.8e-3], 1.4e-4, ...),  # as where heavy-core loses the floor
     ([1e-3, -2e-3, 5e-4, -5e-4], 1e-3, None),  # noise: the last is the limit
@@ -45,7 +55,9 @@ def test_known_sequences_have_their_limit_and_order(errors, own, order):
     assert abs(limit.value) <= COVERAGE * limit.uncertainty
     assert limit.uncertainty >= own
     assert own > 1e-12 or order is None or abs(limit.value) <= 1e-10
-    assert order is ... or (math.isnan(found) if order is None else found == pytest.approx(order, abs=0.01))
+    assert order is ... or (
+        math.isnan(found) if order is None else found == pytest.approx(order, abs=0.01)
+    )
 
 
 def test_errors_of_fourth_order_have_a_limit_where_four_steps_show_it():
@@ -60,7 +72,8 @@ def test_errors_of_fourth_order_have_a_limit_where_four_steps_show_it():
 
 
 def test_the_uncertainty_of_a_limit_covers_the_truth():
-    """Smooth errors of both orders, with terms that fall as the step in natural units, and noise of known size."""
+    """Smooth errors of both orders, with terms that fall as the step in natural units, and noise of
+    known size."""
     rng, covered = np.random.default_rng(1), []
     for _ in range(400):
         first = int(rng.integers(1, 3))
@@ -68,7 +81,9 @@ def test_the_uncertainty_of_a_limit_covers_the_truth():
         terms = [size[k] * STEPS ** (first + k) for k in range(5)]
         own = 10 ** rng.uniform(-9, -4)
         truth = rng.normal()
-        limit, _ = extrapolated(STEPS, truth + sum(terms) + own * rng.uniform(-1, 1, 4), np.full(4, own))
+        limit, _ = extrapolated(
+            STEPS, truth + sum(terms) + own * rng.uniform(-1, 1, 4), np.full(4, own)
+        )
         covered.append(abs(limit.value - truth) <= COVERAGE * limit.uncertainty)
     assert all(covered)
 
@@ -78,16 +93,19 @@ def test_the_uncertainty_of_a_limit_covers_the_truth():
     [
         (0.0, 0.01, 4, 0.9, Outcome.CONFIRMED),
         (0.05, 0.01, 4, 0.9, Outcome.REFUTED),
-        # Next to a threshold the step decides on the case, and all of a state in the wrong case would be off.
+        # Next to a threshold the step decides on the case, and all of a state in the wrong case
+        # would be off.
         (0.05, 0.01, 4, 0.99, Outcome.INCONCLUSIVE),
-        # Three steps show a limit to a tenth of what extrapolation takes away, 3.3e-6; with four the lesser is noticed.
+        # Three steps show a limit to a tenth of what extrapolation takes away, 3.3e-6; with four
+        # the lesser is noticed.
         (5e-7, 1e-5, 3, 0.9, Outcome.CONFIRMED),
         (5e-7, 1e-5, 4, 0.9, Outcome.REFUTED),
         (5e-6, 1e-5, 3, 0.9, Outcome.REFUTED),
     ],
 )
 def test_a_claim_is_judged_in_the_limit_of_no_step(left, least, steps, near, outcome):
-    """States that differ a little with the step are the same state; at 2 ms it is off by what users see."""
+    """States that differ a little with the step are the same state; at 2 ms it is off by what users
+    see."""
     end = Records((measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine"),))
     errors = {n: seen(left + least / n, slip_x=1.0 + 0.05 / n) for n in range(1, steps + 1)}
     plain = said(errors, seen(0.0) + end)
@@ -100,23 +118,31 @@ def test_a_claim_is_judged_in_the_limit_of_no_step(left, least, steps, near, out
 
 
 @pytest.mark.parametrize(
-    ("errors", "agrees"), [((7.0e-4, 1.2e-3, 1.2e-3), True), ((0.03, 0.02, 0.015), None), ((0.02, 0.02, 0.02), False)]
+    ("errors", "agrees"),
+    [((7.0e-4, 1.2e-3, 1.2e-3), True), ((0.03, 0.02, 0.015), None), ((0.02, 0.02, 0.02), False)],
 )
 def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
-    """Two that are the same don't show a limit that well, and one that moves far shows none; one that stays off is."""
+    """Two that are the same don't show a limit that well, and one that moves far shows none; one
+    that stays off is."""
     places = [measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors]
-    checks = [Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places]
+    checks = [
+        Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places
+    ]
     limit = _limit_of_no_step(list(zip((2, 3, 4), checks, strict=True)))
     assert (limit and limit[0].agrees) is agrees
 
 
 def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
-    plain = said({n: seen(0.0, slip_x=100.0 * (n == 1), slip_y=100.0 * (n == 2)) for n in (1, 2, 3)})
+    plain = said(
+        {n: seen(0.0, slip_x=100.0 * (n == 1), slip_y=100.0 * (n == 2)) for n in (1, 2, 3)}
+    )
     assert (plain.outcome, plain.left_out) == (Outcome.INCONCLUSIVE, 1)
     assert plain.reason == "too few numbers can tell: 0 of 1 in ω_c"
 
 
-@pytest.mark.parametrize(("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)])
+@pytest.mark.parametrize(
+    ("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)]
+)
 def test_an_engine_as_it_comes_may_be_off_by_its_allowance(error, outcome):
     defaults = said({2: seen(error)}, witness="mujoco-defaults")
     assert (defaults.outcome, defaults.farthest) == (outcome, pytest.approx(error))
@@ -125,7 +151,11 @@ def test_an_engine_as_it_comes_may_be_off_by_its_allowance(error, outcome):
 def test_who_was_asked_and_measured_nothing_is_undecided_and_says_why():
     for name, outcome, reason in (
         ("mine", Outcome.INCONCLUSIVE, "too few numbers can tell: 0 of 1 in ω_c"),
-        ("another", Outcome.NOT_ASKED, "at this level nothing that bears on the claim was asked of it"),
+        (
+            "another",
+            Outcome.NOT_ASKED,
+            "at this level nothing that bears on the claim was asked of it",
+        ),
     ):
         plain = said({1: Records((), (Missing("settled", name, "nothing settles"),))})
         assert (plain.outcome, plain.reason) == (outcome, f"{reason}; {name}: nothing settles")
@@ -146,10 +176,12 @@ def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
 
 
 @pytest.mark.parametrize(
-    ("lost", "outcome"), [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE), (3, Outcome.INCONCLUSIVE)]
+    ("lost", "outcome"),
+    [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE), (3, Outcome.INCONCLUSIVE)],
 )
 def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost, outcome):
-    """The engine on trial has a count and a flow on three sets, the witness all counts, but not all flows."""
+    """The engine on trial has a count and a flow on three sets, the witness all counts, but not all
+    flows."""
     flow = Bearing("thresholds", "omega_03", lambda m: m.parameters.omega_0)
     of = claim("it", Bearing("thresholds", "lifts", lambda m: 1.0), flow)
     sets = ("one", "another", "third")
@@ -157,4 +189,6 @@ def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost, outc
     flows = tuple(measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)
     own = Records(counts + flows[lost:])
     assert said(dict.fromkeys((1, 2, 3), own), Records(counts + flows), of).outcome is outcome
-    assert full_verdict(of, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN  # counts confirm no number
+    assert (
+        full_verdict(of, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN
+    )  # counts confirm no number

@@ -1,4 +1,5 @@
-"""Cases from made-up steps whose case is plain, in one piece or many; events of motions whatever their sampling."""
+"""Cases from made-up steps whose case is plain, in one piece or many; events of motions whatever
+their sampling."""
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ WEIGHT = P.m * P.g
 
 
 def made(cases):
-    """Steps that show the given cases plainly: loads of the weight, slip of 0.1 m/s, half the friction in rolling."""
+    """Steps that show the given cases plainly: loads of the weight, slip of 0.1 m/s, half the
+    friction in rolling."""
     letters = np.array([list(case.name) for case in cases])
     closed, slips = letters != "N", letters == "S"
     normal = WEIGHT * closed
@@ -46,7 +48,9 @@ def test_all_nine_cases_and_their_changes(sizes) -> None:
     np.testing.assert_array_equal(events.to_case, list(Case)[1:])
     np.testing.assert_array_equal(events.from_case, list(Case)[:-1])
     # What jumps is located no better than to the steps that a contact takes to stick.
-    np.testing.assert_allclose(events.time / SETTINGS.timestep, np.arange(1, 9) * 2 * PERSISTENCE, rtol=0, atol=3)
+    np.testing.assert_allclose(
+        events.time / SETTINGS.timestep, np.arange(1, 9) * 2 * PERSISTENCE, rtol=0, atol=3
+    )
 
 
 @pytest.mark.parametrize("sizes", [[1000], [1] * 1000])
@@ -72,10 +76,13 @@ def test_between_the_bands_a_contact_is_what_it_was() -> None:
 
 @pytest.mark.parametrize("motion", [LANDING, HITTING])
 def test_cases_and_events_come_from_steps_whatever_the_sampling(motion) -> None:
-    """The contacts close first, located to a fine step, and stick in the end, to a tenth of a step of 1 ms."""
+    """The contacts close first, located to a fine step, and stick in the end, to a tenth of a step
+    of 1 ms."""
     exact = motion.exact.events
     runs = [
-        mjsim.simulate(motion.p, motion.x0, motion.lasts, settings=SETTINGS, sample_interval=interval)
+        mjsim.simulate(
+            motion.p, motion.x0, motion.lasts, settings=SETTINGS, sample_interval=interval
+        )
         for interval in (1e-3, 7e-3, motion.lasts)
     ]
     for run in runs:
@@ -89,8 +96,11 @@ def test_cases_and_events_come_from_steps_whatever_the_sampling(motion) -> None:
 
 
 def test_a_ball_at_rest_is_not_slipping() -> None:
-    """From rest it rolls on the floor and, once it is pressed there, slips on the wall; then it rolls, then slips."""
-    run = mjsim.simulate(P.replace(omega_0=25.0), np.zeros(8), 3.0, settings=SETTINGS, sample_interval=3.0)
+    """From rest it rolls on the floor and, once it is pressed there, slips on the wall; then it
+    rolls, then slips."""
+    run = mjsim.simulate(
+        P.replace(omega_0=25.0), np.zeros(8), 3.0, settings=SETTINGS, sample_interval=3.0
+    )
     cases = [run.cases[0].name, *(Case(code).name for code in run.events.to_case)]
     assert set(cases[:-2]) <= {"RS", "RN"}
     assert cases[-2:] == ["RR", "SS"]

@@ -31,12 +31,21 @@ def test_contacts_die_out_for_all_friction_up_to_one() -> None:
     fast = ContactSettings.at(2e-3)
     for mu in np.linspace(0, 3, 13):
         for eta in np.linspace(0, 3, 13):
-            assert fast.suited(Parameters.named("reference").replace(mu=mu, eta=eta)).contact_decay(mu, eta) < 1
+            assert (
+                fast.suited(Parameters.named("reference").replace(mu=mu, eta=eta)).contact_decay(
+                    mu, eta
+                )
+                < 1
+            )
 
 
-@pytest.mark.parametrize(("solref", "holds"), [((3, 0.75), True), ((2, 1.0), True), ((2, 0.5), False)])
+@pytest.mark.parametrize(
+    ("solref", "holds"), [((3, 0.75), True), ((2, 1.0), True), ((2, 0.5), False)]
+)
 def test_decay_tells_which_contacts_hold_a_slipping_ball(solref, holds) -> None:
-    p = Parameters(m=0.016, r=0.0221, R=0.0613, j=0.657, mu=0.92, eta=0.4, g=7.9, c=0.907, omega_0=15.9)
+    p = Parameters(
+        m=0.016, r=0.0221, R=0.0613, j=0.657, mu=0.92, eta=0.4, g=7.9, c=0.907, omega_0=15.9
+    )
     (steady,) = (each for each in analytic.stationary_solutions(p) if each.case is Case.SS)
     step = 2e-3
     settings = ContactSettings.for_problem(p, step, solref=(solref[0] * step, solref[1]))

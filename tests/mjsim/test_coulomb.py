@@ -1,8 +1,9 @@
-"""Coulomb's law in any MuJoCo model: what sticks does not creep, what slides does not lift, what lands does not bounce.
+"""Coulomb's law in any MuJoCo model: what sticks does not creep, what slides does not lift, what
+lands does not bounce.
 
-Closed forms are of one rigid body. MuJoCo's step is of first order: what moves is wrong by h/2 times its speed.
-That rigid contacts roll, turn, land and bounce as they should exact cases show, in tests/compare/test_engines.py.
-"""
+Closed forms are of one rigid body. MuJoCo's step is of first order: what moves is wrong by h/2
+times its speed. That rigid contacts roll, turn, land and bounce as they should exact cases show, in
+tests/compare/test_engines.py."""
 
 import math
 from pathlib import Path
@@ -25,12 +26,24 @@ WAYS = pytest.mark.parametrize("rigid", [False, True], ids=["soft", "rigid"])
 
 
 def scene(
-    slope=0.0, mu=0.6, cone="elliptic", boxes=1, geom=BOX, option="", friction=".005 .0001", condim=3, height=0.05
+    slope=0.0,
+    mu=0.6,
+    cone="elliptic",
+    boxes=1,
+    geom=BOX,
+    option="",
+    friction=".005 .0001",
+    condim=3,
+    height=0.05,
 ):
-    """Bodies one on top of the other on a plane that is tilted by `slope`, rad; gravity is turned instead."""
-    bodies = "".join(f'<body pos="0 0 {height + 0.1 * i}"><freejoint/>{geom}</body>' for i in range(boxes))
+    """Bodies one on top of the other on a plane that is tilted by `slope`, rad; gravity is turned
+    instead."""
+    bodies = "".join(
+        f'<body pos="0 0 {height + 0.1 * i}"><freejoint/>{geom}</body>' for i in range(boxes)
+    )
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="{cone}" gravity="{G * np.sin(slope)} 0 {-G * np.cos(slope)}" {option}/>'
+        f'<mujoco><option cone="{cone}" gravity="{G * np.sin(slope)} 0 {-G * np.cos(slope)}" '
+        f"{option}/>"
         f'<default><geom friction="{mu} {friction}" condim="{condim}"/></default>'
         f'<worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
     )
@@ -62,10 +75,11 @@ def creep(model, rigid=False):
     ],
 )
 def test_nothing_creeps(cone, rigid, option, more):
-    """Nothing moves inside the cone, nor a ball inside that of rolling friction, .02 m of a radius of .05 m.
+    """Nothing moves inside the cone, nor a ball inside that of rolling friction, .02 m of a radius
+    of .05 m.
 
-    What is left is the solver's: with its default tolerance, 1e-8, about 1e-12 m/s, with implicit integrators 1e-10.
-    """
+    What is left is the solver's: with its default tolerance, 1e-8, about 1e-12 m/s, with implicit
+    integrators 1e-10."""
     model, _ = scene(np.radians(10), cone=cone, option=f'tolerance="1e-14" {option}', **more)
     assert creep(model, rigid) < (1e-7 if "PGS" in option else 1e-12)
 
@@ -88,8 +102,12 @@ def test_breaks_away_at_the_limit(cone, rigid):
 @pytest.mark.parametrize("geom", [BOX, CYLINDER, BALL], ids=["box", "cylinder", "ball"])
 @pytest.mark.parametrize("step", [4e-3, 2e-3, 1e-3])
 def test_what_slides_keeps_its_contacts(cone, rigid, geom, step):
-    """Down a slope with g (sin - mu cos), to 1e-9, and never without contact; where it begins, it settles for 2 s."""
-    slope, mu = np.radians(20), 0.05 if geom == BALL else 0.25  # a ball slides as long as mu < 2/7 tan
+    """Down a slope with g (sin - mu cos), to 1e-9, and never without contact; where it begins, it
+    settles for 2 s."""
+    slope, mu = (
+        np.radians(20),
+        0.05 if geom == BALL else 0.25,
+    )  # a ball slides as long as mu < 2/7 tan
     model, data = scene(slope, mu, cone, geom=geom, option=f'timestep="{step}" tolerance="1e-12"')
     law, speeds, loads = Coulomb(model, rigid=rigid), [], []
     law.step(data, round(2 / step))
@@ -98,8 +116,11 @@ def test_what_slides_keeps_its_contacts(cone, rigid, geom, step):
         speeds.append(data.qvel[0])
         loads.append(data.efc_force.max(initial=0))
     exact = G * (np.sin(slope) - mu * np.cos(slope))
-    # A cylinder's three points turn it a little as it begins: that dies out as slowly as it slides fast.
-    assert np.diff(speeds) / step == pytest.approx(exact, rel=1e-4 if geom == CYLINDER and rigid else 1e-9)
+    # A cylinder's three points turn it a little as it begins: that dies out as slowly as it slides
+    # fast.
+    assert np.diff(speeds) / step == pytest.approx(
+        exact, rel=1e-4 if geom == CYLINDER and rigid else 1e-9
+    )
     assert min(loads) > 0
 
 
@@ -116,12 +137,15 @@ def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(cone, rigid, step
         law.step(data)
         heights.append(data.qpos[2])
     assert np.ptp(heights) < 3e-5
-    assert data.qpos[0] - begin == pytest.approx(speed**2 / (2 * mu * G), abs=1.1 * step * speed / 2)
+    assert data.qpos[0] - begin == pytest.approx(
+        speed**2 / (2 * mu * G), abs=1.1 * step * speed / 2
+    )
 
 
 @CONES
 def test_servo_takes_the_depth_away(cone):
-    """A ball that rolls down has the lever r, so that it gains 5/7 g sin(slope): 1 % less without servo."""
+    """A ball that rolls down has the lever r, so that it gains 5/7 g sin(slope): 1 % less without
+    servo."""
     slope, ball = np.radians(5), '<geom size=".05" mass=".03" margin="2e-3"/>'
     model, data = scene(slope, cone=cone, geom=ball, option='tolerance="1e-12"')
     law = Coulomb(model, servo=0.1)
@@ -142,7 +166,8 @@ def test_servo_takes_the_depth_away(cone):
 @CONES
 @WAYS
 def test_every_door_leads_to_the_same_bits(cone, rigid):
-    """`step`, its halves; `mj_step`, of two simulations in turn, and its halves in either order under the callback."""
+    """`step`, its halves; `mj_step`, of two simulations in turn, and its halves in either order
+    under the callback."""
     model, data = scene(0.3, mu=0.25, cone=cone, boxes=2)
     Coulomb(model, rigid=rigid).step(data, 100)
     halves, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
@@ -176,7 +201,8 @@ def test_runge_kutta_has_the_callback():
 
 
 def test_forward_under_the_callback_changes_nothing():
-    """`mj_forward` between steps finds the forces of the step, and takes nothing from the memory."""
+    """`mj_forward` between steps finds the forces of the step, and takes nothing from the
+    memory."""
     model, data = scene(np.radians(15), option='tolerance="1e-14"')
     with Coulomb(model).installed():
         mujoco.mj_step(model, data, 1000)
@@ -189,7 +215,8 @@ def test_forward_under_the_callback_changes_nothing():
 
 
 def test_other_models_and_other_callbacks():
-    """What isn't installed is MuJoCo's own, to the bit; somebody else's callback is refused, and always restored."""
+    """What isn't installed is MuJoCo's own, to the bit; somebody else's callback is refused, and
+    always restored."""
     model, data = scene(np.radians(15))
     plain, copied = mujoco.MjData(model), scene(np.radians(15))
     mujoco.mj_step(model, plain, 100)
@@ -210,7 +237,10 @@ def test_other_models_and_other_callbacks():
     assert mujoco.get_mjcb_control() is None
     mujoco.set_mjcb_control(lambda model, data: None)
     try:
-        with pytest.raises(ValueError, match=r"mjcb_control is taken by .*lambda"), Coulomb(model).installed():
+        with (
+            pytest.raises(ValueError, match=r"mjcb_control is taken by .*lambda"),
+            Coulomb(model).installed(),
+        ):
             pass
     finally:
         mujoco.set_mjcb_control(None)
@@ -243,8 +273,15 @@ def test_what_is_refused():
         Coulomb(data)
     with pytest.raises(ValueError, match="not a state"):
         law.restore({"contacts": [], "joints": [], "time": [0, 0]})
-    for wrong in ({"contacts": np.zeros((1, 3))}, {"contacts": 0.0}, {"spins": np.zeros((1, 6))}, {"time": [0, 0, 0]}):
-        with pytest.raises(ValueError, match=f"not a state of Coulomb: {next(iter(wrong))} of shape"):
+    for wrong in (
+        {"contacts": np.zeros((1, 3))},
+        {"contacts": 0.0},
+        {"spins": np.zeros((1, 6))},
+        {"time": [0, 0, 0]},
+    ):
+        with pytest.raises(
+            ValueError, match=f"not a state of Coulomb: {next(iter(wrong))} of shape"
+        ):
             law.restore(law.state() | wrong)
     off = scene(option="/><option")[0]
     off.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
@@ -274,9 +311,12 @@ def test_a_state_that_mujoco_resets_is_forgotten(array, value, tmp_path, monkeyp
 
 @CONES
 @pytest.mark.parametrize(
-    ("given", "solref"), [({"condim": 1}, (0.02, 1)), ({}, (-1000, 0)), ({"geom": BOX, "height": 9}, (0.02, 1))]
+    ("given", "solref"),
+    [({"condim": 1}, (0.02, 1)), ({}, (-1000, 0)), ({"geom": BOX, "height": 9}, (0.02, 1))],
 )
-def test_contacts_without_friction_or_damping_or_none_at_all_are_the_engines_own(cone, given, solref):
+def test_contacts_without_friction_or_damping_or_none_at_all_are_the_engines_own(
+    cone, given, solref
+):
     model, data = scene(cone=cone, slope=0.1, **{"geom": BALL} | given)
     model.geom_solref[:] = solref
     plain = mujoco.MjData(model)
@@ -292,26 +332,39 @@ def test_scenes_of_the_page_hold(name, rigid):
 
 
 def test_a_rigid_box_stands_on_a_heightfield():
-    """Of which the collider reports a corner in each step, another in the next; one start of many may still fall."""
+    """Of which the collider reports a corner in each step, another in the next; one start of many
+    may still fall."""
     hill = '<hfield name="hill" nrow="3" ncol="3" size="1 1 .1 .1" elevation="0 0 0 0 1 0 0 0 0"/>'
     ways = []
     for x in (0.298, 0.299, 0.3, 0.301, 0.302):
         box = f'<body pos="{x} .1 .12"><freejoint/>{FLAT}</body>'
         scene = f'<worldbody><geom type="hfield" hfield="hill"/>{box}</worldbody>'
-        ways.append(creep(mujoco.MjModel.from_xml_string(f"<mujoco><asset>{hill}</asset>{scene}</mujoco>"), True))
+        ways.append(
+            creep(
+                mujoco.MjModel.from_xml_string(f"<mujoco><asset>{hill}</asset>{scene}</mujoco>"),
+                True,
+            )
+        )
     assert np.median(ways) < 1e-5
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "implicit"])
 def test_rigid_contacts_know_of_dampers(integrator):
-    """They become inertia, once, and motions stay as they are; `implicit` has Coriolis forces' derivative, too."""
+    """They become inertia, once, and motions stay as they are; `implicit` has Coriolis forces'
+    derivative, too."""
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option integrator="{integrator}" timestep=".002"/><worldbody><body><joint name="j" damping="3" '
-        'axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/><body pos=".3 0 0"><joint name="k" '
-        'damping=".5" axis="0 1 0"/><geom name="tip" type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body></body>'
-        '<geom name="floor" type="plane" pos="0 0 -.3" size="1 1 1"/></worldbody><contact><exclude body1="world" '
-        'body2="world"/></contact><tendon><fixed name="t" damping="1"><joint joint="j" coef="1"/><joint joint="k" '
-        'coef="-1"/></fixed></tendon><actuator><position joint="j" kp="30" kv="2"/><position tendon="t" kp="3" kv="1"/>'
+        f'<mujoco><option integrator="{integrator}" timestep=".002"/><worldbody><body><joint '
+        f'name="j" damping="3" '
+        'axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/><body pos=".3 0 '
+        '0"><joint name="k" '
+        'damping=".5" axis="0 1 0"/><geom name="tip" type="capsule" fromto="0 0 0 .3 0 0" '
+        'size=".02"/></body></body>'
+        '<geom name="floor" type="plane" pos="0 0 -.3" size="1 1 1"/></worldbody><contact><exclude '
+        'body1="world" '
+        'body2="world"/></contact><tendon><fixed name="t" damping="1"><joint joint="j" '
+        'coef="1"/><joint joint="k" '
+        'coef="-1"/></fixed></tendon><actuator><position joint="j" kp="30" kv="2"/><position '
+        'tendon="t" kp="3" kv="1"/>'
         "</actuator></mujoco>"
     )
     plain = mujoco.MjData(model)
@@ -320,14 +373,18 @@ def test_rigid_contacts_know_of_dampers(integrator):
     for _ in range(2):
         law, data = Coulomb(model, rigid=True), mujoco.MjData(model)
         law.step(data, 100)
-        assert data.qpos == pytest.approx(plain.qpos, rel=1e-5 if integrator == "implicit" else 1e-9)
+        assert data.qpos == pytest.approx(
+            plain.qpos, rel=1e-5 if integrator == "implicit" else 1e-9
+        )
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 def test_a_damped_finger_lands_in_a_step(integrator):
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option integrator="{integrator}" timestep=".002" tolerance="1e-12"/><worldbody><geom type="plane" '
-        'size="1 1 1"/><body pos="0 0 .1"><joint type="slide" axis="0 0 1" damping="50"/><geom size=".02" mass=".2"/>'
+        f'<mujoco><option integrator="{integrator}" timestep=".002" '
+        f'tolerance="1e-12"/><worldbody><geom type="plane" '
+        'size="1 1 1"/><body pos="0 0 .1"><joint type="slide" axis="0 0 1" damping="50"/><geom '
+        'size=".02" mass=".2"/>'
         "</body></worldbody></mujoco>"
     )
     data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
@@ -346,10 +403,12 @@ def test_a_damped_finger_lands_in_a_step(integrator):
 @pytest.mark.parametrize("kind", ["capsule", "box", "cylinder"])
 @pytest.mark.parametrize("centre", ["0 0 0", ".1 .05 0"])
 def test_what_spins_keeps_its_energy(kind, centre):
-    """With rigid contacts: Euler's method alone takes the moment of the beginning of a step, and feeds it."""
+    """With rigid contacts: Euler's method alone takes the moment of the beginning of a step, and
+    feeds it."""
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/>'
-        f'<geom type="{kind}" size=".02 .05 .03" pos="{centre}" quat="1 .3 .2 .1"/></body></worldbody></mujoco>'
+        f'<geom type="{kind}" size=".02 .05 .03" pos="{centre}" quat="1 .3 .2 '
+        f'.1"/></body></worldbody></mujoco>'
     )
     law = Coulomb(model, rigid=True)
 
@@ -359,7 +418,9 @@ def test_what_spins_keeps_its_energy(kind, centre):
         law.step(data, steps)
         for update in (mujoco.mj_forward, mujoco.mj_energyVel, mujoco.mj_subtreeVel):
             update(model, data)
-        found.append([data.energy[1], np.linalg.norm(data.subtree_angmom[1]), *data.subtree_linvel[1]])
+        found.append(
+            [data.energy[1], np.linalg.norm(data.subtree_angmom[1]), *data.subtree_linvel[1]]
+        )
     (energy, momentum, *velocity), (later, kept, *then) = found
     assert (later, kept) == pytest.approx((energy, momentum), rel=1e-12)
     assert then == pytest.approx(velocity, abs=1e-11)
@@ -368,11 +429,14 @@ def test_what_spins_keeps_its_energy(kind, centre):
 @WAYS
 @pytest.mark.parametrize("seeds", [[3], pytest.param(range(20), marks=pytest.mark.slow)])
 def test_piles_come_to_rest(seeds, rigid):
-    """The collider of boxes drops points and finds them again: bodies would rock if they were not put back."""
+    """The collider of boxes drops points and finds them again: bodies would rock if they were not
+    put back."""
     from docs.studies import friction
 
     models = [friction.pile(seed, mixed=False) for seed in seeds]
     plain = [friction.settle(model, friction.Plain(model))[1] for model in models]
-    drift, rise = np.transpose([friction.settle(model, Coulomb(model, rigid=rigid)) for model in models])
+    drift, rise = np.transpose(
+        [friction.settle(model, Coulomb(model, rigid=rigid)) for model in models]
+    )
     assert (drift < friction.STILL).sum() >= 0.95 * len(models)
     assert rise.max() <= max(friction.RISES[0], *plain)

@@ -1,4 +1,5 @@
-"""The law serves with numba and without it, and says so where MuJoCo is another one than it knows."""
+"""The law serves with numba and without it, and says so where MuJoCo is another one than it
+knows."""
 
 import re
 import subprocess
@@ -31,7 +32,9 @@ print("compiled" if compiled.COMPILES else "as it stands")
 
 def serves(before: str) -> str:
     """What holds a box on a slope in a Python of its own."""
-    done = subprocess.run([sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
@@ -52,13 +55,21 @@ STRUCTS = "import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fie
 @pytest.mark.parametrize(
     ("before", "says"),
     [
-        (STRUCTS.format("[f for f in d.fields if f.name != 'time']"), f"{NAME}.* which has no time"),
+        (
+            STRUCTS.format("[f for f in d.fields if f.name != 'time']"),
+            f"{NAME}.* which has no time",
+        ),
         (STRUCTS.format("d.fields[::-1]"), f"{NAME}.* doesn't lie in memory"),
-        ("import mujoco; mujoco.__version__, mujoco.MjModel = '3.3.0', object\n", "needs MuJoCo 4.0, and this is 3.3"),
+        (
+            "import mujoco; mujoco.__version__, mujoco.MjModel = '3.3.0', object\n",
+            "needs MuJoCo 4.0, and this is 3.3",
+        ),
     ],
 )
 def test_another_mujoco_is_named(before, says):
-    done = subprocess.run([sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True
+    )
     assert done.returncode == 1
     assert re.search(says, done.stderr.splitlines()[-1])
 

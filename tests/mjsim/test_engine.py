@@ -1,4 +1,5 @@
-"""The engine has the motions of exact forms, the same alone, in batches, on threads, compiled or not."""
+"""The engine has the motions of exact forms, the same alone, in batches, on threads, compiled or
+not."""
 
 import ctypes
 import math
@@ -19,8 +20,8 @@ P = Parameters.named("reference")
 def test_a_spin_under_which_the_axes_turn_stays_as_large_as_it_is() -> None:
     """On a smooth wall no moment turns the ball in space; a turn of the fluid takes 31 steps.
 
-    What the first step, whose accelerations are those before its end, leaves of a swing is gone after two turns.
-    """
+    What the first step, whose accelerations are those before its end, leaves of a swing is gone
+    after two turns."""
     p = P.replace(eta=0.0, omega_0=100.0)
     x0 = [1e3, -p.g / p.c, 100.0, 30.0, 0, 0]
     run = mjsim.simulate(p, x0, 4.0, settings=ContactSettings.for_problem(p, 2e-3))
@@ -50,8 +51,11 @@ RIGID = ContactSettings.rigid_at(1e-3)
 
 @pytest.mark.parametrize("settings", [None, ContactSettings(memory=False, servo=0.0), RIGID])
 def test_a_run_begins_at_the_azimuth_that_is_asked_for(settings) -> None:
-    """Later ones are second order in the step: places are brought back by the velocity of the sample."""
-    run = mjsim.simulate(P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], 0.01, settings=settings, theta_0=0.3)
+    """Later ones are second order in the step: places are brought back by the velocity of the
+    sample."""
+    run = mjsim.simulate(
+        P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], 0.01, settings=settings, theta_0=0.3
+    )
     assert run.theta[0] == pytest.approx(0.3, abs=1e-11)
 
 
@@ -61,7 +65,9 @@ def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> N
     sets = [P.replace(omega_0=omega_0) for omega_0 in (5.0, 12.0, 25.0, 40.0, 60.0)]
     x0s, told = [[0.0, 0, 10.0, 0, 0, 0]] * 4 + [[0, 0, 1e11, 0, 0, 0]], []
     one, *others = (
-        mjsim.simulate_many(sets, x0s, 0.1, settings=settings, sample_interval=0.01, threads=n, progress=told.append)
+        mjsim.simulate_many(
+            sets, x0s, 0.1, settings=settings, sample_interval=0.01, threads=n, progress=told.append
+        )
         for n in (1, 2, 3, 1000)
     )
     assert min(told) < told[-1] == max(told) == 1.0
@@ -88,12 +94,18 @@ def test_divergence_stops_a_run_and_keeps_what_there_is(settings, omega_c) -> No
 
 @pytest.mark.parametrize("miss", [0.0, 1e-7, 1e-5, 3e-4])
 def test_a_ball_that_crosses_the_axis_goes_on(miss) -> None:
-    """Without friction a straight line past the axis; where the azimuth turns by phi in a step, 1/24 phi^2 is lost."""
+    """Without friction a straight line past the axis; where the azimuth turns by phi in a step,
+    1/24 phi^2 is lost."""
     p = P.replace(omega_0=0.0, c=0.0, mu=0.0, eta=0.0)
     a, v = 0.8 * p.R, 0.2
     rho = math.hypot(a, miss)
-    x0, still = [0, 0, v * miss / rho**2, 0, 0, 0, p.R - rho, v * a / rho], [0, 0, 0, 0, 0, 0, 0.2 * p.R, 0]
-    together = mjsim.simulate_many([p, p], [x0, still], 0.35, settings=ContactSettings(), sample_interval=0.01)
+    x0, still = (
+        [0, 0, v * miss / rho**2, 0, 0, 0, p.R - rho, v * a / rho],
+        [0, 0, 0, 0, 0, 0, 0.2 * p.R, 0],
+    )
+    together = mjsim.simulate_many(
+        [p, p], [x0, still], 0.35, settings=ContactSettings(), sample_interval=0.01
+    )
     alone = mjsim.simulate(p, x0, 0.35, settings=ContactSettings(), sample_interval=0.01)
     for run in (alone, together[0]):
         exact = np.hypot(miss, a - v * run.time)
@@ -107,34 +119,60 @@ def test_a_ball_that_crosses_the_axis_goes_on(miss) -> None:
 def test_a_ball_that_slides_down_the_wall_as_fast_as_drag_lets_it_stays_on_it(step) -> None:
     """Its load on the wall is a fifth of the weight, its slip 10 m/s; it falls as drag says."""
     p = P.replace(m=0.02, r=0.004, R=0.03, j=0.35, mu=0.15, eta=0.7, g=9.1, c=0.8, omega_0=7.489)
-    run = mjsim.simulate(p, [100.0, -9.7, 7.489, 0, 0, 0], 2.0, settings=ContactSettings.at(step).suited(p))
+    run = mjsim.simulate(
+        p, [100.0, -9.7, 7.489, 0, 0, 0], 2.0, settings=ContactSettings.at(step).suited(p)
+    )
     assert set(run.cases[len(run.time) // 2 :]) == {Case.NS}
-    # Friction of the wall, eta R omega_c^2 upwards, slows it: less than the weight, which drag balances in the end.
-    assert -p.g / p.c < run.v_y[-1] < -(p.g - p.eta * p.R * p.omega_0**2) / p.c * (1 - math.exp(-p.c * 2.0))
+    # Friction of the wall, eta R omega_c^2 upwards, slows it: less than the weight, which drag
+    # balances in the end.
+    assert (
+        -p.g / p.c
+        < run.v_y[-1]
+        < -(p.g - p.eta * p.R * p.omega_0**2) / p.c * (1 - math.exp(-p.c * 2.0))
+    )
 
 
 def test_file_opens_as_it_is_and_holds_the_reference() -> None:
     model = mujoco.MjModel.from_xml_path(str(scene.SCENE))
     built, mjcf = scene.build(P, ContactSettings())
-    for name in ("body_mass", "body_inertia", "body_pos", "jnt_pos", "geom_size", "geom_pos", "pair_solref"):
+    for name in (
+        "body_mass",
+        "body_inertia",
+        "body_pos",
+        "jnt_pos",
+        "geom_size",
+        "geom_pos",
+        "pair_solref",
+    ):
         assert getattr(built, name) == pytest.approx(getattr(model, name)), name
-        assert getattr(mujoco.MjModel.from_xml_string(mjcf), name) == pytest.approx(getattr(model, name)), name
+        assert getattr(mujoco.MjModel.from_xml_string(mjcf), name) == pytest.approx(
+            getattr(model, name)
+        ), name
 
 
 SETS = [P.replace(omega_0=12.0, drag=law, nu_f=1e-4) for law in LAWS]
-STARTS = [[0.02, -0.2, 12.0, 30, -10, 20, 0, 0], [0, 0, 12.0, -2, 1, 6, 0, 0], [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3]]
+STARTS = [
+    [0.02, -0.2, 12.0, 30, -10, 20, 0, 0],
+    [0, 0, 12.0, -2, 1, 6, 0, 0],
+    [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3],
+]
 """A landing, slip at both contacts, and a landing on the wall."""
 
 
 @pytest.mark.parametrize("changes", [{}, {"servo": 0.0}, {"memory": False, "order": 1}])
-def test_compiled_gives_the_same_run(monkeypatch: pytest.MonkeyPatch, changes: dict[str, object]) -> None:
-    """For all laws of drag in one batch; not to the bit everywhere: numpy and numba may round a cosine in two ways."""
+def test_compiled_gives_the_same_run(
+    monkeypatch: pytest.MonkeyPatch, changes: dict[str, object]
+) -> None:
+    """For all laws of drag in one batch; not to the bit everywhere: numpy and numba may round a
+    cosine in two ways."""
     pytest.importorskip("numba")
     settings, flow = ContactSettings.at(1e-3, **changes), Flow.ramp(12.0, 25.0, 0.2)
 
     def runs() -> list[np.ndarray]:
         together = mjsim.simulate_many(SETS, STARTS, 0.3, flow, settings, sample_interval=2e-3)
-        alone = [mjsim.simulate(p, x0, 0.3, flow, settings) for p, x0 in zip(SETS, STARTS, strict=True)]
+        alone = [
+            mjsim.simulate(p, x0, 0.3, flow, settings) for p, x0 in zip(SETS, STARTS, strict=True)
+        ]
         return [run.x for run in (*together, *alone)]
 
     fast = runs()

@@ -1,4 +1,5 @@
-"""Landings within a step are of second order, at any step and place in it; claim impacts has what they leave."""
+"""Landings within a step are of second order, at any step and place in it; claim impacts has what
+they leave."""
 
 import numpy as np
 import pytest
@@ -20,13 +21,18 @@ LASTS = 0.6
 def test_motions_through_landings_are_of_second_order_but_for_shorter_steps() -> None:
     """Largest error of height (relative to its range) and omega_c (relative) between the landings.
 
-    A second-order method makes errors of (omega_c h)^2 and the like, shorter steps of a landing of omega_c times
-    their length.
-    """
+    A second-order method makes errors of (omega_c h)^2 and the like, shorter steps of a landing of
+    omega_c times their length."""
     exact = analytic.simulate(HOPS, START, LASTS, sample_interval=0.02)
     errors = []
     for step in (1e-3, 5e-4, 2.5e-4):
-        run = mjsim.simulate(HOPS, START, LASTS, settings=ContactSettings.for_problem(HOPS, step), sample_interval=0.02)
+        run = mjsim.simulate(
+            HOPS,
+            START,
+            LASTS,
+            settings=ContactSettings.for_problem(HOPS, step),
+            sample_interval=0.02,
+        )
         height = np.abs(run.y - exact.y).max() / np.ptp(exact.y)
         errors.append(max(height, np.abs(run.omega_c / exact.omega_c - 1).max()))
         angle = HOPS.omega_0 * step
@@ -35,10 +41,14 @@ def test_motions_through_landings_are_of_second_order_but_for_shorter_steps() ->
 
 
 def off(p, x0, lasts, step, initial_impact=False):
-    """How far v_y and speeds of turning are off at the end, in units of what forces of the size of the weight do in a
-    step, times the angle by which they turn."""
-    exact = analytic.simulate(p, x0, lasts, sample_interval=lasts, rtol=1e-12, initial_impact=initial_impact)
-    run = mjsim.simulate(p, x0, lasts, settings=ContactSettings.for_problem(p, step), sample_interval=lasts)
+    """How far v_y and speeds of turning are off at the end, in units of what forces of the size of
+    the weight do in a step, times the angle by which they turn."""
+    exact = analytic.simulate(
+        p, x0, lasts, sample_interval=lasts, rtol=1e-12, initial_impact=initial_impact
+    )
+    run = mjsim.simulate(
+        p, x0, lasts, settings=ContactSettings.for_problem(p, step), sample_interval=lasts
+    )
     speeds = np.abs(run.x[-1] - exact.x[-1])[1:6] * [1, p.R, p.r, p.r, p.r]
     return speeds / (p.g * step * p.omega_0 * step)
 
@@ -49,19 +59,30 @@ def test_a_start_that_comes_down_on_the_floor_lands_at_once() -> None:
 
 @pytest.mark.parametrize("step", [4e-3, 1e-3])
 def test_the_first_step_leaves_a_ball_where_theory_has_it_at_rest(step: float) -> None:
-    """An unstable stationary state, slipping at both points: an edge between two attractors shows where a run began."""
+    """An unstable stationary state, slipping at both points: an edge between two attractors shows
+    where a run began."""
     p = Parameters(m=0.02, r=0.012, R=0.06, j=0.3, mu=0.45, eta=0.15, g=9.81, c=2.0, omega_0=34.12)
-    (x,) = [each.x for each in analytic.stationary_solutions(p) if each.case is Case.SS and not each.stable]
+    (x,) = [
+        each.x
+        for each in analytic.stationary_solutions(p)
+        if each.case is Case.SS and not each.stable
+    ]
     run = mjsim.simulate(p, x, step, settings=ContactSettings.at(step), sample_interval=step)
     speeds = np.abs(run.x[-1] - x)[1:6] * [1, p.R, p.r, p.r, p.r]
-    # What forces of the size of the weight do in a step, times the square of the angle of a shorter one.
+    # What forces of the size of the weight do in a step, times the square of the angle of a shorter
+    # one.
     assert speeds.max() < p.g * step * (p.omega_0 * step / COARSE) ** 2
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_a_ball_that_slides_down_the_wall_lands_anywhere_in_a_step(share: float) -> None:
-    """Friction is damped less in short steps, which by itself takes a tenth of the load from the wall at this speed."""
-    p, x0, step = Parameters.named("reference"), [0.02, -0.2, 12.0, 30.0, -10.0, 20.0, 0.0, 0.0], 2.5e-4
+    """Friction is damped less in short steps, which by itself takes a tenth of the load from the
+    wall at this speed."""
+    p, x0, step = (
+        Parameters.named("reference"),
+        [0.02, -0.2, 12.0, 30.0, -10.0, 20.0, 0.0, 0.0],
+        2.5e-4,
+    )
     begin = float(analytic.simulate(p, x0, 0.06, rtol=1e-12).events.time[0]) - (2 + share) * step
     start = analytic.simulate(p, x0, begin, sample_interval=begin, rtol=1e-12).x[-1]
     assert max(off(p, start, n * step, step).max() for n in (1, 2, 3, 4)) < 1

@@ -1,4 +1,5 @@
-"""Small scenes of what users build, and robots that others wrote: what memory holds still, and what it leaves alone."""
+"""Small scenes of what users build, and robots that others wrote: what memory holds still, and what
+it leaves alone."""
 
 import pytest
 
@@ -15,14 +16,20 @@ def both(run):
 def assert_no_worse(plain, soft):
     """Nothing went wrong, nothing sinks in deeper, energy rises no higher."""
     assert not soft.wrong
-    assert soft.depth <= 1.3 * plain.depth  # what slides is lifted out of its depth in plain MuJoCo alone
+    assert (
+        soft.depth <= 1.3 * plain.depth
+    )  # what slides is lifted out of its depth in plain MuJoCo alone
     if plain.rise is not None:
         assert soft.rise <= WORSE * plain.rise + 1e-3
 
 
-STILL = {name: SCENES[name].run for name in ("treadmill", "nut", "tactile", "mocap", "tendon", "sleeping")}
+STILL = {
+    name: SCENES[name].run
+    for name in ("treadmill", "nut", "tactile", "mocap", "tendon", "sleeping")
+}
 STILL |= {"castle": small_scenes.castle, "dominos": lambda way: small_scenes.pushed(way, push=3.5)}
-"""Of dominos one push: fallen, two rows in three jerk once in some seconds as an edge on a face loses a point."""
+"""Of dominos one push: fallen, two rows in three jerk once in some seconds as an edge on a face
+loses a point."""
 
 
 @pytest.mark.parametrize("name", STILL)
@@ -40,7 +47,8 @@ def test_a_shaken_grip_slips_less():
 
 
 def test_a_carousel_holds_what_stands_on_it():
-    """An integrator of first order leaves h omega^2 r/2; rigid contacts take half a step's turning into account."""
+    """An integrator of first order leaves h omega^2 r/2; rigid contacts take half a step's turning
+    into account."""
     left = 0.002 * small_scenes.TURN**2 * 0.2 / 2
     assert small_scenes.carousel(WAYS["soft"]).values[CREEP] < 1.1 * left
     assert small_scenes.carousel(WAYS["rigid"]).values[CREEP] < 0.01 * left
@@ -67,7 +75,9 @@ def test_flexes_are_left_to_mujoco():
     assert other.data.qpos == pytest.approx(one.data.qpos, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["ant", "quadruped", "sawyer", "egg", pytest.param("lift", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["ant", "quadruped", "sawyer", "egg", pytest.param("lift", marks=pytest.mark.slow)]
+)
 def test_robots_hold_still(name):
     pytest.importorskip(SCENES[name].package, reason="where its scene comes from")
     plain, soft = both(SCENES[name].run)

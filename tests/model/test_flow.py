@@ -1,4 +1,5 @@
-"""Flows have the values that they are made of, and files, pieces and steps that are wrong are refused by name."""
+"""Flows have the values that they are made of, and files, pieces and steps that are wrong are
+refused by name."""
 
 import numpy as np
 import pytest
@@ -22,7 +23,9 @@ def test_values():
     np.testing.assert_allclose(ramp([0, 1, 3.5, 6, 100]), [10, 10, 20, 30, 30], rtol=1e-15)
     np.testing.assert_array_equal(stairs([0, 1.99, 2, 4, 99]), [1, 1, 4, 2, 2])
     np.testing.assert_allclose(sampled([0, 0.5, 1, 2.5, 4, 9]), [5, 5.5, 6, 3, 0, 0], atol=1e-15)
-    np.testing.assert_allclose(sine([0, 0.5]), [10 + 2 * np.sin(0.3), 10 + 2 * np.cos(0.3)], rtol=1e-15)
+    np.testing.assert_allclose(
+        sine([0, 0.5]), [10 + 2 * np.sin(0.3), 10 + 2 * np.cos(0.3)], rtol=1e-15
+    )
     assert sines(0.25) == pytest.approx(10 + np.sqrt(2) + np.sin(1.5 * np.pi + 1.5), rel=1e-15)
     np.testing.assert_array_equal(sines.line([0.1, 0.2]), [10, 10])
     assert sine(np.zeros((2, 3))).shape == (2, 3)
@@ -38,7 +41,9 @@ def test_a_mapping_holds_all_of_it(flow):
     t = np.linspace(0, 10, 101)
     np.testing.assert_array_equal(back(t), flow(t))
     assert back.kind == flow.kind
-    older = Flow.from_mapping({"kind": "steady", "start": [0], "value": [1], "slope": [0]})  # without waves
+    older = Flow.from_mapping(
+        {"kind": "steady", "start": [0], "value": [1], "slope": [0]}
+    )  # without waves
     assert older.is_steady
 
 
@@ -53,7 +58,15 @@ def test_a_mapping_holds_all_of_it(flow):
         "no;ω₀ in rad/s;t;valve\n1;5,0;0,0;open\n2;6;1;open\n3;0,0;4,00;shut\n",
         "0,0\t5,0\n1\t6\n4,0\t0\n",
     ],
-    ids=["plain", "semicolons", "white space", "spreadsheet", "turned round", "decimal commas", "tabs"],
+    ids=[
+        "plain",
+        "semicolons",
+        "white space",
+        "spreadsheet",
+        "turned round",
+        "decimal commas",
+        "tabs",
+    ],
 )
 def test_measured(tmp_path, text):
     (tmp_path / "flow.csv").write_text(text, "utf-8")
@@ -69,14 +82,20 @@ def test_measured(tmp_path, text):
         ("0,5\n1\n", "line 2: needs two values, time and omega_0, but has 1"),
         ("0,5\n2,6\n1,7\n", "line 3: times must increase, but 1 s comes after 2 s"),
         ("0,5\n1,nan\n", "line 2: omega_0 = nan rad s-1 must be finite"),
-        ("# logger\n0,5\n1,6\n2,6\n2.5,5\n13,6\n", "line 6: a gap of 10.5 s from t = 2.5 s on; usual are 1 s, and"),
+        (
+            "# logger\n0,5\n1,6\n2,6\n2.5,5\n13,6\n",
+            "line 6: a gap of 10.5 s from t = 2.5 s on; usual are 1 s, and",
+        ),
         ("time,omega_0\n", "no line with a time"),
         ("time (ms),rpm\n0,5\n", r"line 1: 'time \(ms\)': time must be in s, not in ms"),
         ("time,omega_0 [rpm]\n0,5\n", "line 1: .* must be in rad/s, not in rpm"),
         ("time,speed\n0,5\n", "line 1: no column is called omega_0; there are 'time', 'speed'"),
         ("t,omega_0,time\n0,5,0\n", "line 1: time is given twice"),
         ("no,time,omega_0\n0,5\n", "line 2: needs 3 values, as the head, but has 2"),
-        ("time,omega_0\n0,5,12,3\n", "line 2: .* but has 4; with decimal commas, separate them by semicolons"),
+        (
+            "time,omega_0\n0,5,12,3\n",
+            "line 2: .* but has 4; with decimal commas, separate them by semicolons",
+        ),
     ],
 )
 def test_bad_measurements(tmp_path, text, says):

@@ -8,15 +8,23 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from model import Parameters, State
-from model.kinematics import angular_velocity, frame, from_world, rotated, slip_speeds, slip_velocities, to_world
+from model.kinematics import (
+    angular_velocity,
+    frame,
+    from_world,
+    rotated,
+    slip_speeds,
+    slip_velocities,
+    to_world,
+)
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
 
 speeds = st.floats(-100, 100)
-states = st.tuples(st.floats(0, 1), speeds, speeds, speeds, speeds, speeds, st.floats(0, 0.9 * P.R), speeds).map(
-    np.array
-)
+states = st.tuples(
+    st.floats(0, 1), speeds, speeds, speeds, speeds, speeds, st.floats(0, 0.9 * P.R), speeds
+).map(np.array)
 angles = st.floats(-3.1, 3.1)
 
 
@@ -25,8 +33,9 @@ def test_to_the_world_and_back(unit, theta):
     """Of many states at once."""
     x = unit * [1, 100, 100, 100, 100, 100, 0.9 * P.R, 100]
     back, angle = from_world(to_world(x, theta, P), P)
-    # Each entry is a sum of terms no larger than this scale; a dozen operations lose at most that many ulps of it,
-    # and dividing by the orbit's radius (>= R/10) magnifies the tangential velocity's error.
+    # Each entry is a sum of terms no larger than this scale; a dozen operations lose at most that
+    # many ulps of it, and dividing by the orbit's radius (>= R/10) magnifies the tangential
+    # velocity's error.
     scale = 1 + np.abs(x).max() * (1 + P.R / P.r)
     np.testing.assert_allclose(back.stacked(), x, rtol=0, atol=64 * EPS * scale * 10 / P.R)
     np.testing.assert_allclose(angle, theta, rtol=0, atol=8 * EPS)

@@ -41,7 +41,8 @@ valid = st.builds(
 @pytest.mark.parametrize("law", LAWS)
 def test_a_law_of_drag_beside_a_fluid(tmp_path, law):
     (tmp_path / "p.toml").write_text(
-        f'r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\ndrag = "{law}"\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 4.0'
+        f'r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\ndrag = "{law}"\n[fluid]\nnu_f = 1e-6\nrho_f = '
+        f"1.0\nrho_b = 4.0"
     )
     p = Parameters.load(tmp_path / "p.toml")
     assert (p.drag, p.nu_f, p.density_ratio, p.C_D) == (law, 1e-6, 0.25, 0.44)
@@ -53,7 +54,9 @@ def test_a_law_of_drag_beside_a_fluid(tmp_path, law):
 
 def test_drag_and_gravity_follow_from_the_fluid():
     nu, rho_f, rho_b, r = 1e-6, 1000.0, 8000.0, 0.002
-    p = Parameters.from_fluid(nu_f=nu, rho_f=rho_f, rho_b=rho_b, r=r, R=0.02, mu=0.1, eta=0.1, gravity=9.8)
+    p = Parameters.from_fluid(
+        nu_f=nu, rho_f=rho_f, rho_b=rho_b, r=r, R=0.02, mu=0.1, eta=0.1, gravity=9.8
+    )
     # Stokes: F = 6 pi rho_f nu r v = m c v.
     assert p.m * p.c == pytest.approx(6 * math.pi * rho_f * nu * r, rel=1e-14)
     # Archimedes: weight less the weight of the displaced fluid.
@@ -102,7 +105,12 @@ def test_a_bad_value_is_named_with_unit_and_range(name):
         (ANY, [-1e300, 0], [], "any"),
         (POSITIVE, [5e-324, 1e300], [0, -1], "> 0"),
         (NOT_NEGATIVE, [0, 0.5], [-5e-324], ">= 0"),
-        (Range(0.1, 2 / 3), [0.1, 2 / 3], [math.nextafter(0.1, 0), math.nextafter(2 / 3, 1)], ">= 0.1 and <= 2/3"),
+        (
+            Range(0.1, 2 / 3),
+            [0.1, 2 / 3],
+            [math.nextafter(0.1, 0), math.nextafter(2 / 3, 1)],
+            ">= 0.1 and <= 2/3",
+        ),
         (Range(high=1e-7), [-1, 1e-7], [1], "<= 1e-07"),
         (Range(2, whole=True), [2, 3.0], [2.5, 1], "a whole number >= 2"),
         (Range(whole=True), [-3], [0.5], "a whole number"),
@@ -116,7 +124,10 @@ def test_ranges(allowed, inside, outside, words):
     for number in outside:
         with pytest.raises(InputError) as caught:
             check_number("x", number, "m", allowed, "length of the rod")
-        assert str(caught.value) == f"x = {number:g} m is out of range: length of the rod must be {words}"
+        assert (
+            str(caught.value)
+            == f"x = {number:g} m is out of range: length of the rod must be {words}"
+        )
         with pytest.raises(InputError, match=r"^x = .* m is out of range: must be "):
             parse_number("x", repr(number), "m", allowed)
     with pytest.raises(InputError, match=r"^x = '5 cm' must be a number in m$"):
@@ -130,12 +141,30 @@ def test_ranges(allowed, inside, outside, words):
         ("m = 0.03", "missing parameter 'r', 'R', 'j'"),
         ("m = ", "is not valid TOML"),
         ("m = 1\nmu = 0,2\n", "line 2, column 7); a number takes a point, not a comma"),
-        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\nm = 1\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 2.0", "m follows"),
-        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu = 1e-6", "unknown fluid property 'nu'"),
-        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = 1e-6\nrho_f = 2.0\nrho_b = 1.0", "floats"),
-        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = -1e-6\nrho_f = 1.0\nrho_b = 2.0", "nu_f = -1e-06"),
+        (
+            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\nm = 1\n[fluid]\nnu_f = 1e-6\nrho_f = "
+            "1.0\nrho_b = 2.0",
+            "m follows",
+        ),
+        (
+            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu = 1e-6",
+            "unknown fluid property 'nu'",
+        ),
+        (
+            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = 1e-6\nrho_f = 2.0\nrho_b = "
+            "1.0",
+            "floats",
+        ),
+        (
+            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = -1e-6\nrho_f = 1.0\nrho_b = "
+            "2.0",
+            "nu_f = -1e-06",
+        ),
         ("fluid = 3", "must be a table"),
-        ("r = 0.01\nR = '5 cm'\nm = 1\nj = 0.4\nmu = 0.2\neta = 0.2\ng = 9.8\nc = 1\nomega_0 = 1", "R = '5 cm'"),
+        (
+            "r = 0.01\nR = '5 cm'\nm = 1\nj = 0.4\nmu = 0.2\neta = 0.2\ng = 9.8\nc = 1\nomega_0 = 1",
+            "R = '5 cm'",
+        ),
     ],
 )
 def test_a_bad_file_is_one_clear_line(tmp_path, text, says):

@@ -1,4 +1,5 @@
-"""A run comes back from its file as it was, and a file that was damaged, cut or is foreign is refused by name."""
+"""A run comes back from its file as it was, and a file that was damaged, cut or is foreign is
+refused by name."""
 
 import dataclasses
 import io
@@ -16,7 +17,18 @@ import pandas
 import pytest
 import xarray
 
-from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage, versions
+from model import (
+    Case,
+    Events,
+    Flow,
+    Header,
+    InputError,
+    Parameters,
+    StorageError,
+    Trajectory,
+    storage,
+    versions,
+)
 from model.files import write_text
 from model.hdf5 import seal
 from model.trajectory import SAMPLE, columns
@@ -26,7 +38,9 @@ def make(n=50, events=2, failure=""):
     rng = np.random.default_rng(0)
     samples = np.empty(n, SAMPLE)
     for name in columns(Trajectory):
-        samples[name] = rng.normal(size=samples[name].shape) if name != "case" else rng.integers(0, 9, n)
+        samples[name] = (
+            rng.normal(size=samples[name].shape) if name != "case" else rng.integers(0, 9, n)
+        )
     header = Header(
         engine="event",
         parameters=Parameters.named("steel-in-water").replace(drag="quadratic", C_D=0.5),
@@ -91,12 +105,16 @@ def test_xarray_sees_axes_units_and_cases_in_a_file_and_in_memory(tmp_path, n, e
     names = data.case.flag_meanings.split()
     assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
     parameters = dataclasses.asdict(trajectory.header.parameters)
-    assert json.loads(data.parameters) == parameters == {name: data.attrs[name] for name in parameters}
+    assert (
+        json.loads(data.parameters) == parameters == {name: data.attrs[name] for name in parameters}
+    )
     with h5py.File(tmp_path / "run.h5") as file:  # without xarray, too
         assert h5py.check_enum_dtype(file["case"].dtype) == {case.name: case.value for case in Case}
 
 
-@pytest.mark.parametrize(("library", "needed"), [("xarray", "xarray h5netcdf"), ("pandas", "pandas")])
+@pytest.mark.parametrize(
+    ("library", "needed"), [("xarray", "xarray h5netcdf"), ("pandas", "pandas")]
+)
 def test_without_the_library_it_is_named(monkeypatch, library, needed):
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(InputError, match=f"pip install {needed}"):
@@ -106,7 +124,9 @@ def test_without_the_library_it_is_named(monkeypatch, library, needed):
 def test_a_table_has_a_row_for_each_sample_in_pandas_and_in_xarray(tmp_path):
     """Which reads it by the entry point that it looks up where dualball is installed."""
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-    backend = EntryPoint("dualball", project["entry-points"]["xarray.backends"]["dualball"], "").load()
+    backend = EntryPoint(
+        "dualball", project["entry-points"]["xarray.backends"]["dualball"], ""
+    ).load()
     trajectory = make(50, 2)
     expected = trajectory.to_pandas()
     assert expected.index.name == "time"
@@ -123,10 +143,16 @@ def test_a_table_has_a_row_for_each_sample_in_pandas_and_in_xarray(tmp_path):
             assert run.force_Ay.units == "N"
             assert run.attrs["mu"] == trajectory.header.parameters.mu
             run.to_netcdf(tmp_path / "copy.nc")
-        pandas.testing.assert_frame_equal(table, expected.astype({"case": table.case.dtype})[table.columns])
+        pandas.testing.assert_frame_equal(
+            table, expected.astype({"case": table.case.dtype})[table.columns]
+        )
     with xarray.open_dataset(tmp_path / "run.h5", engine=backend, drop_variables="theta") as run:
         assert "theta" not in run
-    for path, message in (("text.h5", "text.h5"), ("none.h5", "none.h5"), ("batch.h5", "name one of them")):
+    for path, message in (
+        ("text.h5", "text.h5"),
+        ("none.h5", "none.h5"),
+        ("batch.h5", "name one of them"),
+    ):
         with pytest.raises(StorageError, match=message):
             xarray.open_dataset(tmp_path / path, engine=backend)
     with pytest.raises(InputError, match="by its name, not a BytesIO"):
@@ -168,11 +194,17 @@ for size in (0, 40, 900, 3000, 20_000, 60_000, 90_000):
 
 
 def test_a_disk_that_fills_at_any_moment(tmp_path):
-    """In a process of its own, since HDF5 might crash it; a limit on the size of files plays the disk."""
-    program, here = [sys.executable, "-c", FULL, str(tmp_path / "run.h5")], Path(__file__).parents[2]
+    """In a process of its own, since HDF5 might crash it; a limit on the size of files plays the
+    disk."""
+    program, here = (
+        [sys.executable, "-c", FULL, str(tmp_path / "run.h5")],
+        Path(__file__).parents[2],
+    )
     answer = subprocess.run(program, cwd=here, capture_output=True, text=True, check=True)
     assert answer.stderr == ""
-    assert answer.stdout.splitlines() == [f"cannot write {tmp_path / 'run.h5'}: File too large"] * 14
+    assert (
+        answer.stdout.splitlines() == [f"cannot write {tmp_path / 'run.h5'}: File too large"] * 14
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -229,19 +261,39 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path):
     ("name", "change", "says"),
     [
         ("run.h5", lambda f: f.attrs.__setitem__("schema", "other"), "not a dualball-trajectory"),
-        ("run.h5", lambda f: f.attrs.__setitem__("schema_version", 99), "newer dualball: its schema version is 99"),
+        (
+            "run.h5",
+            lambda f: f.attrs.__setitem__("schema_version", 99),
+            "newer dualball: its schema version is 99",
+        ),
         ("run.h5", lambda f: f.attrs.__setitem__("schema_version", "x"), "no valid schema version"),
         ("run.h5", lambda f: f.attrs.__delitem__("engine"), "attribute 'engine' is missing"),
         ("run.h5", lambda f: f.attrs.__setitem__("flow", "{"), "attribute 'flow' is not JSON"),
-        ("run.h5", lambda f: f.attrs.__setitem__("settings", "[]"), "attribute 'settings' is not a table"),
+        (
+            "run.h5",
+            lambda f: f.attrs.__setitem__("settings", "[]"),
+            "attribute 'settings' is not a table",
+        ),
         ("run.h5", lambda f: f.attrs.__setitem__("parameters", '{"m": -1}'), "missing parameter"),
         ("run.h5", lambda f: f.__delitem__("omega_c"), "no dataset 'omega_c'"),
-        ("run.h5", lambda f: replace(f, "omega_c", h5py.SoftLink("/y")), "no dataset 'omega_c' of its own"),
+        (
+            "run.h5",
+            lambda f: replace(f, "omega_c", h5py.SoftLink("/y")),
+            "no dataset 'omega_c' of its own",
+        ),
         ("run.h5", lambda f: replace(f, "force_A", np.zeros(50)), "'force_A' has shape"),
         ("run.h5", lambda f: replace(f, "y", np.zeros(49)), "differ in length"),
         ("run.h5", lambda f: replace(f, "y", np.array([b"a"] * 50)), "'y' has type"),
-        ("run.h5", lambda f: replace(f, "case", np.full(50, 9, np.int8)), "case that does not exist"),
-        ("batch.h5/a", lambda f: f.attrs.__setitem__("schema_version", 2), "newer dualball: its schema version is 2"),
+        (
+            "run.h5",
+            lambda f: replace(f, "case", np.full(50, 9, np.int8)),
+            "case that does not exist",
+        ),
+        (
+            "batch.h5/a",
+            lambda f: f.attrs.__setitem__("schema_version", 2),
+            "newer dualball: its schema version is 2",
+        ),
         ("batch.h5/a", lambda f: replace(f, "header", ["{"] * 3), "attribute 'header' is not JSON"),
         ("batch.h5/a", lambda f: replace(f, "samples", [50, 0]), "does not hold what it should"),
         ("batch.h5/a", lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
@@ -259,7 +311,8 @@ def test_a_foreign_or_damaged_file_is_refused(tmp_path, name, change, says):
 
 
 def test_where_nothing_is_read_or_written(tmp_path):
-    """What is no file is not replaced: as the superuser, renaming one to /dev/null would take it from everyone."""
+    """What is no file is not replaced: as the superuser, renaming one to /dev/null would take it
+    from everyone."""
     with pytest.raises(StorageError, match=r"^cannot write .*: No such file or directory$"):
         storage.save(make(), tmp_path / "absent" / "run.h5")
     with pytest.raises(StorageError, match=r"^cannot read .*: there is no such file$"):

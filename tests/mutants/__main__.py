@@ -18,20 +18,35 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=trial.__doc__)
     results = "results of 'dualball validate'; a theory is judged on them until a claim notices it, the quickest first"
     parser.add_argument("directories", type=Path, nargs="+", metavar="DIR", help=results)
-    parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
+    parser.add_argument(
+        "--engines", action="store_true", help="also measure with every wrong engine"
+    )
     one = "also judge by what this witness alone says, as mujoco-plain, stored in DIR or the first of all; repeatable"
     parser.add_argument("--witness", action="append", default=[], metavar="NAME[=DIR]", help=one)
-    parser.add_argument("--whole", action="store_true", help="judge by all claims on the first of them: takes longer")
+    parser.add_argument(
+        "--whole",
+        action="store_true",
+        help="judge by all claims on the first of them: takes longer",
+    )
     parser.add_argument("--page", type=Path, metavar="FILE", help="page to write")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
-    parser.add_argument("--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)")
+    parser.add_argument(
+        "--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes"
+    )
+    parser.add_argument(
+        "--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)"
+    )
     args = parser.parse_args()
     try:
         first, *others = args.directories
-        levels = [trial.judged(first, args.workers, args.whole), *(trial.judged(each, args.workers) for each in others)]
+        levels = [
+            trial.judged(first, args.workers, args.whole),
+            *(trial.judged(each, args.workers) for each in others),
+        ]
         measured = trial.wrong_engines(first, args.workers) if args.engines else []
         named = [name.partition("=") for name in args.witness]
-        alone = [trial.judged(Path(where or first), args.workers, by=name) for name, _, where in named]
+        alone = [
+            trial.judged(Path(where or first), args.workers, by=name) for name, _, where in named
+        ]
         if args.page:
             write_text(args.page, mutants.page(levels, measured, alone))
     except InputError as error:
@@ -41,7 +56,8 @@ def main() -> int:
     missed, count = [each for each in trials if not each.noticed], len(trials)
     hanging = sum(bool(each.hung) for each in trials)
     print(
-        f"{count - len(missed)} of {count} faults were noticed; with {hanging} of them the predictions of a claim hang"
+        f"{count - len(missed)} of {count} faults were noticed; with {hanging} of them the "
+        f"predictions of a claim hang"
     )
     for each in missed:
         print(f"nobody noticed: {each.what}: {each.by}")

@@ -25,7 +25,8 @@ Stretch = Callable[[], AbstractContextManager[Any]]
 
 
 class _Disguised(mjsim.Run):
-    """A run with a fault that lasts as long as it is stepped, and headers that say nothing of it."""
+    """A run with a fault that lasts as long as it is stepped, and headers that say nothing of
+    it."""
 
     fault: Stretch = staticmethod(nullcontext)
 
@@ -40,7 +41,9 @@ def _wrong(
     fault: Stretch = nullcontext,
     **changes: Any,
 ) -> Engine:
-    def stream(p: Parameters, x0: Any, t_end: float, flow: Any, settings: ContactSettings, **more: Any) -> mjsim.Run:
+    def stream(
+        p: Parameters, x0: Any, t_end: float, flow: Any, settings: ContactSettings, **more: Any
+    ) -> mjsim.Run:
         with fault():
             run = _Disguised(ball(p), x0, t_end, flow, replace(settings, **changes), **more)
         run.fault = fault
@@ -68,7 +71,8 @@ def _smooth(model: Any) -> None:
 
 
 def _turn(model: Any) -> None:
-    """The plane of the wall is turned about the vertical by `CROOKED`, so that it drives the ball round."""
+    """The plane of the wall is turned about the vertical by `CROOKED`, so that it drives the ball
+    round."""
     wall, upright = model.geom("wall"), (math.cos(CROOKED / 2), 0.0, 0.0, math.sin(CROOKED / 2))
     mujoco.mju_mulQuat(wall.quat, upright, wall.quat.copy())
 

@@ -1,4 +1,5 @@
-"""Putting a wrong function in the place of a right one, wherever it is known, for as long as a context lasts."""
+"""Putting a wrong function in the place of a right one, wherever it is known, for as long as a
+context lasts."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ class WrongTheory:
 
 @contextmanager
 def believed(*wrongs: WrongTheory) -> Iterator[None]:
-    """Believe wrong theories: every name and table entry of a right function stands for the wrong one."""
+    """Believe wrong theories: every name and table entry of a right function stands for the wrong
+    one."""
     rights = [getattr(importlib.import_module(each.module), each.function) for each in wrongs]
     puts = [faulty(right, each.wrong) for each, right in zip(wrongs, rights, strict=True)]
     _exchange(dict(zip(map(id, rights), puts, strict=True)))
@@ -64,7 +66,9 @@ def _exchange(new: Mapping[int, Function]) -> None:
             if id(value) in new:
                 setattr(module, name, new[id(value)])
             elif isinstance(value, dict):
-                value.update({key: new[id(entry)] for key, entry in value.items() if id(entry) in new})
+                value.update(
+                    {key: new[id(entry)] for key, entry in value.items() if id(entry) in new}
+                )
 
 
 def noting(what: str, seen: set[str]) -> Fault:

@@ -39,7 +39,8 @@ def test_each_replaces_a_function_that_exists_and_gives_it_back() -> None:
 
 
 def test_a_function_that_is_noted_answers_as_before() -> None:
-    """Wherever it is called: a claim that doesn't call it can't notice its faults, and isn't judged by them."""
+    """Wherever it is called: a claim that doesn't call it can't notice its faults, and isn't judged
+    by them."""
     seen, noted = set(), next(each for each in THEORIES if each.function == "stationary_solutions")
     with believed(dataclasses.replace(noted, wrong=noting("it", seen)), THEORIES[0]):
         found = claims.analytic.stationary_solutions(P)
@@ -62,9 +63,14 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(wrong, tmp_path, mon
 
 def test_subjects_name_wrong_theories_and_tests_that_there_are():
     assert set(mutants.SUBJECTS.values()) <= {wrong.what for wrong in (*THEORIES, *FOR_TESTS)}
-    for named in (*mutants.BY_HAND.values(), *(f"analytic/test_{wrong.test}" for wrong in FOR_TESTS)):
+    for named in (
+        *mutants.BY_HAND.values(),
+        *(f"analytic/test_{wrong.test}" for wrong in FOR_TESTS),
+    ):
         file, _, test = named.partition("::")
-        assert f"def {test}(" in (Path(__file__).parents[1] / f"{file}.py").read_text("utf-8"), named
+        assert f"def {test}(" in (Path(__file__).parents[1] / f"{file}.py").read_text("utf-8"), (
+            named
+        )
 
 
 @pytest.mark.slow
@@ -73,12 +79,29 @@ def test_what_no_measurement_shows_a_unit_test_sees(wrong, tmp_path):
     """In a process of its own, which believes it before the test is imported."""
     file, _, test = wrong.test.partition("::")
     (tmp_path / "believing.py").write_text(
-        "from tests.mutants.exchange import believed\nfrom tests.mutants.theories import FOR_TESTS\n"
+        "from tests.mutants.exchange import believed\nfrom tests.mutants.theories import "
+        "FOR_TESTS\n"
         f"belief = believed(next(w for w in FOR_TESTS if w.what == {wrong.what!r}))\n"
         "def pytest_configure(config): belief.__enter__()\n"
     )
     root = Path(__file__).parents[2]
-    words = ["-p", "believing", "-n0", "-xq", "-p", "no:cacheprovider", f"tests/analytic/test_{file}.py", "-k", test]
+    words = [
+        "-p",
+        "believing",
+        "-n0",
+        "-xq",
+        "-p",
+        "no:cacheprovider",
+        f"tests/analytic/test_{file}.py",
+        "-k",
+        test,
+    ]
     where = {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{tmp_path}"}
-    done = subprocess.run([sys.executable, "-m", "pytest", *words], cwd=root, env=where, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *words],
+        cwd=root,
+        env=where,
+        capture_output=True,
+        text=True,
+    )
     assert "1 failed" in done.stdout, done.stdout

@@ -53,7 +53,9 @@ Ball = Parameters | Motion
 def given(change: Change) -> Fault:
     """It takes other parameters for those of the ball."""
     change = functools.lru_cache(change)
-    return lambda right, *args, **named: right(*(change(a) if isinstance(a, Ball) else a for a in args), **named)
+    return lambda right, *args, **named: right(
+        *(change(a) if isinstance(a, Ball) else a for a in args), **named
+    )
 
 
 def replaced(p: Ball, **values: Any) -> Ball:
@@ -66,7 +68,11 @@ def replaced(p: Ball, **values: Any) -> Ball:
 
 def other(**factors: float) -> Fault:
     """It takes a ball some of whose parameters are multiplied."""
-    return given(lambda p: replaced(p, **{name: getattr(p, name) * factor for name, factor in factors.items()}))
+    return given(
+        lambda p: replaced(
+            p, **{name: getattr(p, name) * factor for name, factor in factors.items()}
+        )
+    )
 
 
 swapped = given(lambda p: replaced(p, mu=p.eta, eta=p.mu))
@@ -75,7 +81,9 @@ swapped = given(lambda p: replaced(p, mu=p.eta, eta=p.mu))
 
 def where(test: Change, fault: Fault) -> Fault:
     """The fault shows only where the first argument passes a test."""
-    return lambda right, first, *rest, **named: (faulty(right, fault) if test(first) else right)(first, *rest, **named)
+    return lambda right, first, *rest, **named: (faulty(right, fault) if test(first) else right)(
+        first, *rest, **named
+    )
 
 
 def in_case(fault: Fault, *cases: Case) -> Fault:
@@ -95,7 +103,9 @@ def fields(**changes: Change) -> Change:
 
 def entries(**changes: Change) -> Change:
     """A mapping with some of its entries changed."""
-    return lambda mapping: mapping | {name: change(mapping[name]) for name, change in changes.items()}
+    return lambda mapping: (
+        mapping | {name: change(mapping[name]) for name, change in changes.items()}
+    )
 
 
 def times(factor: float, *entries: int) -> Change:
@@ -127,7 +137,9 @@ def _exist(right: Function, p: Parameters) -> list[Any]:
     return [replace(s, exists=True) for s in right(p)]
 
 
-def _without_drag_on_y(right: Function, case: Case, x: Any, f: Any, p: Parameters, omega_0: Any) -> Any:
+def _without_drag_on_y(
+    right: Function, case: Case, x: Any, f: Any, p: Parameters, omega_0: Any
+) -> Any:
     """(20) without the drag on the vertical motion."""
     rate = right(case, x, f, p, omega_0)
     return rate._replace(v_y=rate.v_y + p.c * State(*x).v_y) if case.A.name == "N" else rate
@@ -157,9 +169,13 @@ def _jams(right: Function, case: Case, p: Parameters, omega_c: float | None = No
     return type(known).STABLE if case is Case.RR and p.mu > 1 and forces else known
 
 
-def _ramped(right: Function, p: Parameters, x0: Any, t_end: float, flow: Flow | None = None, **named: Any) -> Any:
+def _ramped(
+    right: Function, p: Parameters, x0: Any, t_end: float, flow: Flow | None = None, **named: Any
+) -> Any:
     """Simulations with 5 % more drag where the flow is a ramp."""
-    return right(p.replace(c=1.05 * p.c) if flow and flow.kind == "ramp" else p, x0, t_end, flow, **named)
+    return right(
+        p.replace(c=1.05 * p.c) if flow and flow.kind == "ramp" else p, x0, t_end, flow, **named
+    )
 
 
 def _rolls_for_ever(right: Function, p: Parameters, mu: Any, eta: Any, omega_0: Any) -> Any:
@@ -170,7 +186,10 @@ def _rolls_for_ever(right: Function, p: Parameters, mu: Any, eta: Any, omega_0: 
 
 def _one_cone(right: Function, p: Parameters) -> float:
     """The amplitude of a fast pulsation at which the cone of wall or floor alone is full."""
-    return min(abs(bound(p, p.omega_0, 1).zero - p.omega_0) for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr))
+    return min(
+        abs(bound(p, p.omega_0, 1).zero - p.omega_0)
+        for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr)
+    )
 
 
 _backwards = functools.partial(where, lambda p: p.omega_0 < 0)
@@ -180,16 +199,22 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "B_x of RS 1 % large": scaled(1.01, 3),
         "A_z of RS 2 % large": scaled(1.02, 2),
         "B_z of RS with the wrong sign": scaled(-1.0, 5),
-        "the wall of RS doesn't turn the spin axis": lambda right, x, p, *rest: times(1 / (1 + p.j), 3)(
-            right(x, p, *rest)
-        ),
+        "the wall of RS doesn't turn the spin axis": lambda right, x, p, *rest: times(
+            1 / (1 + p.j), 3
+        )(right(x, p, *rest)),
     },
-    "mechanics.dynamics._sr": {"A_y of SR 1 % large": scaled(1.01, 1), "B_z of SR 2 % large": scaled(1.02, 5)},
+    "mechanics.dynamics._sr": {
+        "A_y of SR 1 % large": scaled(1.01, 1),
+        "B_z of SR 2 % large": scaled(1.02, 5),
+    },
     "mechanics.dynamics._ss": {
         "forces of SS with μ and η exchanged": swapped,
         "A_y of SS 1 % large": scaled(1.01, 1),
     },
-    "mechanics.dynamics._nr": {"B_y of NR 1 % large": scaled(1.01, 4), "B_z of NR 2 % large": scaled(1.02, 5)},
+    "mechanics.dynamics._nr": {
+        "B_y of NR 1 % large": scaled(1.01, 4),
+        "B_z of NR 2 % large": scaled(1.02, 5),
+    },
     "mechanics.dynamics._ns": {
         "B_y of NS 1 % large": scaled(1.01, 4),
         "B_z of NS with the wrong sign": scaled(-1.0, 5),
@@ -210,14 +235,18 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     # Stationary solutions, Propositions 1-6
     "stationary.solutions.stationary_solutions": {
-        "stationary forces 2 % large": of_case(None, fields(force_A=times(1.02), force_B=times(1.02))),
+        "stationary forces 2 % large": of_case(
+            None, fields(force_A=times(1.02), force_B=times(1.02))
+        ),
         "stationary wall force of NR 5 % large": of_case(Case.NR, fields(force_B=times(1.05))),
         "SR exists nowhere": without(Case.SR),
         "NR exists nowhere": without(Case.NR),
         "SS lags 0.5 % too little": of_case(Case.SS, fields(x=times(1.005, 2))),
         "spin of SS on the floor 1 % large": of_case(Case.SS, fields(x=times(1.01, 3))),
         "NS sinks 2 % too fast": of_case(Case.NS, fields(x=times(1.02, 1))),
-        "in a flow the other way round the ball spins as before": _backwards(of_case(None, fields(x=times(-1.0, 3)))),
+        "in a flow the other way round the ball spins as before": _backwards(
+            of_case(None, fields(x=times(-1.0, 3)))
+        ),
         "in a flow the other way round friction along the orbit is as before": _backwards(
             of_case(None, fields(force_A=times(-1.0, 2)))
         ),
@@ -231,8 +260,12 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     "stationary.solutions._ns": {"NS sinks as under Stokes' drag": given(_by_stokes)},
     "stationary.solutions._lifting_spin": {"spin of SR and NR with 1 % more weight": other(g=1.01)},
-    "stationary.solutions._wall_carries": {"(35) with the sign as printed": answer(lambda carries: not carries)},
-    "stationary.solutions.stable_solutions": {"a ball on the wall is no attractor": without(Case.NR)},
+    "stationary.solutions._wall_carries": {
+        "(35) with the sign as printed": answer(lambda carries: not carries)
+    },
+    "stationary.solutions.stable_solutions": {
+        "a ball on the wall is no attractor": without(Case.NR)
+    },
     "stationary.slipping_branch.branch": {
         "A_y along SS in closed form 2 % large": answer(fields(A_y=times(1.02))),
         "B_x along SS in closed form 2 % large": answer(fields(B_x=times(1.02))),
@@ -241,13 +274,19 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "mechanics.dynamics.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
     "stationary.solutions.leaning_modes": {
         "leaning rate of SR 5 % large": scaled(1.05, 0),
-        "leaning and the orbit exchange their rates": answer(lambda modes: (modes[0][::-1], modes[1])),
-        "leaning and the orbit exchange their directions": answer(lambda modes: (modes[0], modes[1][::-1])),
+        "leaning and the orbit exchange their rates": answer(
+            lambda modes: (modes[0][::-1], modes[1])
+        ),
+        "leaning and the orbit exchange their directions": answer(
+            lambda modes: (modes[0], modes[1][::-1])
+        ),
         "leaning modes in the other order": answer(lambda modes: (modes[0][::-1], modes[1][::-1])),
         "leaning mirrored": answer(lambda modes: (modes[0], modes[1] * [1, -1])),
         "leaning at half the slope": answer(lambda modes: (modes[0], modes[1] * [1, 0.5])),
     },
-    "mechanics.dynamics.jacobian": {"Jacobians transposed": answer(lambda matrix: np.swapaxes(matrix, -1, -2))},
+    "mechanics.dynamics.jacobian": {
+        "Jacobians transposed": answer(lambda matrix: np.swapaxes(matrix, -1, -2))
+    },
     "stationary.solutions._rr": {"RR exists at any flow": _exist},
     "stationary.solutions._rs": {
         "RS on a smooth wall takes friction as if j were 1": lambda right, p: [
@@ -256,8 +295,12 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "RS in a fluid that moves": lambda right, p: right(p.replace(omega_0=0.0)),
     },
     "stationary.solutions._nr": {"NR at any flow": _exist},
-    "stationary.slipping_branch.points_at": {"SS beyond the fold for that before it": answer(lambda s: s[::-1])},
-    "stationary.slipping_branch.fold": {"the fold a little further along the branch": answer(lambda s: s + 0.5)},
+    "stationary.slipping_branch.points_at": {
+        "SS beyond the fold for that before it": answer(lambda s: s[::-1])
+    },
+    "stationary.slipping_branch.fold": {
+        "the fold a little further along the branch": answer(lambda s: s + 0.5)
+    },
     "stationary.slipping_branch.light_drag": {"a slight lag's drag 3 % large": scaled(1.03)},
     # Bifurcations, (84)-(90)
     "bifurcation.diagram.threshold_curves": {
@@ -282,18 +325,26 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         ),
     },
     "bifurcation.diagram.double_points": {
-        "the fold is born at 5 % more η": answer(lambda points: [replace(x, eta=1.05 * x.eta) for x in points]),
-        "double points at 1 % more flow": answer(lambda points: [replace(x, omega_0=1.01 * x.omega_0) for x in points]),
+        "the fold is born at 5 % more η": answer(
+            lambda points: [replace(x, eta=1.05 * x.eta) for x in points]
+        ),
+        "double points at 1 % more flow": answer(
+            lambda points: [replace(x, omega_0=1.01 * x.omega_0) for x in points]
+        ),
         "for equal friction the fold is born at η_cr of the set": lambda right, p, equal=False: (
             right(p)[:1] + right(p, equal)[1:]
         ),
     },
     "bifurcation.diagram.thresholds_with_inertia": {
         "the fluid's inertia leaves j as it is": lambda right, p: {
-            name: w / np.sqrt(1 - p.density_ratio) for name, w in vars(bifurcation.thresholds(p)).items()
+            name: w / np.sqrt(1 - p.density_ratio)
+            for name, w in vars(bifurcation.thresholds(p)).items()
         }
     },
-    "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04), "η_cr four times as large": scaled(4.0)},
+    "stationary.slipping_branch.eta_critical": {
+        "η_cr 4 % high": scaled(1.04),
+        "η_cr four times as large": scaled(4.0),
+    },
     "bifurcation.diagram.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
     "bifurcation.diagram.wall_spin": {
         "spin on the wall about the ball's own radius": lambda right, x, p: right(x, p) - x.omega_c,
@@ -311,7 +362,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "slipping.slip_bounds.gamma_nr": {
         "(56) with 3 % more drag": other(c=1.03),
         "(56) with 3 % more wall friction": other(eta=1.03),
-        "(56) with sin β of the wrong sign": lambda right, beta, *rest: right(-np.asarray(beta), *rest),
+        "(56) with sin β of the wrong sign": lambda right, beta, *rest: right(
+            -np.asarray(beta), *rest
+        ),
     },
     "slipping.slip_bounds.steepest_nr": {"(58) with 5 % more drag": other(c=1.05)},
     "slipping.slip_stability.lift_acceleration": {
@@ -331,11 +384,15 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "rolling lasts while forces can jam it": _jams,
         "Definitions 1-3 with 1 % more wall friction": other(eta=1.01),
     },
-    "slipping.slip_stability._by_sign": {"what is driven is held": lambda right, drive, hold: right(hold, drive)},
+    "slipping.slip_stability._by_sign": {
+        "what is driven is held": lambda right, drive, hold: right(hold, drive)
+    },
     "slipping.slip_bounds._nr_terms": {"(56)-(59) with 2 % more inertia": other(j=1.02)},
     "slipping.slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": other(eta=1.03)},
     "slipping.slip_bounds.rr_to_rs": {"(66) with μ, as printed": swapped},
-    "slipping.slip_bounds.rr_to_rs_stationary": {"(67) with 3 % more wall friction": other(eta=1.03)},
+    "slipping.slip_bounds.rr_to_rs_stationary": {
+        "(67) with 3 % more wall friction": other(eta=1.03)
+    },
     "slipping.slip_bounds.rr_to_sr": {"(73) with 3 % more floor friction": other(mu=1.03)},
     "slipping.slip_bounds.rr_to_sr_stationary": {"(74) with 3 % more inertia": other(j=1.03)},
     "slipping.slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
@@ -360,7 +417,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "mechanics.drag.speed_of": {"the lag that a force needs 1 % large": scaled(1.01)},
     "mechanics.drag.fall_speed": {"falls with 5 % more drag": other(c=1.05)},
     "mechanics.drag.fall_time": {
-        "a fall ends as if nothing braked it": lambda right, y, v_y, p: (v_y + (v_y**2 + 2 * p.g * y) ** 0.5) / p.g
+        "a fall ends as if nothing braked it": lambda right, y, v_y, p: (
+            (v_y + (v_y**2 + 2 * p.g * y) ** 0.5) / p.g
+        )
     },
     "mechanics.drag.reynolds": {"Reynolds' number by the radius": scaled(0.5)},
     "mechanics.drag.ramp_lag": {"a fall begins 2 % fast": scaled(1.02)},
@@ -368,15 +427,20 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "flowmeter.characteristic.operating_range": {
         "operating range up to ω₀₂": lambda right, p: bifurcation.thresholds(p).omega_02,
     },
-    "flowmeter.characteristic.characteristic_slope": {"slope of the characteristic 5 % large": scaled(1.05)},
+    "flowmeter.characteristic.characteristic_slope": {
+        "slope of the characteristic 5 % large": scaled(1.05)
+    },
     "flowmeter.characteristic.slope_jump": {"the slope jumps by 3 % more": scaled(1.03)},
     "flowmeter.characteristic.unloading_limit": {"unloading 2 % too high": scaled(1.02)},
     "flowmeter.design.choice": {
-        "a design takes slip for the end of every range": lambda right, make, values, tolerances, fastest: replace(
-            right(make, values, tolerances, fastest), margin=bifurcation.thresholds(make(**values)).omega_01
+        "a design takes slip for the end of every range": lambda right, make, values, tolerances, fastest: (
+            replace(
+                right(make, values, tolerances, fastest),
+                margin=bifurcation.thresholds(make(**values)).omega_01,
+            )
         ),
-        "a design's margin without its tolerances": lambda right, make, values, tolerances, fastest: right(
-            make, values, {}, fastest
+        "a design's margin without its tolerances": lambda right, make, values, tolerances, fastest: (
+            right(make, values, {}, fastest)
         ),
     },
     "flowmeter.design.corners": {
@@ -399,14 +463,21 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "flowmeter.design.sensitivities": {
         "sensitivities 2 % large": answer(
             lambda all_: {
-                key: {name: replace(s, value=1.02 * s.value) for name, s in own.items()} for key, own in all_.items()
+                key: {name: replace(s, value=1.02 * s.value) for name, s in own.items()}
+                for key, own in all_.items()
             }
         )
     },
-    "flowmeter.design.response_time": {"a design's response as in RS": lambda right, p: (1 + p.j) / p.c},
-    "stationary.solutions.slowest_time_constant": {"the slowest time constant 3 % long": scaled(1.03)},
+    "flowmeter.design.response_time": {
+        "a design's response as in RS": lambda right, p: (1 + p.j) / p.c
+    },
+    "stationary.solutions.slowest_time_constant": {
+        "the slowest time constant 3 % long": scaled(1.03)
+    },
     "flowmeter.characteristic.mean_slope": {"the mean slope 3 % large": scaled(1.03)},
-    "flowmeter.characteristic.reading_range": {"the reading range ends with rolling": lambda right, p: _rolls_up_to(p)},
+    "flowmeter.characteristic.reading_range": {
+        "the reading range ends with rolling": lambda right, p: _rolls_up_to(p)
+    },
     "flowmeter.response.peak": {
         "the peak after a jump 3 % late": scaled(1.03, 0),
         "the peak 3 % high": scaled(1.03, 1),
@@ -415,12 +486,14 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "the fluid's torque takes 2 % more friction": answer(fields(friction=times(1.02))),
     },
     "flowmeter.design.best": {
-        "a design takes less friction at the wall than it may": lambda right, make, bounds, *wanted: right(
-            make, {**bounds, "eta": (0.05, 0.2)}, *wanted
+        "a design takes less friction at the wall than it may": lambda right, make, bounds, *wanted: (
+            right(make, {**bounds, "eta": (0.05, 0.2)}, *wanted)
         )
     },
     "stationary.slipping_branch.hopf_places": {
-        "SS begins to swing a little later": answer(lambda places: [place + 1e-3 for place in places])
+        "SS begins to swing a little later": answer(
+            lambda places: [place + 1e-3 for place in places]
+        )
     },
     "simulation.time_stepping.run": {"time stepping with 0.1 % more inertia": other(j=1.001)},
     "flowmeter.pulsation.first_harmonic": {"rolling is ahead of a pulsation": answer(np.conj)},
@@ -431,7 +504,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "rebounds with nine tenths of the restitution": lambda right, at, k: right(
             at, k._replace(restitution=0.9 * k.restitution)
         ),
-        "landings on the wall with 5 % more friction": where(lambda at: at.x.h == 0, other(eta=1.05)),
+        "landings on the wall with 5 % more friction": where(
+            lambda at: at.x.h == 0, other(eta=1.05)
+        ),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": swapped},
     "simulation.charts._begin_on_wall": {
@@ -448,12 +523,22 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "flight with 1 % less weight": in_case(other(g=0.99), Case.NN),
     },
     "simulation.equations.fluid": {
-        "ramps begin with the run": lambda right, t, k: right(t, k._replace(line=k.line._replace(start=0.0)))
+        "ramps begin with the run": lambda right, t, k: right(
+            t, k._replace(line=k.line._replace(start=0.0))
+        )
     },
-    "simulation.equations.rolls_on": {"two-point rolling ends with 5 % more floor friction": other(mu=1.05)},
-    "mechanics.rolling_forces.margin": {"forces admit rolling with 5 % more wall friction": other(eta=1.05)},
-    "mechanics.rolling_forces.slip_margin": {"slip begins with 3 % more floor friction": other(mu=1.03)},
-    "mechanics.rolling_forces.least_utilisation": {"rolling is feasible with 5 % more floor friction": other(mu=1.05)},
+    "simulation.equations.rolls_on": {
+        "two-point rolling ends with 5 % more floor friction": other(mu=1.05)
+    },
+    "mechanics.rolling_forces.margin": {
+        "forces admit rolling with 5 % more wall friction": other(eta=1.05)
+    },
+    "mechanics.rolling_forces.slip_margin": {
+        "slip begins with 3 % more floor friction": other(mu=1.03)
+    },
+    "mechanics.rolling_forces.least_utilisation": {
+        "rolling is feasible with 5 % more floor friction": other(mu=1.05)
+    },
     "simulation.simulator.simulate": {
         "motions of a ball with 2 % more inertia": other(j=1.02),
         "motions with 2 % more wall friction": other(eta=1.02),
@@ -464,13 +549,21 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     "orbits.periodic.refine": {"hops with 10 % more floor friction": other(mu=1.1)},
     # Unsteady flow
-    "flowmeter.response.rolling_rate": {"a rolling ball follows the flow at the rate c": lambda right, p: p.c},
+    "flowmeter.response.rolling_rate": {
+        "a rolling ball follows the flow at the rate c": lambda right, p: p.c
+    },
     "flowmeter.response.transfer": {"response to a pulsation 2 % large": scaled(1.02)},
-    "flowmeter.response.step_response": {"ringing after a jump in a fluid with 5 % more drag": other(c=1.05)},
+    "flowmeter.response.step_response": {
+        "ringing after a jump in a fluid with 5 % more drag": other(c=1.05)
+    },
     "flowmeter.response.ramp_coefficient": {"slow ramps pass the fold by 5 % more": scaled(1.05)},
     # The fluid goes round as the ball does, and its acceleration takes no friction.
-    "flowmeter.pulsation._swing": {"pulsation takes no friction": answer(lambda swing: (swing[0], swing[0]))},
-    "flowmeter.pulsation.lag_harmonics": {"rolling follows a pulsation as under Stokes' drag": given(_by_stokes)},
+    "flowmeter.pulsation._swing": {
+        "pulsation takes no friction": answer(lambda swing: (swing[0], swing[0]))
+    },
+    "flowmeter.pulsation.lag_harmonics": {
+        "rolling follows a pulsation as under Stokes' drag": given(_by_stokes)
+    },
     "flowmeter.pulsation.slip_onset": {
         "slip begins 3 % late in a pulsation": scaled(1.03),
         "slip begins 3 % early in a pulsation": scaled(0.97),
@@ -483,14 +576,20 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "fast pulsations make it slip 0.1 % late": scaled(1.001),
         "a fast pulsation never fills both cones": _one_cone,
     },
-    "flowmeter.pulsation.mean_error": {"mean reading of a pulsation with 2 % more floor friction": other(mu=1.02)},
+    "flowmeter.pulsation.mean_error": {
+        "mean reading of a pulsation with 2 % more floor friction": other(mu=1.02)
+    },
 }
 """By function of `analytic`, and what is wrong with it."""
 _FAULTS_OF_ATTRACTORS: dict[str, dict[str, Fault]] = {
     "orbits.periodic.refine": {
         "a swing with 0.1 % more floor friction": where(lambda p: p.mu > 1, other(mu=1.001)),
-        "hops without restitution": lambda right, p, x, period, restitution=0.0: right(p, x, period),
-        "Floquet multipliers of two periods": answer(fields(derivative=lambda derivative: derivative @ derivative)),
+        "hops without restitution": lambda right, p, x, period, restitution=0.0: right(
+            p, x, period
+        ),
+        "Floquet multipliers of two periods": answer(
+            fields(derivative=lambda derivative: derivative @ derivative)
+        ),
     },
     "bifurcation.diagram.thresholds": {
         "hopping begins 1 % late": where(
@@ -499,25 +598,42 @@ _FAULTS_OF_ATTRACTORS: dict[str, dict[str, Fault]] = {
     },
     "orbits.orbit_branch.follow": {
         "hopping ends 2 % late": answer(
-            fields(places=lambda places: tuple(replace(each, value=1.02 * each.value) for each in places))
+            fields(
+                places=lambda places: tuple(
+                    replace(each, value=1.02 * each.value) for each in places
+                )
+            )
         )
     },
-    "simulation.simulator.simulate": {"strong drag in minutes": where(lambda p: p.kappa > 2, other(c=1 / 60))},
+    "simulation.simulator.simulate": {
+        "strong drag in minutes": where(lambda p: p.kappa > 2, other(c=1 / 60))
+    },
 }
 """The same, of what is measured from the default level on."""
 _FAULTS_FOR_TESTS: dict[str, dict[str, Fault]] = {
     "mechanics.rigid_body.energy": {
-        "energy without the spin about the vertical": lambda right, y, u, p: right(y, u._replace(o_y=0.0 * u.o_y), p)
+        "energy without the spin about the vertical": lambda right, y, u, p: right(
+            y, u._replace(o_y=0.0 * u.o_y), p
+        )
     },
     "mechanics.rigid_body.slip_at_A": {
-        "the lowest point slips as if the centre didn't move inwards": lambda right, u, p: (p.r * u.o_z, right(u, p)[1])
+        "the lowest point slips as if the centre didn't move inwards": lambda right, u, p: (
+            p.r * u.o_z,
+            right(u, p)[1],
+        )
     },
     "simulation.equations.smooth_rates": {
-        "as a case is chosen the axes turn the spin the other way": answer(fields(o_x=times(-1.0), o_z=times(-1.0)))
+        "as a case is chosen the axes turn the spin the other way": answer(
+            fields(o_x=times(-1.0), o_z=times(-1.0))
+        )
     },
-    "mechanics.dynamics.newton_euler": {"row of ω̃_z of RN 2 % large": in_case(scaled(1.02, 5), Case.RN)},
+    "mechanics.dynamics.newton_euler": {
+        "row of ω̃_z of RN 2 % large": in_case(scaled(1.02, 5), Case.RN)
+    },
     "stationary.solutions.stationary_solutions": {
-        "on a smooth floor the ball lags by 1 %": where(lambda p: p.mu == 0, of_case(Case.SR, fields(x=times(0.99, 2))))
+        "on a smooth floor the ball lags by 1 %": where(
+            lambda p: p.mu == 0, of_case(Case.SR, fields(x=times(0.99, 2)))
+        )
     },
     "bifurcation.diagram.inertia_shifts": {
         "the fluid adds all of the displaced mass": lambda right, p: (
@@ -525,14 +641,18 @@ _FAULTS_FOR_TESTS: dict[str, dict[str, Fault]] = {
         )
     },
     "stationary.slipping_branch.eta_critical": {
-        "η_cr of the quadratic law as under Stokes' drag": lambda right, mu, p: right(mu, _by_stokes(p))
+        "η_cr of the quadratic law as under Stokes' drag": lambda right, mu, p: right(
+            mu, _by_stokes(p)
+        )
     },
     "slipping.slip_stability.slip_rates": {
         "normal forces of floor and wall exchanged": answer(lambda rates: (rates[0], *rates[:0:-1]))
     },
     "orbits.fates.lyapunov": {"exponents to the base of ten": scaled(1 / np.log(10), 0, 1)},
     "flowmeter.real_fluid.torque_rate": {
-        "the fluid's torque as in creeping flow": lambda right, spin, p, layer=True: right(spin, p, False),
+        "the fluid's torque as in creeping flow": lambda right, spin, p, layer=True: right(
+            spin, p, False
+        ),
         "the fluid's torque as if j were 1": lambda right, spin, p, layer=True: (
             right(spin, p, layer) * (1.0 if p.fluid_torque else p.j)
         ),
@@ -554,7 +674,9 @@ _SEEN_BY = {
 """The tests of `analytic` that see them."""
 
 
-def _listed(faults: Mapping[str, Mapping[str, Fault]], level: Level, tests: Mapping[str, str]) -> list[WrongTheory]:
+def _listed(
+    faults: Mapping[str, Mapping[str, Fault]], level: Level, tests: Mapping[str, str]
+) -> list[WrongTheory]:
     return [
         WrongTheory(what, f"analytic.{module}", function, wrong, level, tests.get(name, ""))
         for name, own in faults.items()

@@ -1,8 +1,8 @@
 """Trying the verdicts: which claims notice a wrong theory, and which a wrong engine?
 
-``python -m tests.mutants DIR`` judges the stored measurements of a validation by every wrong theory; with
-``--engines`` it also measures with every wrong engine. It exits with 1 if more of them go unnoticed than may.
-"""
+``python -m tests.mutants DIR`` judges the stored measurements of a validation by every wrong
+theory; with ``--engines`` it also measures with every wrong engine. It exits with 1 if more of them
+go unnoticed than may."""
 
 from __future__ import annotations
 
@@ -29,9 +29,11 @@ from tests.mutants.theories import THEORIES
 
 Outcomes = dict[str, Outcome]
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
-"""Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
+"""Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in
+contact and landing."""
 PATIENCE = 20.0
-"""Processor time that the predictions of a claim may take under a wrong theory, s; several times what they need."""
+"""Processor time that the predictions of a claim may take under a wrong theory, s; several times
+what they need."""
 KINDS = "by_numbers", "by_error", "by_hanging", "missed"
 """How a wrong theory may be noticed."""
 
@@ -44,7 +46,8 @@ class Trial:
     noticed: Outcomes
     """Claims whose verdict is another than without the fault, and what it is."""
     hung: tuple[str, ...] = ()
-    """Claims whose predictions were given up after `PATIENCE`: they neither notice the fault nor miss it."""
+    """Claims whose predictions were given up after `PATIENCE`: they neither notice the fault nor
+    miss it."""
     tried: bool = True
     """Whether anything is measured that could notice it."""
 
@@ -58,7 +61,9 @@ class Trial:
     @property
     def by(self) -> str:
         """Who noticed it."""
-        named = [name if of is Outcome.REFUTED else f"{name} ({of})" for name, of in self.noticed.items()]
+        named = [
+            name if of is Outcome.REFUTED else f"{name} ({of})" for name, of in self.noticed.items()
+        ]
         named = named or ["**nobody**" if self.tried else "not measured"]
         return ", ".join([*named, *(f"{name} hangs" for name in self.hung)])
 
@@ -83,19 +88,23 @@ def measured(directory: Path) -> Records:
 
 
 def judged(directory: Path, workers: int = 2, whole: bool = False, by: str = "") -> Judged:
-    """Every wrong theory judged on the measurements stored in a results directory, or on what a witness alone says.
+    """Every wrong theory judged on the measurements stored in a results directory, or on what a
+    witness alone says.
 
-    By the claims that call its function, the quickest first and only until one notices it; if `whole`, by all of them.
-    """
+    By the claims that call its function, the quickest first and only until one notices it; if
+    `whole`, by all of them."""
     level = results.load(directory).level.lower()
     with processes(workers) as work:
         right = list(work.map(functools.partial(_right, directory, by), range(len(CLAIMS))))
-        trials = _shown(work.map(functools.partial(_theory, directory, by, whole, right), range(len(THEORIES))))
+        trials = _shown(
+            work.map(functools.partial(_theory, directory, by, whole, right), range(len(THEORIES)))
+        )
     return Judged(f"{level}, by {by}" if by else level, trials, directory, whole)
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
-    """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's apart."""
+    """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's
+    apart."""
     with processes(workers) as work:
         return _shown(work.map(functools.partial(_engine, directory), range(len(WRONG_ENGINES))))
 
@@ -117,7 +126,8 @@ class Right:
     took: float
     """Processor time, s."""
     calls: frozenset[str]
-    """Functions of `THEORIES` that its predictions call: a fault in any other can't change the outcome."""
+    """Functions of `THEORIES` that its predictions call: a fault in any other can't change the
+    outcome."""
 
 
 def _right(directory: Path, by: str, number: int) -> Right:
@@ -170,5 +180,7 @@ def _engine(directory: Path, number: int) -> Trial:
     verdicts = validation.validate(
         apart, level=levels.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False
     )
-    other = {v.claim.id: v.outcome for v in verdicts if v.outcome is not _outcome(directory, "", v.claim)}
+    other = {
+        v.claim.id: v.outcome for v in verdicts if v.outcome is not _outcome(directory, "", v.claim)
+    }
     return Trial(wrong.name, other)

@@ -1,4 +1,5 @@
-"""Pages that need nothing but themselves, filled in from templates that share `base.html`; and tables of text."""
+"""Pages that need nothing but themselves, filled in from templates that share `base.html`; and
+tables of text."""
 
 from __future__ import annotations
 
@@ -20,23 +21,45 @@ def readable(unit: str) -> str:
     """A unit of the files as a reader writes it: rad s-1 is rad/s, 1 is nothing."""
     if unit == "1":
         return ""
-    for written, read in (" s-2", "/s²"), (" s-1", "/s"), (" m-3", "/m³"), ("s-1", "1/s"), ("rad-1", "1/rad"):
+    for written, read in (
+        (" s-2", "/s²"),
+        (" s-1", "/s"),
+        (" m-3", "/m³"),
+        ("s-1", "1/s"),
+        ("rad-1", "1/rad"),
+    ):
         unit = unit.replace(written, read)
     return unit.replace("m2", "m²").replace("rad2", "rad²")
 
 
-_SIGNS = {"√": "sqrt ", "±": "+-", "×": "x", "–": "-", "—": "-", "·": "*", "≈": "~", "≤": "<=", "≥": ">="}
+_SIGNS = {
+    "√": "sqrt ",
+    "±": "+-",
+    "×": "x",
+    "–": "-",
+    "—": "-",
+    "·": "*",
+    "≈": "~",
+    "≤": "<=",
+    "≥": ">=",
+}
 
 
 def spell_out(error: UnicodeError) -> tuple[str, int]:
-    """An error handler of `codecs`: spells out Greek letters, and shows others without accents and digits as such."""
+    """An error handler of `codecs`: spells out Greek letters, and shows others without accents and
+    digits as such."""
     assert isinstance(error, UnicodeEncodeError)
     shown = []
     for letter in error.object[error.start : error.end]:
         name = unicodedata.name(letter, "?").split()
         greek = name[-1].capitalize() if "CAPITAL" in name else name[-1].lower()
-        plain = _SIGNS.get(letter) or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
-        shown.append(greek if name[0] == "GREEK" else plain or "?" * (not unicodedata.combining(letter)))
+        plain = (
+            _SIGNS.get(letter)
+            or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
+        )
+        shown.append(
+            greek if name[0] == "GREEK" else plain or "?" * (not unicodedata.combining(letter))
+        )
     return "".join(shown), error.end
 
 
@@ -45,7 +68,8 @@ _SYMBOL = (  # compiled where it is first needed
     r"|([Α-ω](?![ms]\b|[a-z]{2})"  # alone
     r"|(?<![A-Za-z_.'’])(?<!\d )(?<![A-Z]\. )(?!RR|cm|(?<=\()R\)|m(?![gRrcjΑ-ω·]| =))"  # or a product:
     r"[mgRrcj]+(?![A-Za-z'’_])"
-    r"|(?<![\w.'’])(?<!\d )(?<!&#39;)(?:[yht](?![\w'’.])|[A-Za-z](?= [=&≤≥])|[A-Ca-ce-z](?=[Α-ω])|K(?= [Α-ω])))"
+    r"|(?<![\w.'’])(?<!\d )(?<!&#39;)(?:[yht](?![\w'’.])|[A-Za-z](?= "
+    r"[=&≤≥])|[A-Ca-ce-z](?=[Α-ω])|K(?= [Α-ω])))"
     r"|\^\(?([\d/]+)\)?"  # a power
     r"|((?<= )-(?= )|(?<![\w).])-(?=\d))"  # minus
 )
@@ -53,7 +77,8 @@ _DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 
 
 def typeset(text: str) -> str:
-    """Text of a page with symbols such as ω_c, ω₀ or η as mathematics, in HTML; all else is escaped."""
+    """Text of a page with symbols such as ω_c, ω₀ or η as mathematics, in HTML; all else is
+    escaped."""
     import markupsafe  # comes with jinja2
 
     def symbol(found: re.Match[str]) -> str:
@@ -67,22 +92,32 @@ def typeset(text: str) -> str:
 
 
 def render(package: str, template: str, **values: Any) -> str:
-    """A template of a package, filled in; what is not marked safe is escaped, a value that is missing is an error."""
+    """A template of a package, filled in; what is not marked safe is escaped, a value that is
+    missing is an error."""
     import jinja2  # here, because the terminal has no pages
     import markupsafe
 
-    loader = jinja2.ChoiceLoader([jinja2.PackageLoader(package), jinja2.PackageLoader("compare.kit.pages")])
-    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    loader = jinja2.ChoiceLoader(
+        [jinja2.PackageLoader(package), jinja2.PackageLoader("compare.kit.pages")]
+    )
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined
+    )
     environment.filters["typeset"] = typeset
-    environment.globals["source"] = lambda name: markupsafe.Markup(loader.get_source(environment, name)[0])
+    environment.globals["source"] = lambda name: markupsafe.Markup(
+        loader.get_source(environment, name)[0]
+    )
     return environment.get_template(template).render(**values)
 
 
 def markdown(rows: Rows) -> str:
-    """A table in Markdown; columns of short cells, most of them numbers, are set to the right, and not broken."""
+    """A table in Markdown; columns of short cells, most of them numbers, are set to the right, and
+    not broken."""
     short = [all(len(cell) <= 9 for cell in column[1:]) for column in zip(*rows, strict=True)]
     cells = [rows[0], ["--:" if k and short[k] else "---" for k in range(len(short))], *rows[1:]]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
+    return "\n".join(
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells
+    )
 
 
 def pairs(rows: Mapping[str, str]) -> Table:
@@ -103,7 +138,8 @@ def table(
     justify: JustifyMethod = "right",
     **look: Any,
 ) -> Table:
-    """A table for the terminal; with `no_wrap` only its head and first column may take several lines.
+    """A table for the terminal; with `no_wrap` only its head and first column may take several
+    lines.
 
     `justify` is for all columns but the first, and those of words.
     """
@@ -111,12 +147,19 @@ def table(
     from rich.table import Table
     from rich.text import Text
 
-    usual: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "caption_justify": "left"}
+    usual: dict[str, Any] = {
+        "title_justify": "left",
+        "title_style": "bold",
+        "caption_justify": "left",
+    }
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):
         words = rows[1:] and all(str(row[k])[:1].isalpha() for row in rows[1:])
         shown.add_column(name, justify="left" if k == 0 or words else justify)
     for row in rows[1:]:
-        texts = (Text(cell, no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell for k, cell in enumerate(row))
+        texts = (
+            Text(cell, no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell
+            for k, cell in enumerate(row)
+        )
         shown.add_row(*texts)
     return shown

@@ -1,7 +1,8 @@
-"""Where the ball ends from each start of a plane of states: on a fine grid by theory, on a coarse one by MuJoCo.
+"""Where the ball ends from each start of a plane of states: on a fine grid by theory, on a coarse
+one by MuJoCo.
 
-The two should differ only at the boundaries of basins, where the smallest error decides. What MuJoCo has run is kept.
-"""
+The two should differ only at the boundaries of basins, where the smallest error decides. What
+MuJoCo has run is kept."""
 
 from __future__ import annotations
 
@@ -49,7 +50,9 @@ class Basins:
     y: Array
     fates: npt.NDArray[np.int64]  # indices of `FATES`, by the event-driven simulation, shape (m, n)
     coarse: int  # MuJoCo has computed every `coarse`-th point along both axes; 0 for none
-    mujoco: npt.NDArray[np.int64]  # its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s
+    mujoco: npt.NDArray[
+        np.int64
+    ]  # its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s
     timestep: float
 
     def share(self, fate: str) -> tuple[int, int]:
@@ -57,13 +60,16 @@ class Basins:
         return int(np.sum(self.fates == FATES.index(fate))), self.fates.size
 
     def differences(self) -> Array:
-        """Distances from a boundary of the points at which MuJoCo and theory differ, in cells of the fine map."""
+        """Distances from a boundary of the points at which MuJoCo and theory differ, in cells of
+        the fine map."""
         from scipy.ndimage import distance_transform_cdt  # slow to import
 
         distance = np.zeros(self.fates.shape)
         for fate in np.unique(self.fates):
             own = np.pad(self.fates == fate, 1, mode="edge")
-            distance += distance_transform_cdt(own, metric="chessboard")[1:-1, 1:-1]  # 0 outside its basin
+            distance += distance_transform_cdt(own, metric="chessboard")[
+                1:-1, 1:-1
+            ]  # 0 outside its basin
         coarse = np.s_[:: self.coarse, :: self.coarse]
         return np.asarray(distance[coarse][self.fates[coarse] != self.mujoco])
 
@@ -73,9 +79,12 @@ class Basins:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
+        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of
+        these."""
         with reading_json(Path(path), "basins") as data:
-            arrays: dict[str, Any] = {name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")}
+            arrays: dict[str, Any] = {
+                name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")
+            }
             p, start = Parameters.from_mapping(data.pop("parameters")), tuple(data.pop("start"))
             return cls(parameters=p, start=start, **data, **arrays)
 
@@ -88,10 +97,11 @@ def basins(
     coarse: int = 0,
     timestep: float = 2.5e-4,
 ) -> Basins:
-    """Fates after 10/c of starts on a plane of two state variables, across and up; all others as in `start`, or zero.
+    """Fates after 10/c of starts on a plane of two state variables, across and up; all others as in
+    `start`, or zero.
 
-    Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
-    """
+    Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball
+    can't start."""
     across, up = plane
     check_names((*start, across.name, up.name), VARIABLES, "state variable")
     if across.name == up.name:
@@ -113,7 +123,9 @@ def basins(
     fine, other = [], []
     threads = max(1, campaign.workers) if isinstance(campaign.workers, int) else None
     for row in states:
-        runs = analytic.simulate_many(p, row, lasts, sample_interval=lasts / INSTANTS, threads=threads)
+        runs = analytic.simulate_many(
+            p, row, lasts, sample_interval=lasts / INSTANTS, threads=threads
+        )
         ends = zip(runs.x[..., 0], runs.case[:, -1], runs.failure, strict=True)
         fine.append([UNDECIDED if failure else fate(y, Case(last), p) for y, last, failure in ends])
     broken = {failure.task.key for failure in campaign.complete(tasks)}

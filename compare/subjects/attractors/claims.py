@@ -1,4 +1,5 @@
-"""Claims beyond the paper, which asks whether periodic attractors exist: a ball that hops for ever."""
+"""Claims beyond the paper, which asks whether periodic attractors exist: a ball that hops for
+ever."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ def _hops(m: Measurement) -> float:
 
 
 def _hops_on(m: Measurement) -> float:
-    """Whether the hop of a ball that rebounds is stable, by continuation from the hop without a rebound."""
+    """Whether the hop of a ball that rebounds is stable, by continuation from the hop without a
+    rebound."""
     p, end = m.parameters, m.at("restitution")
     orbit = theory(orbits.refine, p, TOP, 0.22)  # s, about its period
     for restitution in [*np.arange(0.2, end, 0.1).tolist(), end] if end else []:
@@ -37,9 +39,12 @@ def _hops_on(m: Measurement) -> float:
 
 
 def _eta_at_torus(orbit: Orbit) -> float:
-    """The wall friction at which multipliers leave the unit circle, on the branch of an orbit; nan if they don't."""
+    """The wall friction at which multipliers leave the unit circle, on the branch of an orbit; nan
+    if they don't."""
     branch = orbit_branch.follow(orbit, "eta", orbit.p.eta, 1.1 * orbit.p.eta)
-    return next((place.value for place in branch.places if place.kind is Bifurcation.TORUS), math.nan)
+    return next(
+        (place.value for place in branch.places if place.kind is Bifurcation.TORUS), math.nan
+    )
 
 
 _ORBIT: dict[str, Callable[[Orbit], float]] = {
@@ -63,13 +68,15 @@ def _orbit_bearings(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
 
 
 def _after_rest(m: Measurement) -> float:
-    """The settled state of theory from rest, after 60/c: the slowest part decays with a time constant 2 (1 + 2 j)/c."""
+    """The settled state of theory from rest, after 60/c: the slowest part decays with a time
+    constant 2 (1 + 2 j)/c."""
     run = simulated(m.parameters, (0.0,) * 6, 60.0 / m.parameters.c)
     return float(getattr(run, m.quantity)[-1])
 
 
 def _only_lasting(m: Measurement) -> float:
-    """Case or omega_c of the only stationary motion that attracts, by Definitions 1-3; nan if there are more."""
+    """Case or omega_c of the only stationary motion that attracts, by Definitions 1-3; nan if there
+    are more."""
     those = analytic.stable_solutions(m.parameters)
     lasts = those[0].case if m.quantity == "case" else those[0].state.omega_c
     return float(lasts) if len(those) == 1 else math.nan
@@ -81,14 +88,16 @@ CLAIMS = (
     claim(
         "choice",
         "Definitions 1-3",
-        "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
+        "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip "
+        "grows.",
         *bearings("choice", ("case", "omega_c"), _after_rest, by=_RULE),
         *bearings("choice", ("case", "omega_c"), _only_lasting, by="analytic.stable_solutions"),
     ),
     claim(
         "hopping",
         _PERIODIC,
-        "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall. The engine "
+        "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on "
+        "the wall. The engine "
         "and Moreau-Jean time stepping come to the closed orbit of the event-driven simulation.",
         *_orbit_bearings("recurrent", *_HOP),
         *_orbit_bearings("stepped", *_HOP),
@@ -96,14 +105,16 @@ CLAIMS = (
     claim(
         "hopping-multiplier",
         _PERIODIC,
-        "Disturbances of a hop shrink from one to the next by a factor: the largest Floquet multiplier of its orbit.",
+        "Disturbances of a hop shrink from one to the next by a factor: the largest Floquet "
+        "multiplier of its orbit.",
         *_orbit_bearings("recurrent", "orbit_multiplier"),
         level=Level.DEFAULT,
     ),
     claim(
         "swing",
         _PERIODIC,
-        "Between the Hopf points of SS the ball swings for ever and slips all the time (very rough floor).",
+        "Between the Hopf points of SS the ball swings for ever and slips all the time (very rough "
+        "floor).",
         *_orbit_bearings("swing", "swing_period", "swing_omega_c", "swing_size"),
         level=Level.DEFAULT,
     ),
@@ -129,17 +140,21 @@ CLAIMS = (
     claim(
         "hopping-rebound",
         _PERIODIC,
-        "A ball that rebounds hops on, too, lower and lower, up to a coefficient of restitution of 0.536, where a pair "
-        "of Floquet multipliers leaves the unit circle; beyond, the hops end. By continuation and time stepping: "
+        "A ball that rebounds hops on, too, lower and lower, up to a coefficient of restitution of "
+        "0.536, where a pair "
+        "of Floquet multipliers leaves the unit circle; beyond, the hops end. By continuation and "
+        "time stepping: "
         "MuJoCo's contacts have no such coefficient.",
         Bearing("rebounding", "hops", _hops_on, by="analytic.orbits.periodic.refine"),
         level=Level.DEFAULT,
-        reason="Impacts are not in the paper: Newton's law of restitution and Coulomb's, at floor and wall at once.",
+        reason="Impacts are not in the paper: Newton's law of restitution and Coulomb's, at floor "
+        "and wall at once.",
     ),
     claim(
         "hopping-death",
         _PERIODIC,
-        "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit circle.",
+        "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit "
+        "circle.",
         *_orbit_bearings("followed", "orbit_death"),
         Bearing("followed", "hops", _hops, by="analytic.simulate"),
         level=Level.DEFAULT,

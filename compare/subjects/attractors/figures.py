@@ -1,4 +1,5 @@
-"""Beyond the paper: the ball that hops for ever, Figs. 9, 10 and 13 with the branch of such motions, maps of basins."""
+"""Beyond the paper: the ball that hops for ever, Figs. 9, 10 and 13 with the branch of such
+motions, maps of basins."""
 
 from __future__ import annotations
 
@@ -35,18 +36,24 @@ STARTS = 20
 
 @functools.cache
 def _hopping_orbit(p: Parameters) -> orbits.Orbit | None:
-    """The orbit of a ball that hops for ever: by Newton's method from a guess, or of a random start, if any hops."""
+    """The orbit of a ball that hops for ever: by Newton's method from a guess, or of a random
+    start, if any hops."""
     if p == SET:
         return orbits.refine(p, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
     found = (each.fate.orbit for each in analytic.attractors(p, STARTS, seed=0))
-    return next((o for o in found if o and {case.A is Contact.N for case in o.cases} == {True, False}), None)
+    return next(
+        (o for o in found if o and {case.A is Contact.N for case in o.cases} == {True, False}), None
+    )
 
 
 def _orbit_or_gap(p: Parameters) -> orbits.Orbit:
     """The orbit of a ball that hops for ever; `GapError` if none is found."""
     if orbit := _hopping_orbit(p):
         return orbit
-    raise GapError(f"no ball hops for ever that starts in one of {STARTS} random states at ω₀ = {p.omega_0:g} rad/s")
+    raise GapError(
+        f"no ball hops for ever that starts in one of {STARTS} random states at ω₀ = {p.omega_0:g} "
+        f"rad/s"
+    )
 
 
 def draw_branch(of: Diagram) -> tuple[Figure, str]:
@@ -71,7 +78,9 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             height = float(quantity(end.slip_x, end.omega_c))
             style.beside(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
         slip_x, flows = round_with_fluid(p, Case.NR, edge, top)
-        style.curve(axes, (Case.SR, Case.NR), flows, quantity(slip_x, flows), ("SR, NR", (0.6, rides)))
+        style.curve(
+            axes, (Case.SR, Case.NR), flows, quantity(slip_x, flows), ("SR, NR", (0.6, rides))
+        )
         slip_x, flows = round_with_fluid(p, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge)
         style.curve(axes, Case.NS, flows, quantity(slip_x, flows), ("NS", (0.5, (-3, 9))))
         cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
@@ -79,12 +88,22 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
         low, high = [c.min() for c in cycles], [c.max() for c in cycles]
         axes.fill_between(branch.values, low, high, color=style.HOPPING, alpha=0.25, lw=0)
         for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
-            axes.plot(branch.values, np.where(part, mean, np.nan), color=style.HOPPING, ls=line, lw=2)
-        style.beside(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, style.HOPPING)
+            axes.plot(
+                branch.values, np.where(part, mean, np.nan), color=style.HOPPING, ls=line, lw=2
+            )
+        style.beside(
+            axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, style.HOPPING
+        )
         for special in branch.places:
             if special.kind is Bifurcation.BIRTH:
                 born = State(*special.orbit.mean)
-                style.mark(axes, special.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
+                style.mark(
+                    axes,
+                    special.value,
+                    float(quantity(born.slip_x, born.omega_c)),
+                    "birth",
+                    (-10, -30),
+                )
         axes.set(xlim=(LOWEST_FLOW * edge, top), xlabel=style.OMEGA_0)
         style.guides(axes, {"omega_02": edge})
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * top))
@@ -94,9 +113,12 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
     factors = np.abs([each.multipliers[0] for each in branch.orbits])
     return figure, style.caption(
         p,
-        "Stationary motions as in Fig. 13 (left) and Figs. 9 and 10 (right), and the hopping ball (purple): its mean "
-        "over a period, shaded from least to greatest. Hops begin with no height at ω₀₂, where NS, NR, SR and the "
-        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} here. Dashed: "
+        "Stationary motions as in Fig. 13 (left) and Figs. 9 and 10 (right), and the hopping ball "
+        "(purple): its mean "
+        "over a period, shaded from least to greatest. Hops begin with no height at ω₀₂, where NS, "
+        "NR, SR and the "
+        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} "
+        f"here. Dashed: "
         f"unstable. r/R = {p.r / p.R:.3g},",
         states=of.states,
     )
@@ -107,7 +129,11 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     orbit = _orbit_or_gap(of.p)
     cycle = orbit.cycle
     figure, axes = style.panels(9.0, 3.2, 1, 3, sharey=True)
-    shown = {"$t$ (ms)": 1e3 * cycle.time, "$v_y$ (m/s)": cycle.v_y, "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x}
+    shown = {
+        "$t$ (ms)": 1e3 * cycle.time,
+        "$v_y$ (m/s)": cycle.v_y,
+        "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x,
+    }
     for ax, (label, x) in zip(axes, shown.items(), strict=True):
         for case in dict.fromkeys(cycle.cases):
             own, look = cycle.case == case, {"color": style.COLOURS[case], "label": case.name}
@@ -117,15 +143,18 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     style.legend(axes[0], loc="lower right", markerscale=4)
     named = style.named(of.p, "mu", "eta", "j", "kappa", "omega_0")
     return figure, (
-        f"The hopping ball over one period of {orbit.period:.5g} s: height, and the orbit in two planes of the state "
-        f"space, coloured by case: {', '.join(case.name for case in dict.fromkeys(cycle.cases))}; a gap at the impact. "
+        f"The hopping ball over one period of {orbit.period:.5g} s: height, and the orbit in two "
+        f"planes of the state "
+        f"space, coloured by case: {', '.join(case.name for case in dict.fromkeys(cycle.cases))}; "
+        f"a gap at the impact. "
         f"It rises to {1e3 * cycle.y.max():.3g} mm. Largest |Floquet multiplier| "
         f"{abs(orbit.multipliers[0]):.4g}; {named} rad/s."
     )
 
 
 class _Hop(NamedTuple):
-    """What is drawn of an orbit over the friction of the wall: the height of the hops in m, mean omega_c in rad/s."""
+    """What is drawn of an orbit over the friction of the wall: the height of the hops in m, mean
+    omega_c in rad/s."""
 
     eta: float
     height: float
@@ -134,21 +163,31 @@ class _Hop(NamedTuple):
 
 
 def _wall_branch(p: Parameters) -> tuple[list[_Hop], list[tuple[Bifurcation, _Hop]]]:
-    """The branch of hops over the friction of the wall, and what happens on it: both lie on the line.
+    """The branch of hops over the friction of the wall, and what happens on it: both lie on the
+    line.
 
     Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
     """
 
     def hop(orbit: orbits.Orbit, eta: float) -> _Hop:
-        return _Hop(eta, float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c), orbit.stable)
+        return _Hop(
+            eta, float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c), orbit.stable
+        )
 
     branch = orbit_branch.follow(_orbit_or_gap(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
-    rows, places = [hop(orbit, orbit.p.eta) for orbit in branch.orbits], list[tuple[Bifurcation, _Hop]]()
+    rows, places = (
+        [hop(orbit, orbit.p.eta) for orbit in branch.orbits],
+        list[tuple[Bifurcation, _Hop]](),
+    )
     for place in branch.places:
         if place.kind is Bifurcation.BIRTH:
-            at, (one, two) = (len(rows), rows[:-3:-1]) if place is branch.places[-1] else (0, rows[:2])
+            at, (one, two) = (
+                (len(rows), rows[:-3:-1]) if place is branch.places[-1] else (0, rows[:2])
+            )
             share = (place.value - one.eta) / (two.eta - one.eta)
-            eta, height, omega_c = (a + share * (b - a) for a, b in zip(one[:3], two[:3], strict=True))
+            eta, height, omega_c = (
+                a + share * (b - a) for a, b in zip(one[:3], two[:3], strict=True)
+            )
             row = _Hop(eta, height, omega_c, one.stable)
         else:  # where the line is bent least by it
             row = hop(place.orbit, place.value)
@@ -163,7 +202,8 @@ def _wall_branch(p: Parameters) -> tuple[list[_Hop], list[tuple[Bifurcation, _Ho
 
 
 def draw_walls(of: Diagram) -> tuple[Figure, str]:
-    """A figure of height and mean omega_c of hops over the friction of the wall; and its caption."""
+    """A figure of height and mean omega_c of hops over the friction of the wall; and its
+    caption."""
     if of.p.eta == 0:
         raise GapError("its wall has no friction that could grow")
     rows, places = _wall_branch(of.p)
@@ -188,13 +228,25 @@ def draw_walls(of: Diagram) -> tuple[Figure, str]:
         axes.set(xlabel="wall friction $\\eta$", ylabel=label)
         axes.margins(0.2, 0.1)
     style.legend(panels[0], loc="upper left")
-    mark = " Shaded: the least wall friction at which hops don't last, as measured." if of.states else ""
-    told = ", ".join(f"{_SHORT.get(kind, kind)} η = {row.eta:.4g}" for kind, row in places if kind is not _UNNAMED)
+    mark = (
+        " Shaded: the least wall friction at which hops don't last, as measured."
+        if of.states
+        else ""
+    )
+    told = ", ".join(
+        f"{_SHORT.get(kind, kind)} η = {row.eta:.4g}"
+        for kind, row in places
+        if kind is not _UNNAMED
+    )
     return figure, (
-        f"Height and mean ω_c of the hopping ball against the friction of the wall, from {LEAST_WALL:g} to "
-        f"{MOST_WALL:g} times its own. Named along the branch: {told or 'nothing'}. At a birth hops have no height; at "
-        "a torus bifurcation they lose stability, in a fold the branch turns back. Dots without names: the sequence of "
-        f"cases changes. Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} rad/s.{mark}"
+        f"Height and mean ω_c of the hopping ball against the friction of the wall, from "
+        f"{LEAST_WALL:g} to "
+        f"{MOST_WALL:g} times its own. Named along the branch: {told or 'nothing'}. At a birth "
+        f"hops have no height; at "
+        "a torus bifurcation they lose stability, in a fold the branch turns back. Dots without "
+        "names: the sequence of "
+        f"cases changes. Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} "
+        f"rad/s.{mark}"
     )
 
 
@@ -224,7 +276,9 @@ def fill_basins(axes: Axes, basins: Basins) -> None:
     }
     axes.pcolormesh(basins.x, basins.y, basins.fates, shading="nearest", rasterized=True, **look)
     present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
-    handles: list[object] = [Patch(color=_SHADES[k], alpha=0.55, label=FATES[k]) for k in sorted(present)]
+    handles: list[object] = [
+        Patch(color=_SHADES[k], alpha=0.55, label=FATES[k]) for k in sorted(present)
+    ]
     if basins.coarse:
         x, y = np.meshgrid(basins.x[:: basins.coarse], basins.y[:: basins.coarse])
         for k in sorted(set(basins.mujoco.ravel().tolist())):
@@ -234,19 +288,38 @@ def fill_basins(axes: Axes, basins: Basins) -> None:
         if np.any(differ):
             handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
         handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
-    axes.set(xlabel=f"{_VARIABLES[basins.across]} at the start", ylabel=f"{_VARIABLES[basins.up]} at the start")
+    axes.set(
+        xlabel=f"{_VARIABLES[basins.across]} at the start",
+        ylabel=f"{_VARIABLES[basins.up]} at the start",
+    )
     axes.legend(
-        handles=handles, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(handles), frameon=False
+        handles=handles,
+        fontsize=8,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=len(handles),
+        frameon=False,
     )
 
 
 FIGURES = {
     name: diagram(
-        name, f"Beyond the paper: {title}", "hopping", draw, (claim,), methodcaller("select", quantity, "period")
+        name,
+        f"Beyond the paper: {title}",
+        "hopping",
+        draw,
+        (claim,),
+        methodcaller("select", quantity, "period"),
     )
     for name, title, quantity, draw, claim in (
         ("hopping-orbit", "a ball that hops for ever", "orbit_omega_c", draw_orbit, "hopping"),
-        ("hopping-branch", "Figs. 9, 10 and 13 with hopping", "orbit_omega_c", draw_branch, "hopping-birth"),
+        (
+            "hopping-branch",
+            "Figs. 9, 10 and 13 with hopping",
+            "orbit_omega_c",
+            draw_branch,
+            "hopping-birth",
+        ),
         ("hopping-walls", "hops along rougher walls", "orbit_death", draw_walls, "hopping-death"),
     )
 }

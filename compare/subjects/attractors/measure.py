@@ -1,13 +1,18 @@
-"""Motions that never settle: a ball that hops for ever, one that swings for ever, and whether others do.
+"""Motions that never settle: a ball that hops for ever, one that swings for ever, and whether
+others do.
 
-* A ball hops while the flow is lowered in held steps. The tops of its hops give period, height, orbit, and by what
-  factor disturbances shrink from hop to hop; the flow at which hops would have no height is extrapolated.
-* The hop is followed along rougher walls to where disturbances grow; on both sides of that wall balls are left alone.
-* Balls that rebound from floor and wall hop, too: they are followed from one coefficient of restitution to the next.
-* A ball swings beside a Hopf point: it slips at both points, and goes round now faster and now slower.
+* A ball hops while the flow is lowered in held steps. The tops of its hops give period, height,
+  orbit, and by what factor disturbances shrink from hop to hop; the flow at which hops would have
+  no height is extrapolated.
+* The hop is followed along rougher walls to where disturbances grow; on both sides of that wall
+  balls are left alone.
+* Balls that rebound from floor and wall hop, too: they are followed from one coefficient of
+  restitution to the next.
+* A ball swings beside a Hopf point: it slips at both points, and goes round now faster and now
+  slower.
 * Balls in strong drag are run for 60/c, long enough for drag to act: do they go on hopping?
-* On floors so rough (mu > 1) that forces allow rolling and slipping both: what does the ball settle to?
-"""
+* On floors so rough (mu > 1) that forces allow rolling and slipping both: what does the ball settle
+to?"""
 
 from __future__ import annotations
 
@@ -45,7 +50,9 @@ class Hopping:
     later: float = 2.0  # the first part, in which disturbances are not yet linear
     refined: tuple[int, int] = (8, 16)  # time steps in a coarse one, of hops that attract
     marginal: tuple[int, int] = (16, 32)  # and of those that hardly do
-    sample: float = 1e-3  # s: a parabola through three samples then gives a top to 1e-6 of the height
+    sample: float = (
+        1e-3  # s: a parabola through three samples then gives a top to 1e-6 of the height
+    )
     followed: float = 10.0  # how long a hop is followed at a wall
     alone: float = 60.0  # and then left alone
     swinging: float = 24.0  # how long a ball swings
@@ -59,15 +66,20 @@ def hopping(
     protocol: str = "recurrent",
     refine: tuple[int, int] = Hopping.refined,
 ) -> Iterator[Measurement | Missing]:
-    """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin.
+    """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would
+    begin.
 
-    With the protocol "stepped" at the flow of the set only, by time stepping, in which slip begins and turns at whole
-    steps only.
-    """
+    With the protocol "stepped" at the flow of the set only, by time stepping, in which slip begins
+    and turns at whole steps only."""
     p = Parameters.named(SET)
-    flows = [share * p.omega_0 for share in (lab.effort.recurrent_flows if protocol == "recurrent" else (1.0,))]
+    flows = [
+        share * p.omega_0
+        for share in (lab.effort.recurrent_flows if protocol == "recurrent" else (1.0,))
+    ]
     lasts, flow = Hopping.hold * len(flows), Flow.staircase(flows, Hopping.hold)
-    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / Hopping.sample), flow=flow)
+    trial = Trial(
+        SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / Hopping.sample), flow=flow
+    )
     (result,) = carry_out(lab, protocol, [trial])
     if isinstance(result, Missing):
         yield result
@@ -77,20 +89,37 @@ def hopping(
         q, end = p.replace(omega_0=omega_0), (k + 1) * Hopping.hold
         coarse, fine = (tops(run, end - Hopping.last, end) for run in (result.coarse, result.fine))
         if min(len(coarse.time), len(fine.time)) < 6:
-            yield Missing(protocol, SET, f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more")
+            yield Missing(
+                protocol, SET, f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more"
+            )
             break
         row = partial(measurement, lab, protocol, SET, q, tasks=result.tasks, **fine.conditions(q))
         for quantity, value in fine.values.items():
-            yield row(quantity=quantity, value=with_step_error(coarse.values[quantity].value, value))
+            yield row(
+                quantity=quantity, value=with_step_error(coarse.values[quantity].value, value)
+            )
         if k:
-            parts = (result.coarse, Hopping.later), (result.fine, Hopping.later), (result.fine, 2 * Hopping.later)
+            parts = (
+                (result.coarse, Hopping.later),
+                (result.fine, Hopping.later),
+                (result.fine, 2 * Hopping.later),
+            )
             begin, last = k * Hopping.hold, end - Hopping.last
-            slow, fast, later = (hop_map(tops(run, begin + after, last).x, q)[0] for run, after in parts)
-            factor = row(quantity="orbit_multiplier", value=with_step_error(slow, Measured(fast, abs(fast - later))))
-            yield if_found(factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s")
+            slow, fast, later = (
+                hop_map(tops(run, begin + after, last).x, q)[0] for run, after in parts
+            )
+            factor = row(
+                quantity="orbit_multiplier",
+                value=with_step_error(slow, Measured(fast, abs(fast - later))),
+            )
+            yield if_found(
+                factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s"
+            )
         heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
     if len(heights) >= 3:
-        coarse_birth, fine_birth = (birth(flows[: len(heights)], each) for each in zip(*heights, strict=True))
+        coarse_birth, fine_birth = (
+            birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)
+        )
         yield result.row(lab, "orbit_birth", with_step_error(coarse_birth.value, fine_birth))
 
 
@@ -115,18 +144,28 @@ class Hops(NamedTuple):
         span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
         values = {
             "orbit_period": (span / len(periods), periods),
-            "orbit_omega_c": ((self.theta[-1] - self.theta[0]) / span, np.diff(self.theta) / periods),
+            "orbit_omega_c": (
+                (self.theta[-1] - self.theta[0]) / span,
+                np.diff(self.theta) / periods,
+            ),
             "orbit_height": (height.mean(), height),
         }
-        return {name: Measured(float(mean), float(np.ptp(hops)) / 2) for name, (mean, hops) in values.items()}
+        return {
+            name: Measured(float(mean), float(np.ptp(hops)) / 2)
+            for name, (mean, hops) in values.items()
+        }
 
     def conditions(self, p: Parameters) -> dict[str, Any]:
         """Conditions of a measurement: a state at a top, and the period, near a closed orbit."""
-        return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
+        return {
+            **state_of(constrained(Case.NR, self.x[-1], p)),
+            "period": self.values["orbit_period"].value,
+        }
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
-    """The tops of the hops between two times, those at least half as high as the highest of them."""
+    """The tops of the hops between two times, those at least half as high as the highest of
+    them."""
     t, y = run.time, run.y
     k, late = peaks(y)
     inside = (t[k] > start) & (t[k] < end)
@@ -139,10 +178,11 @@ def tops(run: Trajectory, start: float, end: float) -> Hops:
 
 
 def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
-    """The map from hop to hop, linear in height, omega_c and slip_x, fitted to states (n, 8) at tops.
+    """The map from hop to hop, linear in height, omega_c and slip_x, fitted to states (n, 8) at
+    tops.
 
-    The modulus of its largest eigenvalue, the factor by which disturbances grow or shrink; and its fixed point.
-    """
+    The modulus of its largest eigenvalue, the factor by which disturbances grow or shrink; and its
+    fixed point."""
     units = np.array([p.R, 1 / time_unit(p), math.sqrt(p.g * p.R) / p.r])
     z = states[:, [0, 2, 3]] / units
     changes = np.diff(z, axis=0)
@@ -150,79 +190,106 @@ def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
     matrix = np.linalg.lstsq(weight * changes[:-1], weight * changes[1:])[0]
     shift = z[1:].mean(axis=0) - z[:-1].mean(axis=0) @ matrix
     y, omega_c, slip_x = (units * np.linalg.solve(np.eye(3) - matrix.T, shift)).tolist()
-    return float(np.abs(np.linalg.eigvals(matrix)).max()), State(y=y, omega_c=omega_c, slip_x=slip_x)
+    return float(np.abs(np.linalg.eigvals(matrix)).max()), State(
+        y=y, omega_c=omega_c, slip_x=slip_x
+    )
 
 
 def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
-    """Flow at which hops would have no height: a parabola through the last three; a line shows the uncertainty."""
+    """Flow at which hops would have no height: a parabola through the last three; a line shows the
+    uncertainty."""
     parabola, line = (float(np.polyfit(heights[-n:], flows[-n:], n - 1)[-1]) for n in (3, 2))
     return Measured(parabola, abs(parabola - line))
 
 
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
-"""eta of the walls along which the hop is followed, in units of that of the set. The first steps are short: their
-starts are extrapolated from one or two hops, which attract from nearby only."""
+"""eta of the walls along which the hop is followed, in units of that of the set. The first steps
+are short: their starts are extrapolated from one or two hops, which attract from nearby only."""
 
 
-def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The wall friction beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
+def followed(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """The wall friction beyond which disturbances of the hop grow, and whether balls hop on, on
+    both sides of it."""
     p = Parameters.named(SET)
     walls = [p.replace(eta=share * p.eta) for share in WALLS]
     etas = [q.eta for q in walls]
 
     def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
-        return lab.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / Hopping.sample))
+        return lab.task(
+            q, x, lasts, coarse_step(q) / refined, samples=round(lasts / Hopping.sample)
+        )
 
-    steady = [np.array([TOP.stacked()] * 2)]  # fixed points of the map from hop to hop, with both steps (2, 8)
+    steady = [
+        np.array([TOP.stacked()] * 2)
+    ]  # fixed points of the map from hop to hop, with both steps (2, 8)
     factors, tasks = [], []
     for k, q in enumerate(walls):
         ahead = steady[-1]
         if k > 1:
-            ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
+            ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (
+                steady[-1] - steady[-2]
+            )
         both = zip(ahead, Hopping.marginal, strict=True)
         tasks.append([task(q, x, Hopping.followed, refined) for x, refined in both])
         (runs,) = lab.groups(tasks[-1:])
-        parts = [] if isinstance(runs, str) else [tops(run, Hopping.later, Hopping.followed) for run in runs]
+        parts = (
+            []
+            if isinstance(runs, str)
+            else [tops(run, Hopping.later, Hopping.followed) for run in runs]
+        )
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * Hopping.later, Hopping.followed))]
+        maps = [
+            hop_map(each.x, q)
+            for each in (*parts, tops(runs[1], 2 * Hopping.later, Hopping.followed))
+        ]
         factors.append([factor for factor, _ in maps])
         steady.append(np.array([state for _, state in maps[:2]]))
         if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
             near = parts[1].conditions(q)
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
-    again = [task(walls[k], np.array(tasks[k][1].x0), Hopping.alone, Hopping.marginal[0]) for k in (-4, -1)]
+    again = [
+        task(walls[k], np.array(tasks[k][1].x0), Hopping.alone, Hopping.marginal[0])
+        for k in (-4, -1)
+    ]
     yield from _hops_at_end(lab, "followed", SET, again)
 
 
 RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
 """From which coefficient of restitution to the next a rebounding ball is followed."""
 REBOUNDING, REBOUNDS_ALONE = (0.0, 0.2, 0.4, 0.48, 0.6), 20.0
-"""At which of them it is run without further change, and how long, s. (0.6 is among them since results had been seen:
-at 0.56 disturbances grow so slowly that this doesn't show it.)"""
+"""At which of them it is run without further change, and how long, s. (0.6 is among them since
+results had been seen: at 0.56 disturbances grow so slowly that this doesn't show it.)"""
 
 
-def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def rebounding(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Whether balls that rebound hop on, followed from one coefficient of restitution to the next.
 
-    By time stepping: MuJoCo's contacts have no such coefficient. At some, and at the first at which a ball no longer
-    hops, it is run without further change.
-    """
+    By time stepping: MuJoCo's contacts have no such coefficient. At some, and at the first at which
+    a ball no longer hops, it is run without further change."""
     p, x = Parameters.named(SET), TOP.stacked()
 
     def task(x: Array, lasts: float, restitution: float) -> Task:
         step = coarse_step(p) / 40
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
-        return replace(lab.task(p, x, lasts, step, samples=round(lasts / Hopping.sample)), settings=settings)
+        return replace(
+            lab.task(p, x, lasts, step, samples=round(lasts / Hopping.sample)), settings=settings
+        )
 
     for e in RESTITUTIONS:
         (run,) = lab.campaign.run([task(x, Hopping.last, e)])
         if hops(run):
             last = tops(run, 0.0, Hopping.last)
-            x = last.x[-8:].mean(axis=0)  # the hops swing about their mean, and attract from nearby only
+            x = last.x[-8:].mean(
+                axis=0
+            )  # the hops swing about their mean, and attract from nearby only
         elif not e:
             yield Missing("rebounding", SET, "the ball does not hop")
             return
@@ -235,22 +302,30 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
-    """The wall friction at which disturbances neither grow nor shrink, by lines through eta (n,) and factors (n, 3).
+    """The wall friction at which disturbances neither grow nor shrink, by lines through eta (n,)
+    and factors (n, 3).
 
-    Factors are those with the coarser step, with the finer one, and in a later part of the run with the finer one.
-    """
-    slow, fast, later = (float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True))
+    Factors are those with the coarser step, with the finer one, and in a later part of the run with
+    the finer one."""
+    slow, fast, later = (
+        float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True)
+    )
     return with_step_error(slow, Measured(fast, abs(fast - later)))
 
 
-def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Period, mean and size of the swing of omega_c, from its turning points, on a very rough floor.
+def swing(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Period, mean and size of the swing of omega_c, from its turning points, on a very rough
+    floor.
 
-    With other steps than these the contact of the floor, which carries a hundredth of the weight, opens and closes.
-    """
+    With other steps than these the contact of the floor, which carries a hundredth of the weight,
+    opens and closes."""
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
-    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, Hopping.swinging, (60, 80), 12_000)])
+    (result,) = carry_out(
+        lab, "swing", [Trial("reference", p, "swing", x0, Hopping.swinging, (60, 80), 12_000)]
+    )
     end = Hopping.swinging - Hopping.swung
     if isinstance(result, Missing):
         yield result
@@ -261,8 +336,12 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     begun = (result.coarse, end), (result.fine, end), (result.fine, end - Hopping.swung)
     parts = [_swing(run, start) for run, start in begun]
     conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
-    for name, coarse, fine, before in zip(("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True):
-        yield result.row(lab, name, with_step_error(coarse, Measured(fine, abs(fine - before))), **conditions)
+    for name, coarse, fine, before in zip(
+        ("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True
+    ):
+        yield result.row(
+            lab, name, with_step_error(coarse, Measured(fine, abs(fine - before))), **conditions
+        )
 
 
 def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
@@ -276,7 +355,9 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
     return float(span / (len(at) - 1)), float(turn / span), float(size)
 
 
-def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def calm(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Whether balls still hop after 60/c of the weakest drag: three of each of 16 sets."""
     reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
     low, high = np.array([0.05, 0.05, 0.2, 2.0, 0.5]), np.array([1.0, 1.0, 0.6, 8.0, 6.0])
@@ -290,22 +371,40 @@ def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
     yield from _hops_at_end(lab, "calm", "strong drag", tasks)
 
 
-def _hops_at_end(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterator[Measurement | Missing]:
+def _hops_at_end(
+    lab: Lab, protocol: str, set: str, tasks: list[Task]
+) -> Iterator[Measurement | Missing]:
     """Whether each ball hops at the end of a run from a state: 1 or 0."""
     for task, run in zip(tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
             yield Missing(protocol, set, f"a run {run}")
         else:
             at = state_of(State.of(task.x0).stacked())
-            yield measurement(lab, protocol, set, task.parameters, "hops", hops(run), [task], **at, duration=task.t_end)
+            yield measurement(
+                lab,
+                protocol,
+                set,
+                task.parameters,
+                "hops",
+                hops(run),
+                [task],
+                **at,
+                duration=task.t_end,
+            )
 
 
-def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def choice(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
     p = sets["reference"]
     rough = {
-        "rough-floor-1": with_groups(p, 0.1099, 2.635, mu=1.7222, eta=0.0388, j=0.482, r=0.292 * p.R),
-        "rough-floor-2": with_groups(p, 0.1198, 2.099, mu=1.2277, eta=0.1721, j=0.611, r=0.154 * p.R),
+        "rough-floor-1": with_groups(
+            p, 0.1099, 2.635, mu=1.7222, eta=0.0388, j=0.482, r=0.292 * p.R
+        ),
+        "rough-floor-2": with_groups(
+            p, 0.1198, 2.099, mu=1.2277, eta=0.1721, j=0.611, r=0.154 * p.R
+        ),
     }
     starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
     yield from settled_readings(lab, "choice", starts[: lab.effort.choice_sets])
@@ -314,7 +413,13 @@ def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
 _HOPS = "hops that last are those of the set hopping"
 PROTOCOLS = (
     Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
-    Protocol("stepped", partial(hopping, protocol="stepped", refine=(40, 80)), engine=MOREAU, alone=_HOPS, first=True),
+    Protocol(
+        "stepped",
+        partial(hopping, protocol="stepped", refine=(40, 80)),
+        engine=MOREAU,
+        alone=_HOPS,
+        first=True,
+    ),
     Protocol("choice", choice, alone="it is one of balls with mu > 1", first=True),
     Protocol("followed", followed, alone=_HOPS),
     Protocol("rebounding", rebounding, engine=MOREAU, alone=_HOPS),

@@ -1,4 +1,5 @@
-"""The ball as a flowmeter (section 5.3): slope, range and hysteresis of its characteristic curve, unloading, pushes."""
+"""The ball as a flowmeter (section 5.3): slope, range and hysteresis of its characteristic curve,
+unloading, pushes."""
 
 from __future__ import annotations
 
@@ -15,18 +16,31 @@ from compare.judge import simulated, theory
 from compare.kit.record import Measurement, state
 from compare.kit.settling import physical_case
 from compare.kit.statistics import Measured
-from compare.states import case_of, from_floor, is_in, lasting_cases, lifts_first, slips_first, solution_of, solutions
+from compare.states import (
+    case_of,
+    from_floor,
+    is_in,
+    lasting_cases,
+    lifts_first,
+    slips_first,
+    solution_of,
+    solutions,
+)
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES
 
 _SIMULATED = "analytic.simulate"
 RTOL = 1e-9
-"""Relative tolerance of simulations of unloading and pushes: the speed of a landing is measured to 1e-6."""
+"""Relative tolerance of simulations of unloading and pushes: the speed of a landing is measured to
+1e-6."""
 
 
-def _slope(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> tuple[Bearing]:
-    """A bearing on slopes of the characteristic curve that were measured in one way, in some cases."""
+def _slope(
+    by: str, predict: Callable[[Measurement], float], function: str, *cases: Case
+) -> tuple[Bearing]:
+    """A bearing on slopes of the characteristic curve that were measured in one way, in some
+    cases."""
     when = all_of(given(by=by), is_in(*cases))
     return (Bearing("slope", "slope", predict, when=when, by=f"analytic.{function}"),)
 
@@ -37,10 +51,12 @@ def _slope_at(m: Measurement) -> float:
 
 
 def _only_rolling(m: Measurement) -> float:
-    """The case: RR within the operating range, from every start; beyond it one that lasts, and not RR."""
+    """The case: RR within the operating range, from every start; beyond it one that lasts, and not
+    RR."""
     if m.parameters.omega_0 < analytic.operating_range(m.parameters):
         return float(Case.RR)
-    # The start that shows that the range has ended: the ball slips on the floor, or stays on the wall.
+    # The start that shows that the range has ended: the ball slips on the floor, or stays on the
+    # wall.
     ended = m.conditions["start"] == ("rest" if slips_first(m) else "on the wall")
     if case_of(m) not in lasting_cases(m.parameters) - ({Case.RR} if ended else set()):
         raise LookupError("beyond the range, rolling is not the only motion that lasts")
@@ -48,7 +64,8 @@ def _only_rolling(m: Measurement) -> float:
 
 
 def _reads_flow(m: Measurement) -> float:
-    """omega_0 within the reading range; beyond it, that of slipping on the floor, which is less: never for eta > j."""
+    """omega_0 within the reading range; beyond it, that of slipping on the floor, which is less:
+    never for eta > j."""
     p = m.parameters
     within, reads = p.omega_0 < analytic.reading_range(p), float(solution_of(m).state.omega_c)
     if not within and (lifts_first(m) or (case_of(m) is not Case.NR and reads >= p.omega_0)):
@@ -57,7 +74,8 @@ def _reads_flow(m: Measurement) -> float:
 
 
 def _loop_case(m: Measurement) -> Case:
-    """Case at a level of the hysteresis loop: that of the branch it comes from while it attracts, else of the other."""
+    """Case at a level of the hysteresis loop: that of the branch it comes from while it attracts,
+    else of the other."""
     states = lasting_cases(m.parameters) - {Case.NS}
     lifted = m.conditions["before"] == Case.NR.name
     here = {case for case in states if (case is Case.NR) == lifted}
@@ -67,7 +85,8 @@ def _loop_case(m: Measurement) -> Case:
 
 
 def _jumps(way: int) -> When:
-    """A filter of levels of the hysteresis loop: the ball was lifted off the floor (1), came down (-1), or neither."""
+    """A filter of levels of the hysteresis loop: the ball was lifted off the floor (1), came down
+    (-1), or neither."""
     return lambda m: (case_of(m) is Case.NR) - (m.conditions["before"] == Case.NR.name) == way
 
 
@@ -106,13 +125,20 @@ def _at_event(m: Measurement) -> Measured:
         if not any(happens):
             raise LookupError("theory has no such event")
         time = events.time[happens.index(True)]
-        # One landing may be several events at one time; the vertical impulse is that of all of them, at both contacts.
+        # One landing may be several events at one time; the vertical impulse is that of all of
+        # them, at both contacts.
         now = np.isclose(events.time, time, rtol=0.0, atol=math.ulp(1.0) * 1e3)
         impulse = float((events.impulse_A[now, 1] + events.impulse_B[now, 1]).sum())
         # A landing without restitution takes away all of the speed.
-        values = {"time": float(time), "landing_impulse": impulse, "landing_speed": -impulse / m.parameters.m}
+        values = {
+            "time": float(time),
+            "landing_impulse": impulse,
+            "landing_speed": -impulse / m.parameters.m,
+        }
         value = values[m.quantity]
-    return Measured(value, math.hypot(unsure, 100 * RTOL * value))  # errors of 100 steps may have the same sign
+    return Measured(
+        value, math.hypot(unsure, 100 * RTOL * value)
+    )  # errors of 100 steps may have the same sign
 
 
 OFF = 0.05
@@ -120,7 +146,8 @@ OFF = 0.05
 
 
 def _nominal_friction(m: Measurement, off: float) -> dict[str, float]:
-    """Nominal friction of a meter, of whose tolerance `off` the measured ball is the worst case (the best if off < 0).
+    """Nominal friction of a meter, of whose tolerance `off` the measured ball is the worst case
+    (the best if off < 0).
 
     Less friction slips sooner; a rougher wall carries the ball sooner.
     """
@@ -129,7 +156,8 @@ def _nominal_friction(m: Measurement, off: float) -> dict[str, float]:
 
 
 def _one_end(m: Measurement) -> bool:
-    """Whether one and the same threshold ends the range of these meters at every corner of their tolerances."""
+    """Whether one and the same threshold ends the range of these meters at every corner of their
+    tolerances."""
     p, spread = m.parameters, (1 + OFF) / (1 - OFF)
     return not p.eta / spread < p.j < p.eta * spread
 
@@ -145,20 +173,25 @@ def _exact(m: Measurement) -> float:
 
 
 def _worst(m: Measurement) -> float:
-    """The flow up to which a design covers a meter of nominal friction, whatever it is within the tolerance."""
+    """The flow up to which a design covers a meter of nominal friction, whatever it is within the
+    tolerance."""
     nominal = _nominal_friction(m, OFF)
-    return design.choice(m.parameters.replace, nominal, dict.fromkeys(nominal, OFF), fastest=1.0).margin
+    return design.choice(
+        m.parameters.replace, nominal, dict.fromkeys(nominal, OFF), fastest=1.0
+    ).margin
 
 
 def _end_of_spread(m: Measurement, end: int) -> float:
-    """The lowest (end 0) or highest (1) value of a threshold that a design gives for a meter's tolerance."""
+    """The lowest (end 0) or highest (1) value of a threshold that a design gives for a meter's
+    tolerance."""
     nominal = _nominal_friction(m, (OFF, -OFF)[end])
     corners = list(design.corners(m.parameters.replace, nominal, dict.fromkeys(nominal, OFF)))
     return design.threshold_spread(corners)[m.quantity][end]
 
 
 def _by_sensitivity(m: Measurement) -> float:
-    """omega_02 extrapolated from a wall of half the friction by the power of eta that is the design's sensitivity."""
+    """omega_02 extrapolated from a wall of half the friction by the power of eta that is the
+    design's sensitivity."""
     p, half = m.parameters, {"eta": m.parameters.eta / 2}
     power = design.sensitivities(p.replace, half)["omega_02"]["eta"].value
     return analytic.thresholds(p.replace(**half)).omega_02 * 2**power
@@ -170,7 +203,10 @@ def _loop_reading_of_design(m: Measurement) -> float:
     return float(low if m.conditions["side"] == "up" else high)
 
 
-_ENDS_OF_RANGES, _DESIGN = (("omega_01", slips_first), ("omega_02", lifts_first)), "analytic.flowmeter.design"
+_ENDS_OF_RANGES, _DESIGN = (
+    (("omega_01", slips_first), ("omega_02", lifts_first)),
+    "analytic.flowmeter.design",
+)
 _WITHIN_TOLERANCES: tuple[Callable[[Measurement], float], ...] = (
     _worst,
     *(partial(_end_of_spread, end=k) for k in (0, 1)),
@@ -179,34 +215,41 @@ CLAIMS = (
     claim(
         "slope-rolling",
         "Section 5.3",
-        "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = 1.",
+        "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = "
+        "1.",
         *_slope("neighbours", _slope_at, "characteristic_slope", Case.RR, Case.NR),
     ),
     claim(
         "slope-slipping",
         "Section 5.3, (38), (41)",
-        "While the ball slips at both points its reading rises by (38), (41), at first hardly at all.",
+        "While the ball slips at both points its reading rises by (38), (41), at first hardly at "
+        "all.",
         *_slope("neighbours", _slope_at, "characteristic_slope", Case.SS),
     ),
     claim(
         "slope-jump",
         "Section 5.3",
-        "At ω₀₁ the slope of the characteristic curve jumps: from 1 to 0, as the equations have it.",
+        "At ω₀₁ the slope of the characteristic curve jumps: from 1 to 0, as the equations have "
+        "it.",
         *_slope("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),
     ),
     claim(
         "slope-mean",
         "Section 5.3",
-        "Between ω₀₁ and ω₀₂ the characteristic curve has a small mean slope: a few hundredths for the reference.",
+        "Between ω₀₁ and ω₀₂ the characteristic curve has a small mean slope: a few hundredths for "
+        "the reference.",
         *_slope("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),
     ),
     claim(
         "operating-range",
         "Section 5.3",
-        "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, from rest the ball "
+        "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, "
+        "from rest the ball "
         "slips (η < j), and on the wall it stays (η > j).",
         # Slipping on the floor no ball sinks.
-        Bearing("settled", "case", _only_rolling, when=all_of(from_floor, _does_not_sink, slips_first)),
+        Bearing(
+            "settled", "case", _only_rolling, when=all_of(from_floor, _does_not_sink, slips_first)
+        ),
         Bearing("settled", "case", _only_rolling, when=all_of(_does_not_sink, lifts_first)),
         Bearing("settled", "omega_c", _reads_flow, when=_does_not_sink),
         *(
@@ -217,11 +260,16 @@ CLAIMS = (
     claim(
         "unloading-limit",
         "Section 5.3, (85)",
-        "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and sinks.",
+        "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and "
+        "sinks.",
         Bearing(
             "settled",
             "case",
-            lambda m: Case.NR if m.parameters.omega_0 > analytic.unloading_limit(m.parameters) else Case.NS,
+            lambda m: (
+                Case.NR
+                if m.parameters.omega_0 > analytic.unloading_limit(m.parameters)
+                else Case.NS
+            ),
             when=given(start="on the wall"),
         ),
         Bearing(
@@ -235,22 +283,29 @@ CLAIMS = (
     claim(
         "fig-13-left",
         "Fig. 13, left",
-        "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
+        "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in "
+        "between.",
         *(
-            Bearing("hysteresis", "case", _loop_case, when=_jumps(way), by="analytic.stable_solutions")
+            Bearing(
+                "hysteresis", "case", _loop_case, when=_jumps(way), by="analytic.stable_solutions"
+            )
             for way in (1, -1, 0)
         ),
         Bearing("hysteresis", "omega_c", _loop_reading, by="(32), (38), (46)"),
         text=Text.CORRECTED,
-        reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",
+        reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that "
+        "is above ω₀₄.",
     ),
     claim(
         "fig-13-right",
         "Fig. 13, right; section 5.3",
-        "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
+        "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and "
+        "ends slipping or "
         "rolling at both points.",
         Bearing("unloading", "case", _end_case, when=given(start=UNLOADED), by=_SIMULATED),
-        *bearings("unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED),
+        *bearings(
+            "unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED
+        ),
     ),
     claim(
         "push",
@@ -265,8 +320,10 @@ CLAIMS = (
     claim(
         "design-limit",
         "extension",
-        "The operating range of a meter ends where its design says; with friction 5 % off its nominal value, at the "
-        "lowest or the highest limit of that tolerance. ω₀₂ follows the wall's friction by the design's sensitivity.",
+        "The operating range of a meter ends where its design says; with friction 5 % off its "
+        "nominal value, at the "
+        "lowest or the highest limit of that tolerance. ω₀₂ follows the wall's friction by the "
+        "design's sensitivity.",
         *(
             Bearing("thresholds", end, _exact, when=all_of(first, _stokes), by=_DESIGN)
             for end, first in _ENDS_OF_RANGES
@@ -276,19 +333,28 @@ CLAIMS = (
             for end, first in _ENDS_OF_RANGES
             for predict in _WITHIN_TOLERANCES
         ),
-        Bearing("thresholds", "omega_02", _by_sensitivity, by="analytic.flowmeter.design.sensitivities"),
+        Bearing(
+            "thresholds", "omega_02", _by_sensitivity, by="analytic.flowmeter.design.sensitivities"
+        ),
     ),
     claim(
         "design-reading",
         "extension, Fig. 13",
-        "Where a flow has several stable readings, the meter shows the lowest while the flow rises and the highest "
+        "Where a flow has several stable readings, the meter shows the lowest while the flow rises "
+        "and the highest "
         "while it falls, as its design says.",
-        Bearing("hysteresis", "omega_c", _loop_reading_of_design, by="analytic.flowmeter.design.readings"),
+        Bearing(
+            "hysteresis",
+            "omega_c",
+            _loop_reading_of_design,
+            by="analytic.flowmeter.design.readings",
+        ),
     ),
     claim(
         "time-constants",
         "Prop. 1, section 5.2",
-        "The slowest disturbance of rolling dies out with the time constant that a design gives for a meter.",
+        "The slowest disturbance of rolling dies out with the time constant that a design gives "
+        "for a meter.",
         Bearing(
             "rates",
             "slowest_decay",

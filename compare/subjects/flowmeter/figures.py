@@ -1,4 +1,5 @@
-"""Characteristic curves of the flowmeter with settled states, Fig. 13, the fall at unloading; a designed meter."""
+"""Characteristic curves of the flowmeter with settled states, Fig. 13, the fall at unloading; a
+designed meter."""
 
 from __future__ import annotations
 
@@ -27,11 +28,14 @@ _WAYS = {"up": ("^", ", flow raised"), "down": ("v", ", flow lowered")}
 
 
 def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
-    """The settled states of every engine with the two sets of the paper's kind, without balls that only sink (NS)."""
+    """The settled states of every engine with the two sets of the paper's kind, without balls that
+    only sink (NS)."""
     settled = [
         m
         for m in evidence.select("omega_c", "case")
-        if m.protocol in ("settled", "hysteresis") and m.parameters.omega_0 > 0 and m.conditions["case"] != "NS"
+        if m.protocol in ("settled", "hysteresis")
+        and m.parameters.omega_0 > 0
+        and m.conditions["case"] != "NS"
     ]
     curves = tuple(
         Diagram(figure, Parameters.named(name), tuple(m for m in settled if m.set == name))
@@ -43,7 +47,8 @@ def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
 
 
 def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
-    """A figure with a column for each of two sets: characteristic curve, and deviations from it; and its caption."""
+    """A figure with a column for each of two sets: characteristic curve, and deviations from it;
+    and its caption."""
 
     def nearest_prediction(m: Measurement) -> float:
         omega_c = [float(s.state.omega_c) for s in analytic.stable_solutions(m.parameters)]
@@ -56,7 +61,9 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         theory(above, p, fastest)
         above.set_title(f"η = {p.eta:g} {'<' if p.eta < p.j else '>'} j = {p.j:g}", fontsize=11)
         style.points(above, curve.states)
-        above.set(ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C)
+        above.set(
+            ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C
+        )
         style.legend(above, loc="upper left", frameon=False)
         style.dimensionless(above, p, style.FREE_0)
         above.grid(alpha=0.25)
@@ -64,18 +71,25 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         below.set(xlabel=style.OMEGA_0)
     for above in panels[0]:
         names_within(above)
-    sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
+    sets = "; ".join(
+        f"{side}: {style.named(curve.p)}"
+        for side, curve in zip(("left", "right"), curves, strict=True)
+    )
     states = [m for curve in curves for m in curve.states]
     return figure, (
-        f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
-        "dashed where unstable; of cases that lie on one line the colours take turns. Settled states were measured "
-        "from rest, going round with the fluid, and high up on the wall. Below: relative deviation from the nearest "
+        f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: "
+        f"closed-form theory, "
+        "dashed where unstable; of cases that lie on one line the colours take turns. Settled "
+        "states were measured "
+        "from rest, going round with the fluid, and high up on the wall. Below: relative deviation "
+        "from the nearest "
         f"attracting solution; what is below 1e-16 is drawn there.{style.marks(states)}"
     )
 
 
 def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
-    """A panel of Fig. 13: the characteristic curve and measured states, with both scales; and its caption."""
+    """A panel of Fig. 13: the characteristic curve and measured states, with both scales; and its
+    caption."""
     p, rises = of.p, of.figure == "fig-13-left"
     only_where(p, folds=rises)
     figure, axes = style.panels(6.0, 4.3)
@@ -83,30 +97,45 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     t = theory(axes, p, top)
     if rises:
         said = (
-            "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
+            "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where "
+            "the flow came from "
             "(arrows). Dashed: unstable."
         )
         slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
         look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
-        jumps = (t.omega_04, fold_state(p).omega_c, t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)
+        jumps = (
+            (t.omega_04, fold_state(p).omega_c, t.omega_04),
+            (t.omega_02, t.omega_02, slow.state.omega_c),
+        )
         for x, begin, end in jumps:
             axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
         for side, (mark, text) in _WAYS.items():
-            style.points(axes, [m for m in of.states if m.conditions.get("side") == side], way=text, marker=mark)
+            style.points(
+                axes,
+                [m for m in of.states if m.conditions.get("side") == side],
+                way=text,
+                marker=mark,
+            )
         style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
     else:
         said = (
-            "RR, SR and NR lie on one line, in which their colours take turns; between ω₀₂ and ω₀₃ SR is on it, too, "
+            "RR, SR and NR lie on one line, in which their colours take turns; between ω₀₂ and ω₀₃ "
+            "SR is on it, too, "
             "and unstable. "
-            "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
+            "Black dot: where a ball that is carried by the wall drops when the flow falls, see "
+            "the figure of its fall."
         )
         axes.plot([t.omega_02], [t.omega_02], **style.POINT)
-        style.points(axes, [m for m in of.states if m.conditions["case"] in ("RR", "SR", "NR")], ms=4)
+        style.points(
+            axes, [m for m in of.states if m.conditions["case"] in ("RR", "SR", "NR")], ms=4
+        )
     axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
     names_within(axes)
-    return figure, style.caption(p, "Characteristic curve of the flowmeter.", said, states=of.states)
+    return figure, style.caption(
+        p, "Characteristic curve of the flowmeter.", said, states=of.states
+    )
 
 
 def top_flow(p: Parameters) -> float:
@@ -117,7 +146,8 @@ def top_flow(p: Parameters) -> float:
 
 
 def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
-    """Draw all stationary solutions up to the fastest flow, but for unstable SR; return the thresholds."""
+    """Draw all stationary solutions up to the fastest flow, but for unstable SR; return the
+    thresholds."""
     t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, stable_ends(p)
     spans: list[tuple[tuple[Case, ...], tuple[float, float], float]] = [
         ((Case.RR,), (0.0, rolls if folds else t.omega_02), 0.45),
@@ -128,32 +158,44 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     else:
         spans.append(((Case.RR, Case.NR), (t.omega_02, rolls), 0.5))
     for cases, span, at in spans:
-        style.curve(axes, cases, span, span, (", ".join(case.name for case in cases), (at, (-5, 5))))
+        style.curve(
+            axes, cases, span, span, (", ".join(case.name for case in cases), (at, (-5, 5)))
+        )
     axes.set_xlim(0, fastest)
-    style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))})
+    style.guides(
+        axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))}
+    )
     return t
 
 
 def names_within(axes: Axes) -> None:
-    """Move names of curves that would stick out of axes, which have their limits and labels, so that they don't."""
+    """Move names of curves that would stick out of axes, which have their limits and labels, so
+    that they don't."""
     if figure := axes.get_figure(root=True):
         figure.draw_without_rendering()
         low, high = axes.get_window_extent().get_points()
         for name in axes.findobj(Annotation):
             begin, end = name.get_window_extent().get_points()
-            name.xyann = name.xyann + (np.maximum(low - begin, 0) - np.maximum(end - high, 0)) * 72 / figure.dpi
+            name.xyann = (
+                name.xyann
+                + (np.maximum(low - begin, 0) - np.maximum(end - high, 0)) * 72 / figure.dpi
+            )
 
 
 def draw_fall(of: Diagram) -> tuple[Figure, str]:
-    """A figure of a fall from the wall: height, velocities and slip, and 20 ms about the landing; and its caption.
+    """A figure of a fall from the wall: height, velocities and slip, and 20 ms about the landing;
+    and its caption.
 
-    The measured one with the finest step, if its file is there, else that of the event-driven simulation, whose flows
-    are held for 5 s each: longer ones are sampled less densely.
-    """
+    The measured one with the finest step, if its file is there, else that of the event-driven
+    simulation, whose flows are held for 5 s each: longer ones are sampled less densely."""
     only_where(of.p, folds=False)
     check_thresholds(of.p)
     run = of.motions[-1].load() if of.motions else simulator.unloading(of.p, 5.0)
-    landings = [t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N]
+    landings = [
+        t
+        for t, to in zip(run.events.time, run.events.to_case, strict=True)
+        if Case(to).A is not Contact.N
+    ]
     if not landings:
         raise GapError("the ball never landed")
     lands = landings[0]
@@ -163,13 +205,19 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
     whole, close = panels.T
     near = max(0.02, 12 * float(np.median(np.diff(run.time))))
     around, landing = (left - 0.3, left + 1.7), (lands - near, lands + near)
-    # Axes, span of time, its origin, and the units of time and gaps, in parts of a second and of a metre.
-    for column, span, origin, unit, size in (whole, around, left, 1.0, 1e3), (close, landing, lands, 1e3, 1e6):
+    # Axes, span of time, its origin, and the units of time and gaps, in parts of a second and of a
+    # metre.
+    for column, span, origin, unit, size in (
+        (whole, around, left, 1.0, 1e3),
+        (close, landing, lands, 1e3, 1e6),
+    ):
         k = np.flatnonzero((run.time > span[0]) & (run.time < span[1]))
         k = k[:: max(1, len(k) // 1500)]
         t = unit * (run.time[k] - origin)
         gaps, speed, slip = column
-        dots: dict[str, Any] = {"color": "black"} | ({} if column is whole else {"marker": ".", "ms": 3})
+        dots: dict[str, Any] = {"color": "black"} | (
+            {} if column is whole else {"marker": ".", "ms": 3}
+        )
         gaps.plot(t, size * run.y[k], label="$y$ (floor)", **dots)
         gaps.plot(t, size * run.h[k], color=style.FORCE, ls="--", label="$h$ (wall)")
         if column is whole:
@@ -189,7 +237,9 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
             touches = [case for case in Case if getattr(case, point) is not Contact.N]
             shown = np.where(np.isin(run.case[k], touches), value[k], np.nan)
             slip.plot(t, shown, ls=line, label=f"$|v_{point}|$", **dots)
-        slip.set(ylabel="slip speed (m/s)", xlim=(unit * (span[0] - origin), unit * (span[1] - origin)))
+        slip.set(
+            ylabel="slip speed (m/s)", xlim=(unit * (span[0] - origin), unit * (span[1] - origin))
+        )
         for axes in column:
             style.ground(axes, run, span, unit, origin, named=axes is gaps)
             axes.axvline(unit * (lands - origin), color="0.3", lw=0.8)
@@ -197,16 +247,21 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
                 style.legend(axes, frameon=False)
     return figure, style.caption(
         of.p,
-        "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the wall (NS), sinks, "
-        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact at t = 0, "
-        "magnified in time and height (dots: samples): it stops the sinking at once; a hop would show as a gap, "
+        "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the "
+        "wall (NS), sinks, "
+        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the "
+        "impact at t = 0, "
+        "magnified in time and height (dots: samples): it stops the sinking at once; a hop would "
+        "show as a gap, "
         "a depth as a negative one. "
-        f"Background: the case, by name above; engine: {of.motions[-1].engine if of.motions else EVENT.name}.",
+        f"Background: the case, by name above; engine: "
+        f"{of.motions[-1].engine if of.motions else EVENT.name}.",
     )
 
 
 def _loop(evidence: Evidence) -> Iterator[Measurement]:
-    """Settled states of a flow that is raised and lowered in held steps, and those on the edge between two motions."""
+    """Settled states of a flow that is raised and lowered in held steps, and those on the edge
+    between two motions."""
     yield from (m for m in evidence.select("omega_c", "side") if m.conditions["side"] in _WAYS)
     yield from evidence.select("edge_omega_c")
 
@@ -218,7 +273,9 @@ def _settled(evidence: Evidence) -> Iterator[Measurement]:
 
 def _falls(evidence: Evidence) -> Iterator[Measurement]:
     """What was measured of the fall that is kept."""
-    return evidence.records.select("unloading", where=lambda m: m.conditions["start"] == "unloading")
+    return evidence.records.select(
+        "unloading", where=lambda m: m.conditions["start"] == "unloading"
+    )
 
 
 FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, draw_curves)} | {
@@ -234,31 +291,53 @@ FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, dra
 # --- a designed meter, on its page ------------------------------------------------------------------------------
 
 
-_LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f")} | {"gravity": "gravity"}
+_LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f")} | {
+    "gravity": "gravity"
+}
 
 
 def draw_readings(made: Design) -> tuple[Figure, str]:
-    """A figure of a design: reading over flow, with the band of the tolerances and the limits; and its caption."""
+    """A figure of a design: reading over flow, with the band of the tolerances and the limits; and
+    its caption."""
     curve, chosen, request = made.curve, made.choice, made.request
     figure, axes = style.panels(7.0, 4.3)
-    flows, low, high, below, above = (np.append(0.0, each) for each in (curve.omega_0, *curve.meant, *curve.band))
+    flows, low, high, below, above = (
+        np.append(0.0, each) for each in (curve.omega_0, *curve.meant, *curve.band)
+    )
     axes.fill_between(flows, below, above, color="0.82", lw=0, label="within the tolerances")
     axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="nominal, rising flow")
-    axes.plot(flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="nominal, falling flow")
-    axes.axvspan(request.slowest, request.fastest, color="#0072B2", alpha=0.12, lw=0, label="flows to measure")
-    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1, "label": "limit, from worst to nominal"}
+    axes.plot(
+        flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="nominal, falling flow"
+    )
+    axes.axvspan(
+        request.slowest,
+        request.fastest,
+        color="#0072B2",
+        alpha=0.12,
+        lw=0,
+        label="flows to measure",
+    )
+    limit: dict[str, Any] = {
+        "color": style.FORCE,
+        "alpha": 0.25,
+        "lw": 1,
+        "label": "limit, from worst to nominal",
+    }
     axes.axvspan(chosen.worst.omega_0, chosen.limit.omega_0, **limit)
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
     style.legend(axes, loc="lower right")
     return figure, (
-        "Angular velocity of the ball's orbit, against that of the fluid. Where the lines part, the reading depends on "
-        "whether the flow rose or fell. Grey: from the lowest to the highest reading within the tolerances."
+        "Angular velocity of the ball's orbit, against that of the fluid. Where the lines part, "
+        "the reading depends on "
+        "whether the flow rose or fell. Grey: from the lowest to the highest reading within the "
+        "tolerances."
     )
 
 
 def draw_sensitivities(made: Design) -> tuple[Figure, str]:
-    """A bar chart: by how many per cent each threshold changes if a value does by one; and its caption."""
+    """A bar chart: by how many per cent each threshold changes if a value does by one; and its
+    caption."""
     figure, axes = style.panels(7.0, 3.6)
     there = [key for key in THRESHOLDS if np.isfinite(getattr(made.thresholds, key))]
     names = list(made.sensitivities[there[0]])
@@ -281,23 +360,31 @@ def draw_sensitivities(made: Design) -> tuple[Figure, str]:
 
 
 def draw_friction(made: Design) -> tuple[Figure, str]:
-    """A map of the operating limit of the chosen ball and vessel over both frictions; and its caption."""
+    """A map of the operating limit of the chosen ball and vessel over both frictions; and its
+    caption."""
     chosen = made.choice
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
     mu, eta = (np.linspace(top[name] / 50, top[name], 51) for name in ("mu", "eta"))
-    limits = [[analytic.operating_range(chosen.p.replace(mu=float(m), eta=float(e))) for e in eta] for m in mu]
+    limits = [
+        [analytic.operating_range(chosen.p.replace(mu=float(m), eta=float(e))) for e in eta]
+        for m in mu
+    ]
     figure, axes = style.panels(7.0, 4.3)
     shown = axes.contourf(eta, mu, limits, levels=14, cmap="cividis")
     figure.colorbar(shown, label="operating range up to $\\omega_0$ (rad/s)")
     axes.contour(eta, mu, limits, levels=[made.request.fastest], colors="white", linewidths=1.5)
     axes.axvline(chosen.p.j, color="black", lw=1, ls=":")
     x, y = (chosen.values[name] for name in ("eta", "mu"))
-    xerr, yerr = (made.request.tolerances.get(name, 0.0) * chosen.values[name] for name in ("eta", "mu"))
+    xerr, yerr = (
+        made.request.tolerances.get(name, 0.0) * chosen.values[name] for name in ("eta", "mu")
+    )
     axes.errorbar(x, y, yerr, xerr, fmt="o", color="white", mec="black", ms=7, capsize=4)
     axes.set(xlabel="wall friction $\\eta$", ylabel="floor friction $\\mu$")
     return figure, (
-        "How far the operating range reaches over both frictions, with ball, vessel and fluid as chosen. Dot: the "
-        "choice, with its tolerances; white line: the fastest flow to measure; dotted: η = j, left of "
+        "How far the operating range reaches over both frictions, with ball, vessel and fluid as "
+        "chosen. Dot: the "
+        "choice, with its tolerances; white line: the fastest flow to measure; dotted: η = j, left "
+        "of "
         "which slip limits the range, and right of which unloading does."
     )
 

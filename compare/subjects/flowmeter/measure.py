@@ -1,13 +1,16 @@
-"""The flowmeter: slopes of its characteristic curve omega_c(omega_0), its loop of hysteresis, unloading and pushes.
+"""The flowmeter: slopes of its characteristic curve omega_c(omega_0), its loop of hysteresis,
+unloading and pushes.
 
-* For a slope only the flow is changed: at settled states, across the onset of slipping, and on average from there to
-  unloading.
-* For the loop of Fig. 13 the flow rises and falls in held steps, all in one run: a ramp would overshoot the fold of the
-  slipping branch, where settling slows down without bound. The levels are where cases were seen to change, and between.
-* Unloading (section 5.3): a ball rides the wall a little above the floor while the flow suddenly falls below what holds
-  it there. When does it begin to slip, when does it land, how fast, with what impulse?
-* A ball that the wall carries beside the floor is pushed, upwards or by a little more spin: does it stay off the floor,
-  and how high? An engine may follow motions with landings to first order only.
+* For a slope only the flow is changed: at settled states, across the onset of slipping, and on
+  average from there to unloading.
+* For the loop of Fig. 13 the flow rises and falls in held steps, all in one run: a ramp would
+  overshoot the fold of the slipping branch, where settling slows down without bound. The levels are
+  where cases were seen to change, and between.
+* Unloading (section 5.3): a ball rides the wall a little above the floor while the flow suddenly
+  falls below what holds it there. When does it begin to slip, when does it land, how fast, with
+  what impulse?
+* A ball that the wall carries beside the floor is pushed, upwards or by a little more spin: does it
+  stay off the floor, and how high? An engine may follow motions with landings to first order only.
 """
 
 from __future__ import annotations
@@ -25,7 +28,15 @@ from numpy.polynomial import Polynomial
 from compare.kit import settling
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import Protocol
-from compare.kit.record import Condition, Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.record import (
+    Condition,
+    Measurement,
+    Missing,
+    Records,
+    if_found,
+    measurement,
+    state_of,
+)
 from compare.kit.settling import Patience, Settled
 from compare.kit.statistics import Measured, settled_case
 from compare.kit.trials import Start, Trial, TrialResult, carry_out
@@ -37,18 +48,36 @@ from model.trajectory import columns
 class Slopes:
     """Flows at which states settle for a slope, as relative distances."""
 
-    across: tuple[float, ...] = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)  # from where slipping sets in
-    neighbours: tuple[float, ...] = (-1e-3, -5e-4, 5e-4, 1e-3)  # the nearer ones show the effect of curvature
+    across: tuple[float, ...] = (
+        -1e-3,
+        -5e-4,
+        5e-4,
+        1e-3,
+        2e-3,
+        4e-3,
+        8e-3,
+    )  # from where slipping sets in
+    neighbours: tuple[float, ...] = (
+        -1e-3,
+        -5e-4,
+        5e-4,
+        1e-3,
+    )  # the nearer ones show the effect of curvature
 
 
-def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there to unloading."""
+def slope(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there
+    to unloading."""
     most = lab.effort.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
     # With a factor on the drift limit of settled states: for the jump they lie close together.
     for by, sharp in ("neighbours", 0.3), ("jump", 0.1), ("mean", 1.0):
         own = [curve for curve in curves if curve.by == by]
-        starts = [[Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own]
+        starts = [
+            [Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own
+        ]
         settled = settling.settle_groups(lab, starts, Patience(span=24.0, sharp=sharp))
         for curve, states in zip(own, settled, strict=True):
             where = f"{by} at omega_0 = {curve.p.omega_0:.4g} rad/s"
@@ -60,7 +89,9 @@ def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
                 yield if_found(row, f"{where}: no slope")
             else:
                 cases = ", ".join(each.case.name for each in states)
-                yield Missing("slope", curve.set, f"{where}: the states there are not of one kind ({cases})")
+                yield Missing(
+                    "slope", curve.set, f"{where}: the states there are not of one kind ({cases})"
+                )
 
 
 @dataclass(frozen=True)
@@ -78,21 +109,31 @@ class Curve:
 def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
     """Rows of flows at which states are to settle for slopes of the characteristic curve of a set.
 
-    Between neighbours of settled states that slip on the floor, at most so many, and of the fastest of the others;
-    across the onset of slipping; and from there to the flow at which the wall begins to carry the ball.
-    """
+    Between neighbours of settled states that slip on the floor, at most so many, and of the fastest
+    of the others; across the onset of slipping; and from there to the flow at which the wall begins
+    to carry the ball."""
     states: dict[Case, dict[float, dict[str, Measurement]]] = {case: {} for case in Case}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity != "case"):
         if m.parameters.omega_0:
-            at = states[settling.physical_case(Case[str(m.conditions["case"])])].setdefault(m.parameters.omega_0, {})
+            at = states[settling.physical_case(Case[str(m.conditions["case"])])].setdefault(
+                m.parameters.omega_0, {}
+            )
             at[m.quantity] = m
     for case in (Case.RR, Case.SS, Case.NR):
         alike = sorted(states[case].items())
         few = np.linspace(0, len(alike) - 1, most).round() if case is Case.SS else [len(alike) - 1]
         for k in sorted({int(n) for n in few if alike}):
             omega_0, values = alike[k]
-            q, moving = values["omega_c"].parameters, ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
-            x0 = (settling.safe_height(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
+            q, moving = (
+                values["omega_c"].parameters,
+                ("v_y", "omega_c", "slip_x", "slip_y", "slip_z"),
+            )
+            x0 = (
+                settling.safe_height(q) * (case is Case.NR),
+                *(values[each].value for each in moving),
+                0.0,
+                0.0,
+            )
             flows = tuple(omega_0 * (1 + d) for d in Slopes.neighbours)
             yield Curve("neighbours", name, q, flows, x0)
     slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
@@ -106,64 +147,101 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
 
 
 def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
-    """The slope of a curve, from its settled states; None where these are not of the cases that belong.
+    """The slope of a curve, from its settled states; None where these are not of the cases that
+    belong.
 
-    Between neighbours: central differences over two distances, so that the error of second order cancels.
-    The jump: slope above minus slope below, each at the threshold itself, above by a cubic through four secants. The
-    mean: from where slipping sets in, on the line on which the ball comes there, to the last flow.
-    """
+    Between neighbours: central differences over two distances, so that the error of second order
+    cancels. The jump: slope above minus slope below, each at the threshold itself, above by a cubic
+    through four secants. The mean: from where slipping sets in, on the line on which the ball comes
+    there, to the last flow."""
     cases = [each.case for each in states]
     f, onset = np.array(curve.flows), curve.p.omega_0
-    w, noises = np.transpose([(v.value, v.uncertainty) for v in (each.values["omega_c"] for each in states)])
+    w, noises = np.transpose(
+        [(v.value, v.uncertainty) for v in (each.values["omega_c"] for each in states)]
+    )
     noise, below = float(noises.max()), (w[1] - w[0]) / (f[1] - f[0])
     if curve.by == "neighbours" and len(set(map(settling.physical_case, cases))) == 1:
         wide, near = (w[3] - w[0]) / (f[3] - f[0]), (w[2] - w[1]) / (f[2] - f[1])
-        return Measured(near + (near - wide) / 3, math.hypot((near - wide) / 3, 2 * noise / (f[2] - f[1])))
+        return Measured(
+            near + (near - wide) / 3, math.hypot((near - wide) / 3, 2 * noise / (f[2] - f[1]))
+        )
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
         secants, middles = np.diff(w[2:]) / np.diff(f[2:]), (f[2:-1] + f[3:]) / 2 - onset
         cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
-        # Noise of the states, propagated to the secants and from them to the slope: no weight in the cubic exceeds 4.
+        # Noise of the states, propagated to the secants and from them to the slope: no weight in
+        # the cubic exceeds 4.
         solved = 4 * math.sqrt(2) * noise / (f[3] - f[2])
         placed = parabola[-2] * curve.noise
-        return Measured(float(cubic[-1] - below), math.hypot(cubic[-1] - parabola[-1], solved, placed))
+        return Measured(
+            float(cubic[-1] - below), math.hypot(cubic[-1] - parabola[-1], solved, placed)
+        )
     if curve.by == "mean" and cases == [Case.RR, Case.RR, Case.SS]:
         first, rise = w[1] + (onset - f[1]) * (w[1] - w[0]) / (f[1] - f[0]), f[2] - onset
         return Measured(float((w[2] - first) / rise), 3 * math.hypot(noise, curve.noise) / rise)
     return None
 
 
-def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def hysteresis(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Case and omega_c at every level of the loop, and the case at the level before."""
     loops: dict[str, list[Start]] = {}  # starts at all levels of a set, up and down
     for name, p in sets.items():
         if rise := _levels(name, records, lab.effort.hysteresis_parts):
             sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
-            loops[name] = [Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides]
+            loops[name] = [
+                Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides
+            ]
         else:
-            yield Missing("hysteresis", name, "no flow at which slipping on the floor gives way to riding the wall")
+            yield Missing(
+                "hysteresis",
+                name,
+                "no flow at which slipping on the floor gives way to riding the wall",
+            )
     tasks = []
     for loop in loops.values():  # a run through all levels, each held for a time
         p, flows = loop[0].p, [level.p.omega_0 for level in loop]
         step, hold = coarse_step(p), settling.duration(p, lab.effort.hysteresis_hold)
-        samples, flow = round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows), Flow.staircase(flows, hold)
-        tasks.append(lab.task(p, State(omega_c=flows[0]), hold * len(flows), step, flow=flow, samples=samples))
+        samples, flow = (
+            round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows),
+            Flow.staircase(flows, hold),
+        )
+        tasks.append(
+            lab.task(
+                p, State(omega_c=flows[0]), hold * len(flows), step, flow=flow, samples=samples
+            )
+        )
     for (name, loop), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
         if isinstance(run, str):
             yield Missing("hysteresis", name, f"the run {run}")
             continue
-        # By how much half the step changes omega_c, relative to omega_0: the largest of all settled states.
-        settled = [m for m in records.select("settled", "omega_c") if m.set == name and m.parameters.omega_0 > 0]
+        # By how much half the step changes omega_c, relative to omega_0: the largest of all settled
+        # states.
+        settled = [
+            m
+            for m in records.select("settled", "omega_c")
+            if m.set == name and m.parameters.omega_0 > 0
+        ]
         certainty = max(m.uncertainty / m.parameters.omega_0 for m in settled)
         count, before = (len(run.time) - 1) // len(loop), "RR"
         for k, level in enumerate(loop):
             held = slice(k * count, (k + 1) * count)
-            part = replace(run, **{column: getattr(run, column)[held] for column in columns(Trajectory)})
-            ended = settling.judge_run(replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose)
+            part = replace(
+                run, **{column: getattr(run, column)[held] for column in columns(Trajectory)}
+            )
+            ended = settling.judge_run(
+                replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose
+            )
             if ended.failure:
                 where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
                 yield Missing("hysteresis", name, f"{where}: {ended.failure}")
             else:
-                at: dict[str, Any] = {"case": ended.case.name, "side": level.name, "level": k + 1.0, "before": before}
+                at: dict[str, Any] = {
+                    "case": ended.case.name,
+                    "side": level.name,
+                    "level": k + 1.0,
+                    "before": before,
+                }
                 row = partial(measurement, lab, "hysteresis", name, level.p, tasks=[task], **at)
                 omega_c = ended.values["omega_c"]
                 sure = math.hypot(omega_c.uncertainty, certainty * level.p.omega_0)
@@ -197,7 +275,12 @@ class Shown:
     event: str
 
 
-LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
+LANDING, UNLOADED, UPWARDS, BY_SPIN = (
+    "unloading until it lands",
+    "unloading",
+    "push upwards",
+    "push by spin",
+)
 """Names of the trials."""
 
 
@@ -210,21 +293,35 @@ class Falls:
     push: float = 1e-2  # speed in units of sqrt(g R), or more spin in units of its spin on the wall
 
 
-def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """How a ball that rides the wall slips, falls and lands as the flow falls, or is lifted by a push."""
+def unloading(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """How a ball that rides the wall slips, falls and lands as the flow falls, or is lifted by a
+    push."""
     starts, trials = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:
-            yield Missing("unloading", name, "no flow was measured that is the least to hold a ball on the wall")
+            yield Missing(
+                "unloading",
+                name,
+                "no flow was measured that is the least to hold a ball on the wall",
+            )
             continue
-        # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by lifting, too.
+        # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by
+        # lifting, too.
         lifts = records.threshold(name, "omega_03") or limit
         flows = Falls.above * limit.value, 1.1 * max(limit.value, lifts.value)
-        starts.append([settling.named_start(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
+        starts.append(
+            [settling.named_start(name, p.replace(omega_0=omega), "on the wall") for omega in flows]
+        )
     for states in settling.settle_groups(lab, starts, Patience(loose=lab.effort.thresholds_loose)):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
-                yield Missing("unloading", state.start.set, f"no ball to begin with on the wall: {state.failure}")
+                yield Missing(
+                    "unloading",
+                    state.start.set,
+                    f"no ball to begin with on the wall: {state.failure}",
+                )
             else:
                 trials += [_trial(lab, state, name) for name in names]
     kinds: dict[Shown, list[tuple[TrialResult, Measured, float]]] = {}
@@ -236,17 +333,25 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
         if name != LANDING and before is case:
             yield result.row(lab, "case", case)
         elif name != LANDING:
-            yield Missing("unloading", result.trial.set, f"{name}: with half the time step the ball ends up otherwise")
+            yield Missing(
+                "unloading",
+                result.trial.set,
+                f"{name}: with half the time step the ball ends up otherwise",
+            )
         if coarse.keys() != fine.keys() or (name == LANDING and not fine):
             yield Missing("unloading", result.trial.set, f"{name}: the ball does not slip and land")
             continue
         for number, value in fine.items():
-            kinds.setdefault(number, []).append((result, value, abs(coarse[number].value / value.value - 1)))
+            kinds.setdefault(number, []).append(
+                (result, value, abs(coarse[number].value / value.value - 1))
+            )
     for number, alike in kinds.items():
         # The difference may be small by chance: at least the median of all trials counts.
         usual = float(np.median([change for *_, change in alike]))
         for result, fine, change in alike:
-            value = Measured(fine.value, math.hypot(max(change, usual) * fine.value, fine.uncertainty))
+            value = Measured(
+                fine.value, math.hypot(max(change, usual) * fine.value, fine.uncertainty)
+            )
             row = result.row(lab, number.quantity, value, event=number.event)
             yield if_found(row, f"{number.trial}: no {number.quantity}")
 
@@ -261,10 +366,16 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
         x0 = x0._replace(v_y=Falls.push * math.sqrt(p.g * p.R))
     else:
         x0 = x0._replace(slip_x=x.slip_x + Falls.push * (x.slip_x + p.R / p.r * x.omega_c))
-    coarse, fine = (times if name == LANDING else times // 4 for times in lab.effort.unloading_refine)
-    # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of many kinds.
+    coarse, fine = (
+        times if name == LANDING else times // 4 for times in lab.effort.unloading_refine
+    )
+    # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of
+    # many kinds.
     lands = 1.2 + 7 * p.c * time_unit(p)
-    t_end, step = settling.rounded_duration(p, lands if name == LANDING else 6.0), coarse_step(p) / fine
+    t_end, step = (
+        settling.rounded_duration(p, lands if name == LANDING else 6.0),
+        coarse_step(p) / fine,
+    )
 
     def read(run: Trajectory) -> tuple[Case, dict[Shown, Measured]]:
         numbers = {}
@@ -272,21 +383,39 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
             numbers = _landed(run)
         elif name == UPWARDS:  # it falls on the floor soon after
             numbers = {Shown(name, "lift", "first top"): first_top(run)}
-        elif name == BY_SPIN:  # it leaves the floor at a whole step, up to one late or early, which changes its height
-            numbers = {Shown(name, "lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
+        elif (
+            name == BY_SPIN
+        ):  # it leaves the floor at a whole step, up to one late or early, which changes its height
+            numbers = {
+                Shown(name, "lift", "end"): Measured(
+                    float(run.y[-1]), step / 2 * float(run.v_y.max())
+                )
+            }
         return settling.physical_case(settled_case(run)), numbers
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
     samples = None if name == LANDING else 1000
-    return Trial(state.start.set, p, name, x0.stacked(), t_end, (coarse, fine), samples, read, conditions=known)
+    return Trial(
+        state.start.set,
+        p,
+        name,
+        x0.stacked(),
+        t_end,
+        (coarse, fine),
+        samples,
+        read,
+        conditions=known,
+    )
 
 
 def _landed(run: Trajectory) -> dict[Shown, Measured]:
-    """Onset of slip, and landing: time, speed and vertical impulse. Empty if the ball doesn't land."""
+    """Onset of slip, and landing: time, speed and vertical impulse. Empty if the ball doesn't
+    land."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
     touches = np.flatnonzero(run.force_A[:, 1] > 0)
-    # Slip grows as the square of time: its onset is extrapolated from speeds above the noise, but small.
+    # Slip grows as the square of time: its onset is extrapolated from speeds above the noise, but
+    # small.
     growing = np.arange(*np.searchsorted(np.maximum.accumulate(slip), (1e-4, 1e-3)))
     if not len(touches) or not 1 < touches[0] < len(run.time) - 12 or len(growing) < 10:
         return {}
@@ -298,8 +427,12 @@ def _landed(run: Trajectory) -> dict[Shown, Measured]:
     rest = run.v_y[k + 5 : k + 12]  # by then it must have come to rest on the floor
     impulse = Measured(p.m * (float(rest.mean()) - v_y), p.m * float(np.abs(rest).max()))
     return {
-        Shown(LANDING, "time", "slip at B"): Measured(cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))),
-        Shown(LANDING, "time", "landing"): Measured(float(run.time[k]) + wait, step / math.sqrt(12)),
+        Shown(LANDING, "time", "slip at B"): Measured(
+            cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))
+        ),
+        Shown(LANDING, "time", "landing"): Measured(
+            float(run.time[k]) + wait, step / math.sqrt(12)
+        ),
         Shown(LANDING, "landing_speed", "landing"): Measured(v_y, 0.0),
         Shown(LANDING, "landing_impulse", "landing"): impulse,
     }
@@ -308,18 +441,25 @@ def _landed(run: Trajectory) -> dict[Shown, Measured]:
 def first_top(run: Trajectory) -> Measured:
     """Height in m at which v_y first falls to zero.
 
-    It lies between those that constant acceleration gives from the samples on either side: its uncertainty is half of
-    that range.
-    """
+    It lies between those that constant acceleration gives from the samples on either side: its
+    uncertainty is half of that range."""
     k = int(np.argmax(run.v_y < 0))
     ends = [k - 1, k]
     before, after = run.v_y[ends]
-    heights = run.y[ends] + run.v_y[ends] ** 2 * (run.time[k] - run.time[k - 1]) / (before - after) / 2
+    heights = (
+        run.y[ends] + run.v_y[ends] ** 2 * (run.time[k] - run.time[k - 1]) / (before - after) / 2
+    )
     return Measured(float(heights.mean()), float(np.ptp(heights)) / 2)
 
 
 PROTOCOLS = (
     Protocol("hysteresis", hysteresis, ("settled",)),
-    Protocol("unloading", unloading, ("thresholds",), cost=4, drawn=lambda m: m.conditions["start"] == UNLOADED),
+    Protocol(
+        "unloading",
+        unloading,
+        ("thresholds",),
+        cost=4,
+        drawn=lambda m: m.conditions["start"] == UNLOADED,
+    ),
     Protocol("slope", slope, ("settled", "thresholds"), cost=6),
 )

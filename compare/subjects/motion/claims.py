@@ -1,4 +1,5 @@
-"""What holds at every instant, what a landing leaves, the drag of the fluid, and the equations of motion (23)-(29)."""
+"""What holds at every instant, what a landing leaves, the drag of the fluid, and the equations of
+motion (23)-(29)."""
 
 from __future__ import annotations
 
@@ -27,7 +28,14 @@ from model.kinematics import VARIABLES
 _OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
 
 
-_DIMENSIONS: dict[Condition, float] = {"RR": 1.0, "RS": 2.0, "SR": 2.0, "SS": 4.0, "NR": 4.0, "NS": 6.0}
+_DIMENSIONS: dict[Condition, float] = {
+    "RR": 1.0,
+    "RS": 2.0,
+    "SR": 2.0,
+    "SS": 4.0,
+    "NR": 4.0,
+    "NS": 6.0,
+}
 """Of the domain of each case, as Table 4 prints them."""
 _RUN = "analytic.simulate"
 _TORQUE = "analytic.flowmeter.real_fluid.rolling"
@@ -40,7 +48,8 @@ def _sinking(m: Measurement) -> float:
 
 
 def _fallen(m: Measurement) -> float:
-    """Height in m of a thrown ball at the end: the start's height less the depth whose `drag.fall_time` is the time."""
+    """Height in m of a thrown ball at the end: the start's height less the depth whose
+    `drag.fall_time` is the time."""
     p, (y, v_y, *_) = m.parameters, state(m)
     fall = brentq(lambda fall: drag.fall_time(fall, v_y, p) - m.at("time"), 1e-6 * p.R, 100 * p.R)
     return y - float(fall)
@@ -59,7 +68,9 @@ def _end_states(*starts: str) -> tuple[Bearing, ...]:
     def starts_so(m: Measurement) -> bool:
         return str(m.conditions["start"]).startswith(starts)
 
-    return bearings("runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN)
+    return bearings(
+        "runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN
+    )
 
 
 def _is_stable(case: Case, m: Measurement) -> bool:
@@ -78,7 +89,8 @@ def _rolls_or_slips(holds: Callable[[Case, Measurement], bool], m: Measurement) 
 
 
 def _braked_rolls(m: Measurement) -> float:
-    """The case of a ball whose spin the fluid brakes: RR, if friction suffices for it; LookupError else."""
+    """The case of a ball whose spin the fluid brakes: RR, if friction suffices for it; LookupError
+    else."""
     if not real_fluid.rolling(m.parameters).friction < 1:
         raise LookupError("friction doesn't balance the fluid's torque")
     return float(Case.RR)
@@ -86,15 +98,23 @@ def _braked_rolls(m: Measurement) -> float:
 
 def _last_case(m: Measurement, leave_rolling: str = "slip-stability") -> float:
     """The case in which theory's motion ends."""
-    run = theory(analytic.simulate, m.parameters, state(m), m.at("time"), leave_rolling=leave_rolling, rtol=RTOL)
+    run = theory(
+        analytic.simulate,
+        m.parameters,
+        state(m),
+        m.at("time"),
+        leave_rolling=leave_rolling,
+        rtol=RTOL,
+    )
     return float(run.case[-1])
 
 
 def _last_case_either(m: Measurement) -> float:
-    """The case in which theory's motion ends, or the measured one where both rolling and slipping agree with theory.
+    """The case in which theory's motion ends, or the measured one where both rolling and slipping
+    agree with theory.
 
-    There the internal force between floor and wall decides, which the state doesn't contain (docs/theory.md, 7).
-    """
+    There the internal force between floor and wall decides, which the state doesn't contain
+    (docs/theory.md, 7)."""
     leaves = _last_case(m)
     return leaves if leaves == m.value or _last_case(m, "infeasible") != m.value else m.value
 
@@ -103,19 +123,27 @@ LAW_CLAIMS = (
     claim(
         "table-3",
         "Table 3, (12)-(17)",
-        "A contact that rolls doesn't slip, and one that is closed has no gap; where it slips, friction is mu or eta "
-        "times the normal force and opposes the slip. (That contacts press, and that friction stays within its limit, "
+        "A contact that rolls doesn't slip, and one that is closed has no gap; where it slips, "
+        "friction is mu or eta "
+        "times the normal force and opposes the slip. (That contacts press, and that friction "
+        "stays within its limit, "
         "(12) and (13), is built into any solver of friction cones: it is not counted.)",
         Bearing("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
         *(
-            Bearing("laws", "friction_ratio", coefficient, when=given(contact=contact), by="(14), (15)")
-            for contact, coefficient in (("A", lambda m: m.parameters.mu), ("B", lambda m: m.parameters.eta))
+            Bearing(
+                "laws", "friction_ratio", coefficient, when=given(contact=contact), by="(14), (15)"
+            )
+            for contact, coefficient in (
+                ("A", lambda m: m.parameters.mu),
+                ("B", lambda m: m.parameters.eta),
+            )
         ),
     ),
     claim(
         "table-4",
         "Table 4, (22)",
-        "A ball that is pushed a little out of a stationary motion moves in as many independent ways as the domain of "
+        "A ball that is pushed a little out of a stationary motion moves in as many independent "
+        "ways as the domain of "
         "its case has dimensions.",
         Bearing("rates", "modes", lambda m: _DIMENSIONS[m.conditions["case"]], by="Table 4"),
     ),
@@ -130,14 +158,16 @@ LAW_CLAIMS = (
     claim(
         "cases",
         "Fig. 2, Table 3",
-        "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
+        "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes "
+        "through them as the "
         "equations of motion say.",
         Bearing("motions", "case", _last_case_either, by=_RUN),
     ),
     claim(
         "flight",
         "extension, (9), (20)",
-        "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and keeps its spin.",
+        "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and "
+        "keeps its spin.",
         *_end_states("thrown"),
         Bearing(
             "runs",
@@ -151,31 +181,41 @@ LAW_CLAIMS = (
     claim(
         "opening",
         "(12), section 1.1",
-        "The wall contact opens where it carries no load, or where friction at the floor pulls the ball inwards more "
+        "The wall contact opens where it carries no load, or where friction at the floor pulls the "
+        "ball inwards more "
         "than its orbit needs; the ball then leaves the wall as the equations say.",
         *_end_states("pulled off"),
     ),
     claim(
         "sliding",
         "(20), (23)-(29)",
-        "A ball that slips or rolls at one contact or both moves on from case to case as the equations say, also while "
+        "A ball that slips or rolls at one contact or both moves on from case to case as the "
+        "equations say, also while "
         "the flow rises or falls.",
         *_end_states("slips", "rolls", "sinks"),
     ),
     claim(
         "smooth-wall",
         "Prop. 2, Definitions 1-3",
-        "Along a wall without friction a ball goes round with the fluid, rolls on the floor and spins about its axis, "
+        "Along a wall without friction a ball goes round with the fluid, rolls on the floor and "
+        "spins about its axis, "
         "as long as slip at the floor dies out, and friction suffices; faster, it slips.",
         *(
-            Bearing("runs", "case", partial(_rolls_or_slips, holds), when=given(start="smooth wall"), by=by)
+            Bearing(
+                "runs",
+                "case",
+                partial(_rolls_or_slips, holds),
+                when=given(start="smooth wall"),
+                by=by,
+            )
             for holds, by in ((_is_stable, _HOLDS), (_exists, "analytic.stationary_solutions"))
         ),
     ),
     claim(
         "definition-1-2",
         "Definitions 1 and 2, (82)",
-        "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall and roll on beyond "
+        "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall "
+        "and roll on beyond "
         "ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
         # Where slip lasts, theory's motion ends slipping at both points, or lifted.
         Bearing(
@@ -189,19 +229,24 @@ LAW_CLAIMS = (
     claim(
         "fluid-torque",
         "extension",
-        "A fluid that brakes the spin of a ball makes it roll slower than the fluid goes round, at first order in the "
+        "A fluid that brakes the spin of a ball makes it roll slower than the fluid goes round, at "
+        "first order in the "
         "torque.",
         Bearing("torque", "case", _braked_rolls, by=_TORQUE),
-        Bearing("torque", "omega_c", lambda m: real_fluid.rolling(m.parameters).omega_c, by=_TORQUE),
+        Bearing(
+            "torque", "omega_c", lambda m: real_fluid.rolling(m.parameters).omega_c, by=_TORQUE
+        ),
         reason="The paper leaves the torque out; so does all else here, unless parameters give it.",
     ),
     claim(
         "impacts",
         "extension",
-        "A ball that lands does not rebound, and friction acts on it during the impact by Coulomb's law for impulses.",
+        "A ball that lands does not rebound, and friction acts on it during the impact by "
+        "Coulomb's law for impulses.",
         Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
         *bearings("impacts", [f"after_{name}" for name in LANDED], _end_of_motion, by=_RUN),
-        reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
+        reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for "
+        "the impulses.",
     ),
 )
 
@@ -214,8 +259,10 @@ _SOURCES = {
     Case.NS: "(28), (29)",
 }
 _CORRECTED = {
-    Case.SS: "The last row of (26) has the wrong sign before w̃_z A_z/(w̃_x jmr), and A_z and B_z of (29) are damaged.",
-    Case.NS: "(28) divides by w̃_x where it should by w̃_y, and its last row has -(c v_y + g)/r for +(c v_y + g)/r.",
+    Case.SS: "The last row of (26) has the wrong sign before w̃_z A_z/(w̃_x jmr), and A_z and B_z "
+    "of (29) are damaged.",
+    Case.NS: "(28) divides by w̃_x where it should by w̃_y, and its last row has -(c v_y + g)/r "
+    "for +(c v_y + g)/r.",
 }
 _FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
 """Where both contacts roll only A_z, B_z and the sums are determined, and measured."""
@@ -237,19 +284,24 @@ def _motion_bearings(case: Case) -> Iterator[Bearing]:
 
     when = given(case=case.name)
     if case in (Case.NR, Case.NS):  # into which a ball lifts off
-        yield Bearing("field", "rate_v_y", lift, when=when, by="analytic.slip_stability.lift_acceleration")
+        yield Bearing(
+            "field", "rate_v_y", lift, when=when, by="analytic.slip_stability.lift_acceleration"
+        )
     for name in TRAITS[case].active:
         if name not in ("y", "h"):
             yield Bearing("field", f"rate_{name}", rate, when=when, by="analytic.vector_field")
     for name in _FORCES:
-        yield Bearing("field", f"moving_force_{name}", force, when=when, by="analytic.contact_forces")
+        yield Bearing(
+            "field", f"moving_force_{name}", force, when=when, by="analytic.contact_forces"
+        )
 
 
 EQUATIONS = tuple(
     claim(
         f"motion-{case.name}",
         _SOURCES.get(case, "(20)"),
-        f"In case {case.name} the accelerations and contact forces are those of the equations of motion.",
+        f"In case {case.name} the accelerations and contact forces are those of the equations of "
+        f"motion.",
         *_motion_bearings(case),
         text=Text.CORRECTED if case in _CORRECTED else Text.PRINTED,
         reason=_CORRECTED.get(case, "" if case in _SOURCES else _OWN),

@@ -1,4 +1,5 @@
-"""Claims about slip: does a slight one grow or die out, where does the ball lift off (sections 3 and 4, Fig. 6)?"""
+"""Claims about slip: does a slight one grow or die out, where does the ball lift off (sections 3
+and 4, Fig. 6)?"""
 
 from __future__ import annotations
 
@@ -17,7 +18,12 @@ from model import Case
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
 
-_NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS)
+_NR_NS, _RR_RS, _RR_SR, _RR_SS = (
+    (Case.NR, Case.NS),
+    (Case.RR, Case.RS),
+    (Case.RR, Case.SR),
+    (Case.RR, Case.SS),
+)
 
 
 def _state(m: Measurement) -> Array:
@@ -50,14 +56,19 @@ def _following_case(m: Measurement) -> float:
 
 def _gamma_nr(m: Measurement) -> float:
     """gamma (56) in the measured direction of slip, rad s-2."""
-    return float(slip_bounds.gamma_nr(math.atan2(m.at("n_y"), m.at("n_z")), _state(m), m.parameters))
+    return float(
+        slip_bounds.gamma_nr(math.atan2(m.at("n_y"), m.at("n_z")), _state(m), m.parameters)
+    )
 
 
 def _by_forces(m: Measurement) -> float:
-    """gamma from the forces of NR: friction that rolling needs along the slip, minus eta times the normal force."""
+    """gamma from the forces of NR: friction that rolling needs along the slip, minus eta times the
+    normal force."""
     p = m.parameters
     _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _state(m), p)
-    return float((1 + p.j) / (p.j * p.m * p.r) * (B_y * m.at("n_z") - B_z * m.at("n_y") - p.eta * B_x))
+    return float(
+        (1 + p.j) / (p.j * p.m * p.r) * (B_y * m.at("n_z") - B_z * m.at("n_y") - p.eta * B_x)
+    )
 
 
 def _steepest(m: Measurement) -> float:
@@ -78,16 +89,26 @@ def _bounds(
     side: int = 0,
     from_rest: bool = False,
 ) -> tuple[Bearing, Bearing]:
-    """Bearings on the zero and the slope of gamma over the flow, which a bound of the paper predicts.
+    """Bearings on the zero and the slope of gamma over the flow, which a bound of the paper
+    predicts.
 
-    `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly so.
-    """
+    `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly
+    so."""
     when = all_of(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
     power = "_square" if by == "stationary" else ""
     size = (lambda m: m.parameters.g / m.parameters.R) if from_rest else None
     return (
-        Bearing("bounds", f"gamma_zero{power}", lambda m: bound(m).zero, when=when, size=size, by="slip_bounds"),
-        Bearing("bounds", f"gamma_slope{power}", lambda m: bound(m).slope, when=when, by="slip_bounds"),
+        Bearing(
+            "bounds",
+            f"gamma_zero{power}",
+            lambda m: bound(m).zero,
+            when=when,
+            size=size,
+            by="slip_bounds",
+        ),
+        Bearing(
+            "bounds", f"gamma_slope{power}", lambda m: bound(m).slope, when=when, by="slip_bounds"
+        ),
     )
 
 
@@ -119,15 +140,26 @@ CLAIMS = (
         claim(
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
-            f"Out of {arrow[0].name} a slight slip in any direction that {arrow[1].name} allows grows at the rate γ "
-            "while forces admit it; else the ball passes into another case, as the equations of motion say.",
+            f"Out of {arrow[0].name} a slight slip in any direction that {arrow[1].name} allows "
+            f"grows at the rate γ "
+            "while forces admit it; else the ball passes into another case, as the equations of "
+            "motion say.",
             *(
                 Bearing("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
-                for gamma, by in ((_gamma, "slip_stability.gamma"), (_gamma_nr, "slip_bounds.gamma_nr"))
+                for gamma, by in (
+                    (_gamma, "slip_stability.gamma"),
+                    (_gamma_nr, "slip_bounds.gamma_nr"),
+                )
                 if gamma is _gamma or arrow == _NR_NS
             ),
             *(
-                Bearing(protocol, "case", _following_case, when=_along(arrow, *by), by="analytic.simulate")
+                Bearing(
+                    protocol,
+                    "case",
+                    _following_case,
+                    when=_along(arrow, *by),
+                    by="analytic.simulate",
+                )
                 for protocol, by in (
                     ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
                     ("bounds", ("held", "stationary")),
@@ -139,15 +171,23 @@ CLAIMS = (
     claim(
         "eq-58",
         "(58)",
-        "A ball that rolls on the wall alone begins to slip the fastest in the direction β₁, whatever its state.",
+        "A ball that rolls on the wall alone begins to slip the fastest in the direction β₁, "
+        "whatever its state.",
         Bearing("steepest", "steepest", _steepest, by="slip_bounds.steepest_nr"),
     ),
     claim(
         "eq-13-gamma",
         "3.2, last paragraph",
-        "On the wall alone slip in a direction grows in proportion to the friction that rolling needs in it, less "
+        "On the wall alone slip in a direction grows in proportion to the friction that rolling "
+        "needs in it, less "
         "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
-        Bearing("growth", "gamma", _by_forces, when=_along(_NR_NS, "", "dragged"), by="analytic.contact_forces, (13)"),
+        Bearing(
+            "growth",
+            "gamma",
+            _by_forces,
+            when=_along(_NR_NS, "", "dragged"),
+            by="analytic.contact_forces, (13)",
+        ),
     ),
     claim(
         "eq-61",
@@ -158,59 +198,92 @@ CLAIMS = (
     claim(
         "eq-66",
         "(66)",
-        "A ball that rolls round slower than the fluid begins to slip at the wall once the difference exceeds (66).",
-        *_bounds(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y")))),
+        "A ball that rolls round slower than the fluid begins to slip at the wall once the "
+        "difference exceeds (66).",
+        *_bounds(
+            _RR_RS,
+            "held",
+            lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y"))),
+        ),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
     ),
     claim(
         "eq-67",
         "(67)",
-        "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = 0.",
-        *_bounds(_RR_RS, "stationary", lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
+        "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = "
+        "0.",
+        *_bounds(
+            _RR_RS,
+            "stationary",
+            lambda m: slip_bounds.rr_to_rs_stationary(m.parameters),
+            from_rest=True,
+        ),
     ),
     claim(
         "eq-73",
         "(73)",
-        "A ball that rolls round slower than the fluid begins to slip at the floor once the difference exceeds (73).",
-        *_bounds(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x")))),
+        "A ball that rolls round slower than the fluid begins to slip at the floor once the "
+        "difference exceeds (73).",
+        *_bounds(
+            _RR_SR,
+            "held",
+            lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x"))),
+        ),
     ),
     claim(
         "eq-74",
         "(74)",
-        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it lifts (η > j).",
+        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, "
+        "it lifts (η > j).",
         *_bounds(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
         _neutral_flow("omega_03", Case.RR, "loss of the floor"),
     ),
     claim(
         "eq-82",
         "(82)",
-        "Slip at both points at once, in the directions α = β = 0, grows above ω₀₁ and dies out below.",
+        "Slip at both points at once, in the directions α = β = 0, grows above ω₀₁ and dies out "
+        "below.",
         *_bounds(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
     ),
     claim(
         "eq-83",
         "(83)",
         "Slip at both points in the directions α = β = π dies out: (83) has no bound for η < 1.",
-        *_bounds(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
+        *_bounds(
+            _RR_SS,
+            "stationary",
+            lambda m: slip_bounds.rr_to_ss(m.parameters, -1),
+            side=-1,
+            from_rest=True,
+        ),
     ),
     claim(
         "fig-4-5",
         "Figs. 4 and 5",
-        "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps slipping.",
+        "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps "
+        "slipping.",
         *_bounds(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
-        Bearing("settled", "case", _case_on_wall, when=given(start="on the wall"), by="slip_stability.stability"),
+        Bearing(
+            "settled",
+            "case",
+            _case_on_wall,
+            when=given(start="on the wall"),
+            by="slip_stability.stability",
+        ),
     ),
     claim(
         "eq-69",
         "(69)",
-        "Rolling moves as the mean of slipping to one side and to the other, weighted so that no slip is left.",
+        "Rolling moves as the mean of slipping to one side and to the other, weighted so that no "
+        "slip is left.",
         Bearing("growth", "filippov_share", _filippov_share, by="slip_bounds.filippov_share"),
     ),
     claim(
         "definition-3",
         "Definitions 1-3, (67)",
-        "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
+        "Rolling is stable with respect to slipping up to a flow at which it is neutral, and "
+        "unstable beyond (on the "
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
         Bearing("growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
         _neutral_flow("omega_01", Case.RR, "onset of slip"),
@@ -230,7 +303,8 @@ CLAIMS = (
             by="slip_stability.gamma at (0, 0), (π, π)",
         ),
         expected=Outcome.REFUTED,
-        reason="False for the Euclidean normal (75): γ is larger along other directions. With kinetic energy as the "
+        reason="False for the Euclidean normal (75): γ is larger along other directions. With "
+        "kinetic energy as the "
         "inner product it is true.",
     ),
     *(
@@ -239,13 +313,29 @@ CLAIMS = (
             "Fig. 6, dotted",
             f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
             if inner is Case.RS
-            else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would "
+            else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in "
+            f"{outer.name}, would "
             "accelerate it upwards.",
             *(
-                Bearing("lift", quantity, predict, when=given(inner=inner.name), by="slip_stability: lift")
+                Bearing(
+                    "lift",
+                    quantity,
+                    predict,
+                    when=given(inner=inner.name),
+                    by="slip_stability: lift",
+                )
                 for quantity, predict in (
-                    ("lifts", lambda m: slip_stability.lift_acceleration(*_arrow(m), _state(m), m.parameters) > 0),
-                    ("lift_onset", lambda m: slip_stability.lift_onset(*_arrow(m), _state(m), m.parameters)),
+                    (
+                        "lifts",
+                        lambda m: (
+                            slip_stability.lift_acceleration(*_arrow(m), _state(m), m.parameters)
+                            > 0
+                        ),
+                    ),
+                    (
+                        "lift_onset",
+                        lambda m: slip_stability.lift_onset(*_arrow(m), _state(m), m.parameters),
+                    ),
                 )
                 if quantity == "lifts" or inner is not Case.RS
             ),

@@ -1,4 +1,5 @@
-"""Figs. 4 and 5: a ball carried by the wall is pushed into a slight slip, which dies out or grows."""
+"""Figs. 4 and 5: a ball carried by the wall is pushed into a slight slip, which dies out or
+grows."""
 
 from __future__ import annotations
 
@@ -15,15 +16,18 @@ from compare.kit.drawing import Diagram, diagram
 from model import Case
 
 BETA = 0.9
-"""Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that the path bends."""
+"""Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that
+the path bends."""
 PUSHED = 1.0
 """Size of the push, rad s-1."""
 MOTIONS = {"fig-4": (1.38, 3.4), "fig-5": (0.88, 0.17)}
-"""Flows above and below omega_02, in units of it, and times of motions, in units of sqrt(R/g): in Fig. 4 slip ends."""
+"""Flows above and below omega_02, in units of it, and times of motions, in units of sqrt(R/g): in
+Fig. 4 slip ends."""
 
 
 def draw(of: Diagram) -> tuple[Figure, str]:
-    """A figure of the slip at the wall over time, and of its path in the orthogonal plane (55); and its caption.
+    """A figure of the slip at the wall over time, and of its path in the orthogonal plane (55); and
+    its caption.
 
     The motion is that of the event-driven simulation from the formal stationary state of NR.
     """
@@ -42,7 +46,13 @@ def draw(of: Diagram) -> tuple[Figure, str]:
     if stops:
         time.axvline(1e3 * end, **style.GUIDE)
         for place, case in ((0.3, Case.NS), (1.3, Case.NR)):
-            time.text(1e3 * place * end, 0.93, case.name, ha="center", transform=time.get_xaxis_transform())
+            time.text(
+                1e3 * place * end,
+                0.93,
+                case.name,
+                ha="center",
+                transform=time.get_xaxis_transform(),
+            )
     time.set(xlabel="$t$ (ms)", ylabel="slip at the wall (rad/s)")
     time.legend(frameon=False)
     w_y, w_z = run.slip_y, run.slip_z
@@ -50,7 +60,9 @@ def draw(of: Diagram) -> tuple[Figure, str]:
     plane.plot([w_z[0], 0], [w_y[0], 0], **style.GUIDE)
     halfway = int(np.searchsorted(np.hypot(np.diff(w_z), np.diff(w_y)).cumsum(), 0.5 * PUSHED))
     tail, head = zip(w_z[halfway : halfway + 2], w_y[halfway : halfway + 2], strict=True)
-    plane.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": "black", "mutation_scale": 14})
+    plane.annotate(
+        "", head, tail, arrowprops={"arrowstyle": "-|>", "color": "black", "mutation_scale": 14}
+    )
     plane.plot(w_z[0], w_y[0], "kx", ms=7, mew=1.8)
     style.mark(plane, 0.0, 0.0, "NR", (6, -6))
     plane.set(xlabel="$\\tilde\\omega_z$ (rad/s)", ylabel="$\\tilde\\omega_y$ (rad/s)")
@@ -61,8 +73,10 @@ def draw(of: Diagram) -> tuple[Figure, str]:
     dies = "above ω₀₂: the slip dies out within finite time, and the ball rolls on the wall again"
     grows = "below ω₀₂: the slip grows, and the ball keeps slipping (NS)"
     return figure, (
-        f"The stationary orbit on the wall (NR), pushed by a slip of {PUSHED:g} rad/s in the direction β = {BETA:g}, "
-        f"{dies if stops else grows}. Left: the slip over time. Right: its path in the plane orthogonal to NR, from "
+        f"The stationary orbit on the wall (NR), pushed by a slip of {PUSHED:g} rad/s in the "
+        f"direction β = {BETA:g}, "
+        f"{dies if stops else grows}. Left: the slip over time. Right: its path in the plane "
+        f"orthogonal to NR, from "
         "the cross; dotted: the straight line. Event-driven simulation; "
         f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}."
     )
@@ -70,5 +84,8 @@ def draw(of: Diagram) -> tuple[Figure, str]:
 
 FIGURES = {
     name: diagram(name, title, "high-wall-friction", draw, ("slip-NR-NS",))
-    for name, title in (("fig-4", "Fig. 4: a slip that dies out"), ("fig-5", "Fig. 5: a slip that grows"))
+    for name, title in (
+        ("fig-4", "Fig. 4: a slip that dies out"),
+        ("fig-5", "Fig. 5: a slip that grows"),
+    )
 }

@@ -1,4 +1,5 @@
-"""How disturbances of the stationary states die out, or grow: the eigenvalues of Propositions 1-6."""
+"""How disturbances of the stationary states die out, or grow: the eigenvalues of Propositions
+1-6."""
 
 from __future__ import annotations
 
@@ -22,23 +23,31 @@ _LEANING = "analytic.leaning_modes"
 
 
 def _stationary(m: Measurement) -> StationarySolution:
-    """The stationary state of a case; LookupError if theory has none, or no stable one. SR may be unstable."""
+    """The stationary state of a case; LookupError if theory has none, or no stable one. SR may be
+    unstable."""
     p, case = m.parameters, Case[str(m.conditions["case"])]
     found = theory(analytic.stationary_solutions, p)
     those = [s for s in found if s.exists and s.case is case and (s.stable or case is Case.SR)]
     if len(those) != 1:
-        raise LookupError(f"{case.name} has {len(those)} stationary states at omega_0 = {p.omega_0:g} rad/s")
+        raise LookupError(
+            f"{case.name} has {len(those)} stationary states at omega_0 = {p.omega_0:g} rad/s"
+        )
     return those[0]
 
 
 def _spectrum(m: Measurement) -> tuple[complex, ...]:
-    """The eigenvalues of the stationary state, rad s-1; in NS y is cyclic, (48), which adds a zero."""
+    """The eigenvalues of the stationary state, rad s-1; in NS y is cyclic, (48), which adds a
+    zero."""
     state = _stationary(m)
-    return (*([0.0] if state.case is Case.NS else []), *(complex(value) for value in state.eigenvalues))
+    return (
+        *([0.0] if state.case is Case.NS else []),
+        *(complex(value) for value in state.eigenvalues),
+    )
 
 
 def _mode(m: Measurement) -> complex:
-    """The eigenvalue of theory for a measured mode, by its number in the order of frequency and decay, rad s-1."""
+    """The eigenvalue of theory for a measured mode, by its number in the order of frequency and
+    decay, rad s-1."""
     values = _spectrum(m)
     real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
     upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag >= -real)
@@ -56,7 +65,8 @@ def _mode_size(m: Measurement) -> float:
 
 
 def _response(m: Measurement) -> float:
-    """How a linear motion follows a push, in natural units: by the exact Jacobian; of SR by its leaning modes."""
+    """How a linear motion follows a push, in natural units: by the exact Jacobian; of SR by its
+    leaning modes."""
     p, case, time = m.parameters, (stationary := _stationary(m)).case, float(m.conditions["time"])
     names = TRAITS[case].active
     i, j = (names.index(str(m.conditions[name])) for name in ("of", "pushed"))
@@ -81,11 +91,24 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
     when = given(case=case.name)
     leans = case is Case.SR
     return (
-        Bearing("rates", "decay_rate", lambda m: -_mode(m).real, when=when, size=_mode_size, by=_JACOBIAN),
-        Bearing("rates", "frequency", lambda m: _mode(m).imag, when=when, size=_mode_size, by=_JACOBIAN),
+        Bearing(
+            "rates",
+            "decay_rate",
+            lambda m: -_mode(m).real,
+            when=when,
+            size=_mode_size,
+            by=_JACOBIAN,
+        ),
+        Bearing(
+            "rates", "frequency", lambda m: _mode(m).imag, when=when, size=_mode_size, by=_JACOBIAN
+        ),
         Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=_JACOBIAN),
         Bearing(
-            "rates", "response", _response, when=when, by=_LEANING if leans else "exponential of the exact Jacobian"
+            "rates",
+            "response",
+            _response,
+            when=when,
+            by=_LEANING if leans else "exponential of the exact Jacobian",
         ),
         # The slowest of the decays, whatever grows or stays besides.
         Bearing(
@@ -114,7 +137,8 @@ CLAIMS = (
     claim(
         "prop-2",
         "Prop. 2, (24), (33)",
-        "In a fluid at rest a ball that spins next to the wall keeps its spin, whatever it is (a zero eigenvalue); "
+        "In a fluid at rest a ball that spins next to the wall keeps its spin, whatever it is (a "
+        "zero eigenvalue); "
         "going round dies out at the rate c/(1 + j).",
         *_bearings(Case.RS),
     ),
@@ -124,10 +148,19 @@ CLAIMS = (
         "In SR a load on the floor dies out above ω₀₃ = √(g/jR) and grows "
         "below, at the rates of the eigenvalues of f_SR.",
         *_bearings(Case.SR),
-        Bearing("rates", "decay_rate", _slowest_decay, when=given(case="SR", mode=1), size=_mode_size, by=_LEANING),
+        Bearing(
+            "rates",
+            "decay_rate",
+            _slowest_decay,
+            when=given(case="SR", mode=1),
+            size=_mode_size,
+            by=_LEANING,
+        ),
         text=Text.CORRECTED,
-        reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side where the ball leans "
-        "on the floor; on the other it lifts off, and its height is then free. (35) needs ω₀ ≥ √(g/(ηR)), not ≤.",
+        reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side "
+        "where the ball leans "
+        "on the floor; on the other it lifts off, and its height is then free. (35) needs ω₀ ≥ "
+        "√(g/(ηR)), not ≤.",
     ),
     claim(
         "prop-4-rate",
@@ -138,14 +171,16 @@ CLAIMS = (
     claim(
         "prop-5-rate",
         "Prop. 5, (27), (46)",
-        "Carried by the wall alone the ball keeps any height (a zero eigenvalue); it swings about it with a pair "
+        "Carried by the wall alone the ball keeps any height (a zero eigenvalue); it swings about "
+        "it with a pair "
         "of eigenvalues, and ω_c dies out at c/(1 + j).",
         *_bearings(Case.NR),
     ),
     claim(
         "prop-6-rate",
         "Prop. 6, (28), (48), (49)",
-        "The ball that sinks along the wall has a pair of eigenvalues ± iω₀, which never dies out, a zero for the "
+        "The ball that sinks along the wall has a pair of eigenvalues ± iω₀, which never dies out, "
+        "a zero for the "
         "cyclic y, and else decay only.",
         *_bearings(Case.NS),
     ),

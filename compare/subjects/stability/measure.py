@@ -1,13 +1,15 @@
-"""Decay rates and frequencies: settled states are pushed a little, and the motion itself shows its whole spectrum.
+"""Decay rates and frequencies: settled states are pushed a little, and the motion itself shows its
+whole spectrum.
 
-Every active variable of a case is pushed by itself, up and down. Half the difference of the two runs, divided by the
-size of the push, is a column of D(t), which a linear motion turns into P D(t) some time later: the logarithms of the
-eigenvalues of P are the exponents. Two sizes of the push are extrapolated to zero, and so are two time steps.
+Every active variable of a case is pushed by itself, up and down. Half the difference of the two
+runs, divided by the size of the push, is a column of D(t), which a linear motion turns into P D(t)
+some time later: the logarithms of the eigenvalues of P are the exponents. Two sizes of the push are
+extrapolated to zero, and so are two time steps.
 
-Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only by a friction of the order of
-omega_c^2: it takes a large push. Where floor and ball only just touch (SR), every push makes the ball lean on the floor
-one way and lifts it off the other way: only the first is used.
-"""
+Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only by a friction
+of the order of omega_c^2: it takes a large push. Where floor and ball only just touch (SR), every
+push makes the ball lean on the floor one way and lifts it off the other way: only the first is
+used."""
 
 from __future__ import annotations
 
@@ -43,14 +45,21 @@ PROTOCOL = "rates"
 class Pushes:
     """How settled states are pushed."""
 
-    record: tuple[int, int] = (64, 256)  # its length in coarse steps, about 3 sqrt(R/g), and samples
-    # Size of a push that isn't extrapolated to zero, under Stokes' law of drag and under others: theirs is in
-    # proportion to a lag only far below a Reynolds number of 1. The run with the coarser step has half of it, and shows
-    # that it doesn't matter.
+    record: tuple[int, int] = (
+        64,
+        256,
+    )  # its length in coarse steps, about 3 sqrt(R/g), and samples
+    # Size of a push that isn't extrapolated to zero, under Stokes' law of drag and under others:
+    # theirs is in proportion to a lag only far below a Reynolds number of 1. The run with the
+    # coarser step has half of it, and shows that it doesn't matter.
     usual: float = 2e-4
     slight: float = 2e-6
-    slowest: float = 0.04  # least slip speed of a state divided by sqrt(g R): a push is to be small beside it
-    zero_rate: float = 0.05  # measured rates below this share of the drag coefficient c count as zero
+    slowest: float = (
+        0.04  # least slip speed of a state divided by sqrt(g R): a push is to be small beside it
+    )
+    zero_rate: float = (
+        0.05  # measured rates below this share of the drag coefficient c count as zero
+    )
 
 
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
@@ -60,9 +69,15 @@ STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 Exponents = npt.NDArray[np.complex128]
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def measure(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    found = [each for name, p in sets.items() for each in chosen_states(records, name, p, lab.effort.rates_more)]
+    found = [
+        each
+        for name, p in sets.items()
+        for each in chosen_states(records, name, p, lab.effort.rates_more)
+    ]
     yield from (each for each in found if isinstance(each, Missing))
     states = [each for each in found if isinstance(each, Pushed)]
     tasks = [state.tasks(lab) for state in states]
@@ -71,9 +86,12 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield state.missing(f"a run {runs}")
             continue
         count = 2 * len(state.active)
-        answers = [push_response(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
-        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates of leaning by shorter records
-        # had been seen to be off.)
+        answers = [
+            push_response(state, size, runs[k * count : (k + 1) * count])
+            for k, size in enumerate(state.sizes)
+        ]
+        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates of leaning
+        # by shorter records had been seen to be off.)
         if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
             yield state.missing("pushed, the ball doesn't stay in this case")
             continue
@@ -105,39 +123,46 @@ class Pushed:
 
     @property
     def record(self) -> tuple[int, int]:
-        """Length of a run after a push, in coarse steps, and its samples; short for RS, which a large push changes."""
+        """Length of a run after a push, in coarse steps, and its samples; short for RS, which a
+        large push changes."""
         return (2, 16) if self.case is Case.RS else Pushes.record
 
     @property
     def order(self) -> int:
-        """The power of the push's size with which its error shrinks: 2 where pushes up and down are subtracted."""
+        """The power of the push's size with which its error shrinks: 2 where pushes up and down are
+        subtracted."""
         return 1 if self.case is Case.SR else 2
 
     @property
     def sizes(self) -> tuple[float, ...]:
-        """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
+        """Sizes of the pushes: the first with the coarser step, the others with the finer one, the
+        largest first."""
         size = PUSH.get(self.case, Pushes.usual if self.start.p.drag == STOKES else Pushes.slight)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
     def steps(self, lab: Lab) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
-        coarse, fine = lab.effort.rates_leaning if self.case is Case.SR else lab.effort.rates_refined
+        coarse, fine = (
+            lab.effort.rates_leaning if self.case is Case.SR else lab.effort.rates_refined
+        )
         return coarse_step(self.start.p) / coarse, coarse_step(self.start.p) / fine
 
     @property
     def fast(self) -> bool:
         """Whether contacts slip fast enough for a push.
 
-        Neither so slowly that it turns the slip, or friction stops it within four coarse steps, for a faster decay is
-        not resolved; nor at half the speed, divided by what `STUDY_SLIP` allows for the load, at which they hover.
-        """
+        Neither so slowly that it turns the slip, or friction stops it within four coarse steps, for
+        a faster decay is not resolved; nor at half the speed, divided by what `STUDY_SLIP` allows
+        for the load, at which they hover."""
         p, x = self.start.p, self.start.x0
         turned = math.sqrt(p.g * p.R) * max(Pushes.slowest, 2 * PUSH.get(self.case, 0.0))
         loads = (p.mu, p.g), (p.eta, p.R * State.of(x).omega_c ** 2)
         return all(
             max(turned, 4 * coarse_step(p) * friction * load) < speed
             and friction * speed < 10 * STUDY_SLIP * load / p.g
-            for contact, speed, (friction, load) in zip(self.case.name, slip_speeds(x, p), loads, strict=True)
+            for contact, speed, (friction, load) in zip(
+                self.case.name, slip_speeds(x, p), loads, strict=True
+            )
             if contact == "S"
         )
 
@@ -155,13 +180,17 @@ class Pushed:
         return tasks
 
     def missing(self, why: str, modes: int = 0) -> Missing:
-        """A record of modes, all by default, whose decay rates and frequencies were not measured, and why."""
+        """A record of modes, all by default, whose decay rates and frequencies were not measured,
+        and why."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
         return Missing(PROTOCOL, self.start.set, f"{at}: {why}", 2 * (modes or len(self.active)))
 
 
-def chosen_states(records: Records, name: str, p: Parameters, more: float) -> Iterator[Pushed | Missing]:
-    """States of a set to be pushed: one that spins on the spot next to the wall, and several settled ones of each case.
+def chosen_states(
+    records: Records, name: str, p: Parameters, more: float
+) -> Iterator[Pushed | Missing]:
+    """States of a set to be pushed: one that spins on the spot next to the wall, and several
+    settled ones of each case.
 
     Where there are fewer that can be pushed, the rest is missing.
     """
@@ -170,19 +199,28 @@ def chosen_states(records: Records, name: str, p: Parameters, more: float) -> It
     yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, physical_case(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
+        values.setdefault((m.parameters, physical_case(Case[str(m.conditions["case"])])), {})[
+            m.quantity
+        ] = m.value
     states = []
-    for (q, case), value in values.items():  # on the wall alone it is high up, and just touching the floor
+    for (
+        q,
+        case,
+    ), value in values.items():  # on the wall alone it is high up, and just touching the floor
         x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
         raised = x._replace(y=safe_height(q)) if case.A is Contact.N else x
         states.append(Pushed(Start(name, q, "settled", raised.stacked()), case))
         if case is Case.NR:
             states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.SR))
-    if p.drag == QUADRATIC:  # no ball settles to going round with the fluid, but one that starts so goes on so
+    if (
+        p.drag == QUADRATIC
+    ):  # no ball settles to going round with the fluid, but one that starts so goes on so
         q, x = p.replace(omega_0=0.5 / unit), State(omega_c=0.5 / unit)
         states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.RR))
     for case, most in STATES.items():
-        of = sorted((each for each in states if each.case is case), key=lambda each: each.start.p.omega_0)
+        of = sorted(
+            (each for each in states if each.case is case), key=lambda each: each.start.p.omega_0
+        )
         alike = [state for state in of if state.fast]
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
@@ -195,30 +233,36 @@ def chosen_states(records: Records, name: str, p: Parameters, more: float) -> It
 
 
 def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
-    """The response D (n, d, d) of the active variables, in `units`, to pushes of one size, from the runs of `tasks`.
+    """The response D (n, d, d) of the active variables, in `units`, to pushes of one size, from the
+    runs of `tasks`.
 
-    Only as long as the ball stays in the case and no variable is 0.4 away from the state, and without the first sample:
-    forces build up then.
-    """
+    Only as long as the ball stays in the case and no variable is 0.4 away from the state, and
+    without the first sample: forces build up then."""
     ups, downs = runs[::2], runs[1::2]
     if state.case is Case.SR:
-        seen = [max(pair, key=lambda run: stays(run, state.case)) for pair in zip(ups, downs, strict=True)]
+        seen = [
+            max(pair, key=lambda run: stays(run, state.case))
+            for pair in zip(ups, downs, strict=True)
+        ]
         columns = [(1 if run in ups else -1) * (run.x - state.start.x0) for run in seen]
     else:
-        # Where the wall carries nothing, as beside a ball that only spins, its contact is not detected.
+        # Where the wall carries nothing, as beside a ball that only spins, its contact is not
+        # detected.
         seen = list(runs[:2] if state.case is Case.RS else runs)
         columns = [(up.x - down.x) / 2 for up, down in zip(ups, downs, strict=True)]
     D = np.stack(columns, axis=-1)[:, state.active] / (size * state.units[:, None])
     ends = [stays(run, state.case) for run in seen]
-    ends.append(int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > 0.4 * (1 + 1e-9), True))))
+    ends.append(
+        int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > 0.4 * (1 + 1e-9), True)))
+    )
     return np.asarray(D[1 : min(ends)])
 
 
 def stays(run: Trajectory, case: Case) -> int:
     """For how many samples a run stays in a case; the first one counts, whatever it is in.
 
-    A ball on an almost unloaded floor may bounce by less than a contact's gap; it is in SR until the floor lets go.
-    """
+    A ball on an almost unloaded floor may bounce by less than a contact's gap; it is in SR until
+    the floor lets go."""
     left = run.case[1:] != case
     if case is Case.SR:
         left |= run.force_A[1:, 1] <= 0
@@ -226,15 +270,17 @@ def stays(run: Trajectory, case: Case) -> int:
 
 
 def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
-    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `Pushed.sizes`.
+    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the
+    `Pushed.sizes`.
 
-    They are extrapolated to a vanishing push, and to a vanishing step by second order. The uncertainty is made up of
-    that correction, which exceeds the remainder even of first order; the difference from the first half of the record;
-    the next order in the size of the push; the error of a step for the fastest exponent; the accuracy of the solver.
-    """
+    They are extrapolated to a vanishing push, and to a vanishing step by second order. The
+    uncertainty is made up of that correction, which exceeds the remainder even of first order; the
+    difference from the first half of the record; the next order in the size of the push; the error
+    of a step for the fastest exponent; the accuracy of the solver."""
     lasts, samples = state.record
     interval, order = lasts * coarse_step(state.start.p) / samples, state.order
-    # All records are cut to the length of the shortest, so that all are extrapolated from the same motion.
+    # All records are cut to the length of the shortest, so that all are extrapolated from the same
+    # motion.
     length = min(map(len, answers))
 
     def exponents_of(large: Array, small: Array, share: float = 1.0) -> Exponents:
@@ -260,7 +306,8 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
     slip = np.abs(state.start.x0 / state_units(state.start.p))[SLIP_XYZ].max()
     solved = SOLVED * max(1.0, slip) / (size * interval)
     uncertainty = np.sqrt(np.abs(correction) ** 2 + half**2 + bent**2 + stepped**2 + solved**2)
-    # Relative errors of one propagator have the same causes; that of one exponent may vanish by chance.
+    # Relative errors of one propagator have the same causes; that of one exponent may vanish by
+    # chance.
     alike = np.abs(values) * uncertainty.max() / np.abs(values).max()
     return values + correction, np.maximum(uncertainty, alike)
 
@@ -272,19 +319,27 @@ Row = Callable[..., Measurement]
 def _modes(
     state: Pushed, exponents: Exponents, uncertainty: Array, step: float, row: Row
 ) -> Iterator[Measurement | Missing]:
-    """Measurements of decay rate and frequency of each mode, slowest first, one of each pair of conjugates."""
+    """Measurements of decay rate and frequency of each mode, slowest first, one of each pair of
+    conjugates."""
     p, parts = state.start.p, []
     order = np.lexsort((-exponents.real, exponents.imag))
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):
         if abs(exponents[k]) * step > 0.25:
-            yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step", 1)
+            yield state.missing(
+                f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time "
+                f"step",
+                1,
+            )
             continue
         rate, frequency = -float(exponents[k].real), float(exponents[k].imag)
         for name, value, other in (("decay_rate", rate, frequency), ("frequency", frequency, rate)):
             parts.append((name, mode, value, natural_size(value, other, p), float(uncertainty[k])))
-    # They come from one propagator: where one is too vague for a check, the others aren't to be trusted more.
+    # They come from one propagator: where one is too vague for a check, the others aren't to be
+    # trusted more.
     vague = max(COVERAGE * sure / size / quantity(name).resolves for name, *_, size, sure in parts)
-    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > Pushes.zero_rate * p.c]
+    decays = [
+        part for part in parts if part[0] == "decay_rate" and part[2] > Pushes.zero_rate * p.c
+    ]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
     for name, mode, value, size, sure in parts:
@@ -292,24 +347,37 @@ def _modes(
         yield row(quantity=name, value=Measured(value, max(sure, least)), mode=mode)
 
 
-def _responses(state: Pushed, answers: Sequence[Array], turns: float, row: Row) -> Iterator[Measurement]:
-    """Measurements of how each active variable follows a push of each, in `units`, a third of the record later.
+def _responses(
+    state: Pushed, answers: Sequence[Array], turns: float, row: Row
+) -> Iterator[Measurement]:
+    """Measurements of how each active variable follows a push of each, in `units`, a third of the
+    record later.
 
-    This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum` does, to a
-    vanishing push and step; what the exponents may be off, s-1, turns it.
-    """
-    names, (lasts, samples), length = TRAITS[state.case].active, state.record, min(map(len, answers))
+    This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum`
+    does, to a vanishing push and step; what the exponents may be off, s-1, turns it."""
+    names, (lasts, samples), length = (
+        TRAITS[state.case].active,
+        state.record,
+        min(map(len, answers)),
+    )
     coarse, large, small = (propagator(answers[k][:length], length // 3) for k in (0, 1, -1))
     bent, late = (small - large) / (2**state.order - 1), (small - coarse) / 3
     value, time = small + bent + late, length // 3 * lasts * coarse_step(state.start.p) / samples
     turned = turns * time * np.abs(value).max()
     sure = float(np.linalg.norm([np.abs(bent).max(), np.abs(late).max(), turned]))
     for (i, of), (j, by) in product(enumerate(names), repeat=2):
-        yield row(quantity="response", value=Measured(float(value[i, j]), sure), time=time, of=of, pushed=by)
+        yield row(
+            quantity="response",
+            value=Measured(float(value[i, j]), sure),
+            time=time,
+            of=of,
+            pushed=by,
+        )
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:
-    """Natural size in s-1 of the real or imaginary part of an exponent, of which `other` is the other part.
+    """Natural size in s-1 of the real or imaginary part of an exponent, of which `other` is the
+    other part.
 
     Its own, or that of the exponent if it is none, or else that of free fall.
     """

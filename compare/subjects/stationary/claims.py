@@ -1,4 +1,5 @@
-"""Stationary states: Propositions 1-6 with their forces, and the bifurcation diagrams of Figs. 9-11."""
+"""Stationary states: Propositions 1-6 with their forces, and the bifurcation diagrams of Figs.
+9-11."""
 
 from __future__ import annotations
 
@@ -13,7 +14,16 @@ from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
-from compare.states import case_of, from_floor, is_in, lasting_cases, lifts_first, quantity_of, slips_first, solution_of
+from compare.states import (
+    case_of,
+    from_floor,
+    is_in,
+    lasting_cases,
+    lifts_first,
+    quantity_of,
+    slips_first,
+    solution_of,
+)
 from model import Case
 from model.drag import SCHILLER_NAUMANN
 
@@ -21,11 +31,11 @@ MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
 
 
 def case(m: Measurement) -> float:
-    """The case that was detected, if theory lets a ball from that start settle there; LookupError else.
+    """The case that was detected, if theory lets a ball from that start settle there; LookupError
+    else.
 
-    From the floor it may settle to whatever attracts. High up on the wall it stays where the wall carries it, and
-    sinks where not.
-    """
+    From the floor it may settle to whatever attracts. High up on the wall it stays where the wall
+    carries it, and sinks where not."""
     allowed = lasting_cases(m.parameters)
     if m.conditions["start"] == "on the wall":
         if case_of(m) is Case.NS and _exists(Case.NR, m):
@@ -46,20 +56,29 @@ def rolling(m: Measurement) -> float:
     limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
-    if case_of(m) is Case.RR or (_exists(Case.RR, m) and m.parameters.mu < 1):  # beyond, forces may hold it
+    if case_of(m) is Case.RR or (
+        _exists(Case.RR, m) and m.parameters.mu < 1
+    ):  # beyond, forces may hold it
         raise LookupError("RR has ended")
     return case(m)
 
 
 def _exists(case: Case, m: Measurement) -> bool:
     """Whether theory has a stationary state of a case."""
-    return any(s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters))
+    return any(
+        s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters)
+    )
 
 
 def _value_bearings(
-    quantities: Iterable[str], when: When, by: str, of: Case | None = None, protocol: str = "settled"
+    quantities: Iterable[str],
+    when: When,
+    by: str,
+    of: Case | None = None,
+    protocol: str = "settled",
 ) -> tuple[Bearing, ...]:
-    """Bearings on values of settled states: predicted in the case `of`, or in the one that was detected."""
+    """Bearings on values of settled states: predicted in the case `of`, or in the one that was
+    detected."""
 
     def predict(m: Measurement) -> float:
         state = theory(analytic.solution, m.parameters, of) if of else solution_of(m)
@@ -74,13 +93,15 @@ def _case_bearing(when: When) -> Bearing:
 
 
 def _rolling_bearing(when: When = lambda m: True) -> Bearing:
-    """A bearing on the case of balls that start with the fluid: RR up to the threshold at which rolling ends."""
+    """A bearing on the case of balls that start with the fluid: RR up to the threshold at which
+    rolling ends."""
     chosen = all_of(given(start="with the fluid"), when)
     return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
 def _sinks_at_reynolds(m: Measurement) -> float:
-    """v_y in m/s by Schiller and Naumann's C_D at the Reynolds number of the measured speed (`model.drag`)."""
+    """v_y in m/s by Schiller and Naumann's C_D at the Reynolds number of the measured speed
+    (`model.drag`)."""
     p, Re = m.parameters, drag.reynolds(abs(m.value), m.parameters)
     more = max(1 + drag.WAKE * Re**drag.EXPONENT, drag.BLUNT * Re / 24)
     return float(-(p.g - p.eta * p.R * p.omega_0**2) / (p.c * more))
@@ -90,7 +111,13 @@ def _along_branch(m: Measurement) -> float:
     """A contact force of SS in closed form at the flow, before the fold, N."""
     p = m.parameters
     branch = slipping_branch.branch(slipping_branch.points_at(p)[0], p)
-    return float({"force_Ay": branch.A_y, "force_Bx": branch.B_x, "force_Az": -branch.drag}[m.quantity]) * p.m * p.g
+    return (
+        float(
+            {"force_Ay": branch.A_y, "force_Bx": branch.B_x, "force_Az": -branch.drag}[m.quantity]
+        )
+        * p.m
+        * p.g
+    )
 
 
 def _region(m: Measurement) -> Exists:
@@ -106,7 +133,8 @@ _LASTING = {
     Exists.NR: {Case.NR},
     Exists.NS: {Case.NS},
 }
-"""What a ball can settle in where a state exists, SR counted as NR: itself, or both that it divides."""
+"""What a ball can settle in where a state exists, SR counted as NR: itself, or both that it
+divides."""
 
 
 def _cases_in_region(m: Measurement) -> float:
@@ -117,18 +145,19 @@ def _cases_in_region(m: Measurement) -> float:
 
 
 def _omega_c_beyond_fold(m: Measurement) -> float:
-    """omega_c of the unstable SS; LookupError where the region lacks it, or one of the attractors that it divides."""
+    """omega_c of the unstable SS; LookupError where the region lacks it, or one of the attractors
+    that it divides."""
     if Exists.SS | Exists.SS_BEYOND_FOLD | Exists.NR not in _region(m):
         raise LookupError("the region lacks SS, SS beyond the fold, or NR")
     return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
 
 
 def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
-    """The drag c in s-1 at which the fold is born at the eta of the set; that eta is proportional to c^2.
+    """The drag c in s-1 at which the fold is born at the eta of the set; that eta is proportional
+    to c^2.
 
-    Where friction is `equal`, as in Fig. 8, to c^(2/3). Computed from that point at half the measured drag, since at
-    the set's own there may be no fold for any eta below j.
-    """
+    Where friction is `equal`, as in Fig. 8, to c^(2/3). Computed from that point at half the
+    measured drag, since at the set's own there may be no fold for any eta below j."""
     p = m.parameters.replace(c=m.value / 2)
     born = bifurcation.double_points(p, equal)[0]
     if born.meets != ("omega_02", "omega_04"):
@@ -145,8 +174,10 @@ CLAIMS = (
     claim(
         "prop-1",
         "Prop. 1, (30)-(32)",
-        "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
-        "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
+        "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of "
+        "its forces "
+        "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or "
+        "ω₀₃ (η > j).",
         *_value_bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
         _case_bearing(_ROLLS),
         _rolling_bearing(),
@@ -161,19 +192,25 @@ CLAIMS = (
     claim(
         "prop-2-forces",
         "Prop. 2, (33), (34)",
-        "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
-        *_value_bearings(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
+        "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing "
+        "else acts.",
+        *_value_bearings(
+            ("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS
+        ),
     ),
     claim(
         "prop-3-5",
         "Props. 3 and 5, (35), (36), (46), (47)",
-        "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
-        "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
+        "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - "
+        "ω₀R/r, at any height; "
+        "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same "
+        "state as NR.",
         *_value_bearings(_STATE, _LIFTED, "(46), (47)"),
         *_value_bearings(_STATE, _LEANS, "(35), (36)", Case.SR),
         _case_bearing(_LIFTED),
         text=Text.CORRECTED,
-        reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
+        reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), "
+        "as (46) has it.",
     ),
     claim(
         "prop-4",
@@ -186,7 +223,8 @@ CLAIMS = (
     claim(
         "eq-40",
         "(40), (44)",
-        "A ball that has settled slipping at both points slips inwards at the floor and up the wall, cos α > 0, and "
+        "A ball that has settled slipping at both points slips inwards at the floor and up the "
+        "wall, cos α > 0, and "
         "backwards, sin α < 0: there is no such motion with cos α < 0.",
         *(
             Bearing("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
@@ -196,16 +234,22 @@ CLAIMS = (
     claim(
         "eq-42",
         "(42), (43)",
-        "Slipping at both points, the normal forces at floor and wall are the closed forms in α, and friction holds "
+        "Slipping at both points, the normal forces at floor and wall are the closed forms in α, "
+        "and friction holds "
         "the ball back along its orbit.",
         *bearings(
-            "settled", ("force_Ay", "force_Bx", "force_Az"), _along_branch, when=_SLIPS, by="slipping_branch.branch"
+            "settled",
+            ("force_Ay", "force_Bx", "force_Az"),
+            _along_branch,
+            when=_SLIPS,
+            by="slipping_branch.branch",
         ),
     ),
     claim(
         "prop-6",
         "Prop. 6, (49), (50)",
-        "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
+        "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, "
+        "going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
         *_value_bearings(_STATE, _SINKS, "(49), (50)"),
         Bearing(
@@ -223,7 +267,9 @@ CLAIMS = (
         "mirrored",
         "Props. 1, 4 and 5",
         "In a flow the other way round the ball settles in the mirror images of the same states.",
-        *_value_bearings(_STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"),
+        *_value_bearings(
+            _STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"
+        ),
         *_value_bearings((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
         Bearing("mirrored", "case", case, by="analytic.stable_solutions"),
     ),
@@ -239,7 +285,8 @@ DIAGRAMS = (
     claim(
         "fig-10",
         "Fig. 10",
-        "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall lie on the curves "
+        "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall "
+        "lie on the curves "
         "of Fig. 10.",
         *_value_bearings(("wall_spin",), all_of(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
         *_value_bearings(("wall_spin",), all_of(slips_first, _LEANS), "(91)", Case.SR),
@@ -256,8 +303,10 @@ DIAGRAMS = (
         claim(
             figure,
             f"Fig. {figure[-1]}",
-            f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
-            "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
+            f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball "
+            f"settles in every case "
+            "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor "
+            "counts as NR).",
             Bearing(
                 "plane",
                 "cases",
@@ -271,16 +320,25 @@ DIAGRAMS = (
     claim(
         "regions",
         "Figs. 7 and 8, (84)-(90)",
-        "In every region of Figs. 7 and 8 the stationary states of its label exist: balls settle in the attracting "
-        "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the floor.",
+        "In every region of Figs. 7 and 8 the stationary states of its label exist: balls settle "
+        "in the attracting "
+        "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the "
+        "floor.",
         Bearing("plane", "cases", _cases_in_region, by="analytic.bifurcation.diagram.case_map"),
         Bearing("edge", "edge_omega_c", _omega_c_beyond_fold, by="case_map, analytic.solution"),
-        Bearing("rates", "modes", lambda m: 2.0 * (Exists.SR in _region(m)), when=given(case="SR"), by="case_map"),
+        Bearing(
+            "rates",
+            "modes",
+            lambda m: 2.0 * (Exists.SR in _region(m)),
+            when=given(case="SR"),
+            by="case_map",
+        ),
     ),
     claim(
         "double-points",
         "Figs. 7 and 8, black dots",
-        "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j all thresholds are √(g/(jR)), and rolling ends.",
+        "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j all thresholds are √(g/(jR)), "
+        "and rolling ends.",
         Bearing("birth", "critical_drag", _drag_at_birth, by=_DOUBLE),
         Bearing(
             "birth",
@@ -289,7 +347,12 @@ DIAGRAMS = (
             when=lambda m: m.parameters.mu == m.parameters.eta,
             by=f"{_DOUBLE}, equal friction",
         ),
-        Bearing("thresholds", "omega_03", lambda m: bifurcation.double_points(m.parameters)[-1].omega_0, by=_DOUBLE),
+        Bearing(
+            "thresholds",
+            "omega_03",
+            lambda m: bifurcation.double_points(m.parameters)[-1].omega_0,
+            by=_DOUBLE,
+        ),
     ),
 )
 SECTIONS = {"Stationary states": CLAIMS, "Bifurcations": DIAGRAMS}

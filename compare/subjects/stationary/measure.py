@@ -1,8 +1,9 @@
-"""Settled states: where the ball ends from fixed starts at fixed flows, with the forces that mechanics determine.
+"""Settled states: where the ball ends from fixed starts at fixed flows, with the forces that
+mechanics determine.
 
-Flows are the same multiples of sqrt(g/R) for every set. States are measured with the coarse step, and once more with
-half of it: what that changes belongs to their uncertainty, as does what different starts make of the same state.
-"""
+Flows are the same multiples of sqrt(g/R) for every set. States are measured with the coarse step,
+and once more with half of it: what that changes belongs to their uncertainty, as does what
+different starts make of the same state."""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ from model.drag import QUADRATIC
 PROTOCOL = "settled"
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def measure(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """The case that every start ends in, and once for every distinct state its values."""
     sharp, refine = lab.effort.settled_sharp, lab.effort.settled_refine
     alike: dict[Attractor, list[Settled]] = {}
@@ -32,17 +35,24 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     starts = []
     for name, p in sets.items():
         for how, flows in lab.effort.settled_starts:
-            starts += [settling.named_start(name, p.replace(omega_0=flow / time_unit(p)), how) for flow in flows]
+            starts += [
+                settling.named_start(name, p.replace(omega_0=flow / time_unit(p)), how)
+                for flow in flows
+            ]
         spinning = State(slip_y=settling.SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
-    for state in settling.settle(lab, starts, Patience(sharp=sharp, loose=lab.effort.settled_loose)):
+    for state in settling.settle(
+        lab, starts, Patience(sharp=sharp, loose=lab.effort.settled_loose)
+    ):
         if state.failure:
             yield _unsettled(state, 1)
         else:
             yield _row(lab, state, "case", state.case)
         if why := "no values of it" if state.failure else _why_drag_fades(state):
             why = f"{state.case.name} at omega_0 = {state.start.p.omega_0:.4g} rad/s: {why}"
-            without[Attractor.of(state)] = Missing(PROTOCOL, state.start.set, why, len(state.values))
+            without[Attractor.of(state)] = Missing(
+                PROTOCOL, state.start.set, why, len(state.values)
+            )
         else:
             alike.setdefault(Attractor.of(state), []).append(state)
     yield from (each for kind, each in without.items() if kind not in alike)
@@ -51,9 +61,12 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for state, *_ in groups:
         x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
         again.append(replace(state.start, x0=x0.stacked()))
-    # With several time steps the limit is extrapolated from all of them, and half the step isn't needed here.
+    # With several time steps the limit is extrapolated from all of them, and half the step isn't
+    # needed here.
     patience = Patience(refine=refine, span=20.0, sharp=sharp)
-    refined = settling.settle(lab, again, patience) if refine > 1 else [state for state, *_ in groups]
+    refined = (
+        settling.settle(lab, again, patience) if refine > 1 else [state for state, *_ in groups]
+    )
     for same, fine in zip(groups, refined, strict=True):
         yield from _values(lab, same, fine)
 
@@ -73,11 +86,17 @@ class Attractor:
 
 
 def _why_drag_fades(state: Settled) -> str:
-    """Why drag fades as the ball settles; empty if it doesn't, and a round lasts for ten times 1/c or more."""
+    """Why drag fades as the ball settles; empty if it doesn't, and a round lasts for ten times 1/c
+    or more."""
     p = state.start.p
     if p.drag != QUADRATIC:
         return ""
-    Re = 2 * p.r / p.nu_f * math.hypot(State.of(state.mean).v_y, p.R * (State.of(state.mean).omega_c - p.omega_0))
+    Re = (
+        2
+        * p.r
+        / p.nu_f
+        * math.hypot(State.of(state.mean).v_y, p.R * (State.of(state.mean).omega_c - p.omega_0))
+    )
     rate = p.c * (p.C_D / 24 * Re)  # at which the fluid would stop a free ball
     return (
         ""
@@ -87,7 +106,8 @@ def _why_drag_fades(state: Settled) -> str:
 
 
 def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measurement | Missing]:
-    """Measured values of a settled state with half the step; uncertain by what step and start change, too."""
+    """Measured values of a settled state with half the step; uncertain by what step and start
+    change, too."""
     p = fine.start.p
     if fine.failure:
         yield _unsettled(fine, len(fine.values))
@@ -96,14 +116,24 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
         yield Missing(PROTOCOL, fine.start.set, why, len(fine.values))
     else:
         for group in settling.ERROR_GROUPS:
-            sizes = {n: settling.scale(n, p) for n in group if all(n in each.values for each in (fine, *same))}
-            changes = [abs(s.values[n].value - fine.values[n].value) / sizes[n] for s in same for n in sizes]
+            sizes = {
+                n: settling.scale(n, p)
+                for n in group
+                if all(n in each.values for each in (fine, *same))
+            }
+            changes = [
+                abs(s.values[n].value - fine.values[n].value) / sizes[n]
+                for s in same
+                for n in sizes
+            ]
             for n, size in sizes.items():
                 uncertainty = math.hypot(fine.values[n].uncertainty, max(changes) * size)
                 yield _row(lab, fine, n, Measured(fine.values[n].value, uncertainty))
 
 
-def mirrored(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def mirrored(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Case and values to which a ball settles in a flow the other way round."""
     starts = [
         settling.named_start(name, p.replace(omega_0=-flow / time_unit(p)), how)
@@ -123,10 +153,17 @@ def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
     """A record of a start from which the ball did not settle, and of what it did last."""
     p = each.start.p
     at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
-    return Missing(protocol, each.start.set, f"not settled at {at} (start: {each.start.name}): {each.failure}", rows)
+    return Missing(
+        protocol,
+        each.start.set,
+        f"not settled at {at} (start: {each.start.name}): {each.failure}",
+        rows,
+    )
 
 
-def _row(lab: Lab, each: Settled, quantity: str, value: Measured | float, protocol: str = PROTOCOL) -> Measurement:
+def _row(
+    lab: Lab, each: Settled, quantity: str, value: Measured | float, protocol: str = PROTOCOL
+) -> Measurement:
     """The measurement of a quantity of a settled state."""
     start, at = each.start, {"case": each.case.name, "start": each.start.name}
     return measurement(lab, protocol, start.set, start.p, quantity, value, [each.task], **at)

@@ -1,4 +1,5 @@
-"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides two attractors."""
+"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides
+two attractors."""
 
 from __future__ import annotations
 
@@ -18,15 +19,20 @@ from model import Case, Parameters
 
 _BY = "analytic.thresholds"
 SLIPPING = "floor force of settled slipping → 0"
-"""How omega_02 is measured where slipping at both points ends without a fold: that is a claim of its own."""
+"""How omega_02 is measured where slipping at both points ends without a fold: that is a claim of
+its own."""
 
 
 def _threshold(
-    quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, protocol: str = "thresholds"
+    quantity: str,
+    when: When = lambda m: m.conditions["by"] != SLIPPING,
+    protocol: str = "thresholds",
 ) -> Bearing:
     """A bearing on a threshold, which `analytic.thresholds` predicts."""
     by = f"{_BY}: {quantity}"
-    return Bearing(protocol, quantity, lambda m: float(getattr(thresholds_of(m), quantity)), when=when, by=by)
+    return Bearing(
+        protocol, quantity, lambda m: float(getattr(thresholds_of(m), quantity)), when=when, by=by
+    )
 
 
 def _unstable_quantity(m: Measurement) -> float:
@@ -38,9 +44,12 @@ def _unstable_quantity(m: Measurement) -> float:
 _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
     "margin": lambda omega, p: float(rolling_forces.margin(omega, p, omega)),
     "slip_margin": lambda omega, p: float(rolling_forces.slip_margin(omega, p, omega)),
-    "least_utilisation": lambda omega, p: 1 - float(rolling_forces.least_utilisation(omega, p, omega).utilisation),
+    "least_utilisation": lambda omega, p: (
+        1 - float(rolling_forces.least_utilisation(omega, p, omega).utilisation)
+    ),
 }
-"""Functions that change sign where the contacts can no longer hold a ball that rolls with the fluid."""
+"""Functions that change sign where the contacts can no longer hold a ball that rolls with the
+fluid."""
 
 
 def _end_of_rolling(name: str, p: Parameters) -> float:
@@ -59,12 +68,15 @@ CLAIMS = (
     claim(
         "rolling-holds",
         "(12), (13), (22)",
-        "Rolling at both points goes on just as long as forces within both friction cones admit it, for μ < 1.",
+        "Rolling at both points goes on just as long as forces within both friction cones admit "
+        "it, for μ < 1.",
         *(
             Bearing(
                 "thresholds",
                 quantity,
-                lambda m, name=name: theory(_end_of_rolling, name, m.parameters.replace(omega_0=1.0)),  # type: ignore[misc]
+                lambda m, name=name: theory(
+                    _end_of_rolling, name, m.parameters.replace(omega_0=1.0)
+                ),  # type: ignore[misc]
                 when=lambda m: m.parameters.mu < 1,
                 by=f"rolling_forces.{name}",
             )
@@ -81,23 +93,35 @@ CLAIMS = (
     claim(
         "table-5-NF2",
         "Table 5, NF2",
-        "At ω₀₂ the unstable state of slipping at both points merges with the state carried by the wall.",
+        "At ω₀₂ the unstable state of slipping at both points merges with the state carried by the "
+        "wall.",
         _threshold("omega_02", protocol="edge"),
     ),
     claim(
         "table-5-NT1",
         "Table 5, NT1",
-        "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in it; above, it "
+        "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in "
+        "it; above, it "
         "leaves it.",
         _threshold("omega_03"),
-        Bearing("thresholds", "lifts", lambda m: math.isnan(thresholds_of(m).omega_01), by=f"{_BY}: omega_01"),
+        Bearing(
+            "thresholds",
+            "lifts",
+            lambda m: math.isnan(thresholds_of(m).omega_01),
+            by=f"{_BY}: omega_01",
+        ),
     ),
     claim(
         "table-5-F",
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         _threshold("omega_04"),
-        Bearing("thresholds", "folds", lambda m: math.isfinite(thresholds_of(m).omega_04), by=f"{_BY}: omega_04"),
+        Bearing(
+            "thresholds",
+            "folds",
+            lambda m: math.isfinite(thresholds_of(m).omega_04),
+            by=f"{_BY}: omega_04",
+        ),
     ),
     claim(
         "sub-branches",
@@ -113,11 +137,20 @@ CLAIMS = (
     claim(
         "eta-critical",
         "(87), Fig. 7",
-        "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
+        "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the "
+        "state carried by "
         "the wall at ω₀₂, without a jump.",
-        Bearing("thresholds", "folds", lambda m: m.parameters.eta > thresholds_of(m).eta_cr, by=f"{_BY}: eta_cr"),
         Bearing(
-            "birth", "critical_drag", lambda m: bifurcation.critical_drag(m.parameters), by="diagram.critical_drag"
+            "thresholds",
+            "folds",
+            lambda m: m.parameters.eta > thresholds_of(m).eta_cr,
+            by=f"{_BY}: eta_cr",
+        ),
+        Bearing(
+            "birth",
+            "critical_drag",
+            lambda m: bifurcation.critical_drag(m.parameters),
+            by="diagram.critical_drag",
         ),
         _threshold("omega_02", given(by=SLIPPING)),
     ),
@@ -133,7 +166,10 @@ CLAIMS = (
             by=f"{_BY}: omega_01, omega_02",
         ),
         Bearing(
-            "thresholds", "folds", lambda m: bifurcation.number_of_folds(m.parameters), by="diagram.number_of_folds"
+            "thresholds",
+            "folds",
+            lambda m: bifurcation.number_of_folds(m.parameters),
+            by="diagram.number_of_folds",
         ),
     ),
 )

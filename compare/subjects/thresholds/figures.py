@@ -1,7 +1,8 @@
-"""Figs. 7 and 8, which stationary solutions exist and where runs ended, and the bifurcation diagrams of Figs. 9-12.
+"""Figs. 7 and 8, which stationary solutions exist and where runs ended, and the bifurcation
+diagrams of Figs. 9-12.
 
-Those show stationary solutions against the flow, by their spin on the wall (91), with measured states upon them.
-"""
+Those show stationary solutions against the flow, by their spin on the wall (91), with measured
+states upon them."""
 
 from __future__ import annotations
 
@@ -44,31 +45,41 @@ TINTS = {
 
 
 def select_plane(evidence: Evidence, figure: str) -> Diagram:
-    """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the first."""
+    """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the
+    first."""
     checks = evidence.checks.get(figure, ())
     chosen = tuple(c for c in checks if c.measurement.set == checks[0].measurement.set)
     return Diagram(figure, chosen[0].measurement.parameters if chosen else _THEORY, checks=chosen)
 
 
 def draw_plane(plane: Diagram) -> tuple[Figure, str]:
-    """A figure of regions with their names, thresholds between them, and points at which runs ended; and its caption.
+    """A figure of regions with their names, thresholds between them, and points at which runs
+    ended; and its caption.
 
     Friction of floor and wall are equal in Fig. 8; in Fig. 7 that of the floor is fixed.
     """
     p, equal = plane.p, plane.figure == "fig-8"
     figure = style.figure(6.4, 4.9)
     axes = figure.add_subplot()
-    regions(axes, p, equal, max((c.measurement.parameters.omega_0 for c in plane.checks), default=0.0))
-    for section, text in _SECTIONS.items() if not equal and p.replace(eta=_THEORY.eta) == _THEORY else ():
+    regions(
+        axes, p, equal, max((c.measurement.parameters.omega_0 for c in plane.checks), default=0.0)
+    )
+    for section, text in (
+        _SECTIONS.items() if not equal and p.replace(eta=_THEORY.eta) == _THEORY else ()
+    ):
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3",
                   transform=axes.get_xaxis_transform())  # fmt: skip
     marks = [
         (f"{engine}, as predicted", own, style.mark_of(engine))
-        for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items()
+        for engine, own in style.by_engine(
+            plane.checks, lambda check: check.measurement.engine
+        ).items()
     ]
     if failed := [check for check in plane.checks if not check.agrees]:
-        marks.append(("not as predicted", failed, {"marker": "x", "color": "#B3261E", "ms": 10, "mew": 2}))
+        marks.append(
+            ("not as predicted", failed, {"marker": "x", "color": "#B3261E", "ms": 10, "mew": 2})
+        )
     for label, checks, look in marks:
         places = [(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks]
         axes.plot(*np.transpose(places), ls="none", label=label, **{"ms": 4.5} | look)
@@ -76,32 +87,49 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
     style.dimensionless(axes, p, y=style.FREE_0)
     fixed = style.named(p, "j", "kappa") if equal else style.named(p, "mu", "j", "kappa")
     caption = (
-        f"Which stationary solutions exist over ω₀ and {'η = μ' if equal else 'η'}, for {fixed}. Lines: the "
-        "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two stable motions (SS, "
+        f"Which stationary solutions exist over ω₀ and {'η = μ' if equal else 'η'}, for {fixed}. "
+        f"Lines: the "
+        "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two "
+        "stable motions (SS, "
         "and SR or NR)."
     )
     if plane.checks:
         caption += f" Marks: the {len(plane.checks)} points at which runs were started; they ended "
-        caption += f"not as predicted in {len(failed)} (crossed)." if failed else "as predicted in all."
+        caption += (
+            f"not as predicted in {len(failed)} (crossed)." if failed else "as predicted in all."
+        )
     return figure, caption
 
 
 def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> None:
-    """Draw which cases exist over friction and flow, up to a flow at least, rad s-1, and the thresholds."""
+    """Draw which cases exist over friction and flow, up to a flow at least, rad s-1, and the
+    thresholds."""
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if equal else np.full(eta.shape, p.mu)
-    doubles = [each for each in bifurcation.double_points(p, equal) if each.eta > 0.01]  # lower ones set no scale
-    fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), highest, *(point.omega_0 for point in doubles)])
+    doubles = [
+        each for each in bifurcation.double_points(p, equal) if each.eta > 0.01
+    ]  # lower ones set no scale
+    fastest = 1.15 * max(
+        [2.2 * float(np.sqrt(p.g / p.R)), highest, *(point.omega_0 for point in doubles)]
+    )
     omega_0 = np.linspace(0.0, fastest, 901)
     plane = bifurcation.case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
     shades = ListedColormap([TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
-    grid: dict[str, Any] = {"origin": "lower", "aspect": "auto", "extent": (*eta[[0, -1]], *omega_0[[0, -1]])}
+    grid: dict[str, Any] = {
+        "origin": "lower",
+        "aspect": "auto",
+        "extent": (*eta[[0, -1]], *omega_0[[0, -1]]),
+    }
     shown = np.searchsorted(kinds, plane)
-    axes.imshow(shown, cmap=shades, vmin=0, vmax=len(kinds) - 1, interpolation="nearest", zorder=0, **grid)
+    axes.imshow(
+        shown, cmap=shades, vmin=0, vmax=len(kinds) - 1, interpolation="nearest", zorder=0, **grid
+    )
     both = (plane == _BISTABLE).astype(float)
     if both.any():
-        hatched = axes.contourf(eta, omega_0, both, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=0.2)
+        hatched = axes.contourf(
+            eta, omega_0, both, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=0.2
+        )
         hatched.set(edgecolor="0.75", linewidth=0)
     unit = np.sqrt(p.g / p.R)
     for name, curve in bifurcation.threshold_curves(p, mu, eta).items():
@@ -122,12 +150,19 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
 
 
 def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, kind: int) -> None:
-    """Write the cases at the widest spot of every connected region that has room for them, clear of sections.
+    """Write the cases at the widest spot of every connected region that has room for them, clear of
+    sections.
 
-    The region with two stable motions is too narrow: its name stands at the top, with a line to where it belongs.
-    """
-    names = [flag.name.replace("SS_BEYOND_FOLD", "SS*") for flag in Exists if flag & kind and flag.name]
-    text = "\n".join(["  ".join(names[:2]), "  ".join(names[2:])]) if len(names) > 2 else "  ".join(names)
+    The region with two stable motions is too narrow: its name stands at the top, with a line to
+    where it belongs."""
+    names = [
+        flag.name.replace("SS_BEYOND_FOLD", "SS*") for flag in Exists if flag & kind and flag.name
+    ]
+    text = (
+        "\n".join(["  ".join(names[:2]), "  ".join(names[2:])])
+        if len(names) > 2
+        else "  ".join(names)
+    )
     regions, count = ndimage.label(where)
     near = np.any([np.abs(eta - section) < 0.035 for section in _SECTIONS], axis=0)
     for k, box in zip(range(1, count + 1), ndimage.find_objects(regions), strict=True):
@@ -138,34 +173,50 @@ def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, 
         row, column = np.unravel_index(np.argmax(room), room.shape)
         here = float(eta[box[1]][column]), float(omega_0[box[0]][row])
         if room[row, column] > 7 and kind == _BISTABLE:
-            look: dict[str, Any] = {"bbox": style.HALO, "arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"}}
-            at: dict[str, Any] = {"xytext": (0.31, 0.97), "textcoords": "axes fraction", "va": "top"}
+            look: dict[str, Any] = {
+                "bbox": style.HALO,
+                "arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"},
+            }
+            at: dict[str, Any] = {
+                "xytext": (0.31, 0.97),
+                "textcoords": "axes fraction",
+                "va": "top",
+            }
             axes.annotate(f"{text}\nbistable", here, **at, **look, fontsize=9, zorder=6)
         elif room[row, column] > 7:
-            style.beside(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
+            style.beside(
+                axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0)
+            )
 
 
 RELEASED = _THEORY.replace(eta=0.43)
 """eta so little above j that the branch of SS, with (12) released, is whole."""
 _SHOWN = {
-    "fig-9": "off the floor, where y is free: sinking along the wall (NS) passes over to riding it (NR) at P2",
-    "fig-10": "on the floor, for η < j: rolling (RR) passes over to slipping (SS) at P3, SS turns back at the fold "
+    "fig-9": "off the floor, where y is free: sinking along the wall (NS) passes over to riding it "
+    "(NR) at P2",
+    "fig-10": "on the floor, for η < j: rolling (RR) passes over to slipping (SS) at P3, SS turns "
+    "back at the fold "
     "F and ends in SR at NF2",
-    "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR (dots)",
-    "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the branch of SS and its "
+    "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR "
+    "(dots)",
+    "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the "
+    "branch of SS and its "
     "bifurcations P3, F and NF2 reappear, and RR and SR exchange stability at NT1",
 }
 
 
 def draw_diagram(of: Diagram) -> tuple[Figure, str]:
-    """A bifurcation diagram, the spin on the wall over the flow, with both scales; and its caption."""
+    """A bifurcation diagram, the spin on the wall over the flow, with both scales; and its
+    caption."""
     figure, p = style.figure(5.8, 4.1), of.p
     if of.figure != "fig-9":
         only_where(p, of.figure == "fig-10")
     check_thresholds(p)
     axes, t = figure.add_subplot(), bifurcation.thresholds(p)
     guides, flows = _draw_branches(axes, p, of.figure)
-    axes.set(xlim=flows, ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
+    axes.set(
+        xlim=flows, ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X
+    )
     if of.figure == "fig-12":
         axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * guides["omega_01"] * p.R / p.r)
     style.points(axes, of.states)
@@ -180,12 +231,17 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     return figure, caption + style.marks(of.states)
 
 
-def _draw_branches(axes: Axes, p: Parameters, figure: str) -> tuple[dict[str, float], tuple[float, float]]:
-    """Draw all branches and special points of a diagram; return thresholds to be named and the flows shown, rad s-1."""
+def _draw_branches(
+    axes: Axes, p: Parameters, figure: str
+) -> tuple[dict[str, float], tuple[float, float]]:
+    """Draw all branches and special points of a diagram; return thresholds to be named and the
+    flows shown, rad s-1."""
     t, rolls, mark = bifurcation.thresholds(p), p.R / p.r, partial(style.mark, axes)
     guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
 
-    def draw(case: Case, begin: float, end: float, name: str, place: Place, line: Line = STABLE) -> None:
+    def draw(
+        case: Case, begin: float, end: float, name: str, place: Place, line: Line = STABLE
+    ) -> None:
         slip_x, flows = round_with_fluid(p, case, begin, end)  # the ball goes round with the fluid
         style.curve(axes, case, flows, spin(p, slip_x, flows), (name, place), line)
 
@@ -211,11 +267,17 @@ def _draw_branches(axes: Axes, p: Parameters, figure: str) -> tuple[dict[str, fl
             axes.plot([w], [spin_of(Case.NR, w, p)], **style.POINT)
         return {"omega_02": t.omega_02, "omega_03": t.omega_03}, (0.0, 1.6 * t.omega_03)
     if not np.isfinite(slipping_branch.states(np.linspace(-16.0, 16.0, 99), p)[1]).all():
-        raise GapError(f"with (12) released its branch of SS isn't whole: that needs an η nearer to j than {p.eta:g}")
+        raise GapError(
+            f"with (12) released its branch of SS isn't whole: that needs an η nearer to j than "
+            f"{p.eta:g}"
+        )
     curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
     guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
     omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
-    bottom, top = t.omega_02 - 0.5 * (omega_04 - t.omega_02), omega_04 + 0.35 * (omega_04 - t.omega_02)
+    bottom, top = (
+        t.omega_02 - 0.5 * (omega_04 - t.omega_02),
+        omega_04 + 0.35 * (omega_04 - t.omega_02),
+    )
     draw(Case.RR, bottom, t.omega_03, "RR", (0.5, (-5, 5)))
     draw(Case.RR, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
     slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
@@ -243,7 +305,9 @@ def _select_released(_: Evidence) -> Diagram:
 
 
 FIGURES = {
-    name: Drawing(title, partial(select_plane, figure=name), draw_plane, (name,), partial(Diagram, name))
+    name: Drawing(
+        title, partial(select_plane, figure=name), draw_plane, (name,), partial(Diagram, name)
+    )
     for name, title in (
         ("fig-7", "Fig. 7: regions over wall friction and flow"),
         ("fig-8", "Fig. 8: regions over equal friction and flow"),

@@ -27,7 +27,8 @@ def _gain(m: Measurement) -> complex:
 
 
 def _onset_bearing(rule: str, relation: Relation) -> Bearing:
-    """A bearing on the amplitude at which slip begins, if rolling ends by a rule of `Settings.leave_rolling`."""
+    """A bearing on the amplitude at which slip begins, if rolling ends by a rule of
+    `Settings.leave_rolling`."""
 
     def onset(m: Measurement) -> float:
         return theory(pulsation.slip_onset, m.parameters, m.at("f"), rule)
@@ -37,7 +38,8 @@ def _onset_bearing(rule: str, relation: Relation) -> Bearing:
 
 
 def _ramp_end(m: Measurement) -> float:
-    """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
+    """The flow at which a ramp ends slipping at both points by theory; LookupError if it
+    doesn't."""
     p, rate = m.parameters, m.at("rate")
     # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
     beyond = analytic.thresholds(p).omega_04 + 3.0 * response.ramp_coefficient(p) * rate ** (2 / 3)
@@ -58,17 +60,27 @@ CLAIMS = (
     claim(
         "pulsation-lag",
         "(23)",
-        "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag alone accelerates it "
+        "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag "
+        "alone accelerates it "
         "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
-        Bearing("pulsation", "gain", lambda m: abs(_gain(m)), by=f"{_BY}.response.transfer, pulsation.first_harmonic"),
+        Bearing(
+            "pulsation",
+            "gain",
+            lambda m: abs(_gain(m)),
+            by=f"{_BY}.response.transfer, pulsation.first_harmonic",
+        ),
         Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_gain(m)), by="the same"),
-        Bearing("unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE),
+        Bearing(
+            "unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE
+        ),
     ),
     claim(
         "pulsation-slip",
         "(23), (66), (67), (73), (82)",
-        "In a pulsating flow a rolling ball begins to slip once rolling needs more friction than floor and wall can "
-        "give: not below the amplitude at which slip first lasts, and not above the one up to which forces allow "
+        "In a pulsating flow a rolling ball begins to slip once rolling needs more friction than "
+        "floor and wall can "
+        "give: not below the amplitude at which slip first lasts, and not above the one up to "
+        "which forces allow "
         "rolling. Mostly the two are the same; in between Coulomb's law allows both.",
         _onset_bearing("slip-stability", Relation.AT_LEAST),
         _onset_bearing("infeasible", Relation.AT_MOST),
@@ -76,14 +88,17 @@ CLAIMS = (
     claim(
         "pulsation-limits",
         "(66), (67), (82)",
-        "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃, or falls to rest; in a fast one ω_c "
-        "hardly changes, and the ball slips when the drag of the fluid alone is too strong. No pulsation needs a "
+        "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃, or falls to rest; "
+        "in a fast one ω_c "
+        "hardly changes, and the ball slips when the drag of the fluid alone is too strong. No "
+        "pulsation needs a "
         "larger amplitude than a fast one.",
         *(
             Bearing(
                 "thresholds",
                 end,
-                # The greatest flow at which the ball slips in a very slow pulsation about four fifths of it.
+                # The greatest flow at which the ball slips in a very slow pulsation about four
+                # fifths of it.
                 lambda m: (
                     0.8 * m.parameters.omega_0
                     + pulsation.slow_onset(m.parameters.replace(omega_0=0.8 * m.parameters.omega_0))
@@ -104,15 +119,21 @@ CLAIMS = (
         Bearing(
             "bounds",
             "gamma_zero",
-            lambda m: m.at("omega_c") + pulsation.fast_onset(m.parameters.replace(omega_0=m.at("omega_c"))),
+            lambda m: (
+                m.at("omega_c")
+                + pulsation.fast_onset(m.parameters.replace(omega_0=m.at("omega_c")))
+            ),
             when=given(inner="RR", outer="RS", by="held"),
             by=f"{_BY}.pulsation.fast_onset",
         ),
         Bearing(
             "pulsation",
             "slip_amplitude",
-            # On rough floors rolling goes on while forces admit it, beyond the first slip that could last.
-            lambda m: theory(pulsation.slip_onset, m.parameters, 1e5 * m.parameters.c, "infeasible"),
+            # On rough floors rolling goes on while forces admit it, beyond the first slip that
+            # could last.
+            lambda m: theory(
+                pulsation.slip_onset, m.parameters, 1e5 * m.parameters.c, "infeasible"
+            ),
             relation=Relation.AT_MOST,
             by=f"{_BY}.pulsation.slip_onset, infeasible, at a frequency of 1e5 c",
         ),
@@ -131,7 +152,8 @@ CLAIMS = (
     claim(
         "jump-slipping",
         "(26), (38)-(42)",
-        "After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
+        "After a jump of the flow a ball that slips at both points overshoots its new reading and "
+        "rings.",
         *(
             Bearing(
                 "unsteady",

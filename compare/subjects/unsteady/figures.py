@@ -1,4 +1,5 @@
-"""Unsteady flow: how the ball follows a pulsation and when it slips, jumps of the flow, ramps past the fold."""
+"""Unsteady flow: how the ball follows a pulsation and when it slips, jumps of the flow, ramps past
+the fold."""
 
 from __future__ import annotations
 
@@ -25,11 +26,13 @@ _LASTS = 4.0, 56.0
 FREQUENCIES = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
 SHARES = 0.2, 0.4, Changes.ramp[0]
-"""Flows about which the jumps of a ball that slips are shown, as parts of the way from omega_01 to where it ends."""
+"""Flows about which the jumps of a ball that slips are shown, as parts of the way from omega_01 to
+where it ends."""
 
 
 def _ends_of_slipping(p: Parameters) -> tuple[float, float]:
-    """The flows between which balls slip at both points, rad s-1; nan where the wall's friction is too great."""
+    """The flows between which balls slip at both points, rad s-1; nan where the wall's friction is
+    too great."""
     t = bifurcation.thresholds(p)
     return t.omega_01, t.omega_02 if math.isnan(t.omega_04) else t.omega_04
 
@@ -52,11 +55,16 @@ def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     fastest = 0.86 * math.sqrt(p.g / p.R)
     f = np.geomspace(max(0.04 * p.c, fastest / 3e3), fastest, FREQUENCIES).tolist()
     onsets = [pulsation.slip_onset(p, each) for each in f]
-    return f, onsets, [pulsation.mean_error(p, 1.5 * a, each) for each, a in zip(f, onsets, strict=True)]
+    return (
+        f,
+        onsets,
+        [pulsation.mean_error(p, 1.5 * a, each) for each, a in zip(f, onsets, strict=True)],
+    )
 
 
 def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
-    """A figure of pulsations: gain, phase, onset of slip and mean error over frequency; and its caption."""
+    """A figure of pulsations: gain, phase, onset of slip and mean error over frequency; and its
+    caption."""
     if not 0 < stable_ends(of.p)[0] < math.inf:
         raise GapError("there is no flow at which two-point rolling ends")
     p = _rolling(of)
@@ -71,7 +79,10 @@ def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
         k = 330 if case is Case.RR else 60
         style.beside(gain, f[k], abs(ratio[k]), case.name, (0, -8), style.COLOURS[case])
     style.curve(onset, Case.RR, frequencies, onsets)
-    limits = (pulsation.slow_onset(p), "slow", f[225], 3), (pulsation.fast_onset(p), "fast", f[75], -3)
+    limits = (
+        (pulsation.slow_onset(p), "slow", f[225], 3),
+        (pulsation.fast_onset(p), "fast", f[75], -3),
+    )
     for limit, way, at, shift in limits:
         onset.axhline(limit, **style.GUIDE)
         style.beside(onset, at, limit, f"limit of {way} pulsations", (0, shift))
@@ -88,13 +99,20 @@ def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
     onset.margins(y=0.12)
     error.set(ylabel="mean of $\\omega_c - \\omega_0$ (rad/s)", xlabel="frequency (Hz)")
     style.legend(gain, loc="lower left")
-    both = f", and where it slips at both (SS, ω₀ = {cases[Case.SS].omega_0:.3g} rad/s)" if Case.SS in cases else ""
+    both = (
+        f", and where it slips at both (SS, ω₀ = {cases[Case.SS].omega_0:.3g} rad/s)"
+        if Case.SS in cases
+        else ""
+    )
     return figure, style.caption(
         p,
-        f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, "
+        f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase "
+        f"lag of ω_c, "
         f"where it rolls at both points (RR){both}. "
-        "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast "
-        "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
+        "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits "
+        "for slow and fast "
+        "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: "
+        "computed).",
         states=of.states,
     )
 
@@ -105,34 +123,72 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
     check_thresholds(of.p)
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
     t = np.linspace(0.0, min(_LASTS[0] / of.p.c, _LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
-    jump.plot(t, response.step_response(_rolling(of), Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
+    jump.plot(
+        t,
+        response.step_response(_rolling(of), Case.RR, t),
+        color=style.COLOURS[Case.RR],
+        lw=2,
+        label="RR",
+    )
     flows = [_slipping(of.p, share) for share in SHARES]
     flows[0] = next((m.parameters for m in of.states if m.quantity == "jump_height"), flows[0])
     for p, shade in zip(flows, (0.4, 0.7, 1.0), strict=True):
         y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
-        jump.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {p.omega_0:.3g} rad/s")
+        jump.plot(
+            t,
+            y,
+            color=style.COLOURS[Case.SS],
+            alpha=shade,
+            lw=1.8,
+            label=f"SS, {p.omega_0:.3g} rad/s",
+        )
     if of.motions:
         up, down = (motion.load() for motion in of.motions[-2:])  # with the finer step
         shown = np.flatnonzero(up.time <= t[-1])[::5]
         jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="mujoco")
     jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$ / final change")
     style.legend(jump)
-    (low, fold), measured = _ends_of_slipping(of.p), [m for m in of.states if m.quantity == "ramp_end"]
+    (low, fold), measured = (
+        _ends_of_slipping(of.p),
+        [m for m in of.states if m.quantity == "ramp_end"],
+    )
     p = measured[0].parameters if measured else flows[-1]
     slipping(ramp, of.p, lambda slip_x, omega_c: omega_c)
-    rates, passed, start = np.array([0.002, 0.01, 0.04]) * p.c * (fold - low), [], analytic.solution(p, Case.SS)
+    rates, passed, start = (
+        np.array([0.002, 0.01, 0.04]) * p.c * (fold - low),
+        [],
+        analytic.solution(p, Case.SS),
+    )
     last = _slipping(of.p, Changes.ramp[1]).omega_0
     for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
         lasts = (last - p.omega_0) / rate
         flow = Flow.ramp(p.omega_0, last, lasts)
         run = analytic.simulate(p, start.x, lasts, flow, sample_interval=lasts / 5000, rtol=1e-6)
         passed.append(caught_up(run) - fold)
-        ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=f"rising by {rate:.2g} rad/s²")
+        ramp.plot(
+            flow(run.time),
+            run.omega_c,
+            "k",
+            alpha=shade,
+            lw=1.5,
+            label=f"rising by {rate:.2g} rad/s²",
+        )
     beyond = np.array([p.omega_0, last])
     style.curve(ramp, Case.NR, beyond, beyond, ("NR", (0.9, (-5, 5))))
-    ramp.set(xlim=beyond, ylim=(0.7 * start.state.omega_c, 1.1 * last), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    ramp.set(
+        xlim=beyond,
+        ylim=(0.7 * start.state.omega_c, 1.1 * last),
+        xlabel=style.OMEGA_0,
+        ylabel=style.OMEGA_C,
+    )
     style.guides(ramp, {"omega_04": fold})
-    law.loglog(rates, response.ramp_coefficient(of.p) * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
+    law.loglog(
+        rates,
+        response.ramp_coefficient(of.p) * rates ** (2 / 3),
+        color="0.4",
+        ls="--",
+        label="slow ramps",
+    )
     law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
     style.points(law, measured, lambda m: m.at("rate"), lambda m: m.value - fold)
     law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
@@ -142,13 +198,18 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         axis.set_minor_formatter(NullFormatter())
     for axes in (ramp, law):
         style.legend(axes, loc="upper left")
-    dots = " Dots: mujoco, half the difference of two small jumps, up and down." if of.motions else ""
+    dots = (
+        " Dots: mujoco, half the difference of two small jumps, up and down." if of.motions else ""
+    )
     return figure, style.caption(
         of.p,
-        "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls approaches its "
-        f"new reading slowly, one that slips at both points swings.{dots} Middle: ramps of the flow past the fold "
+        "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls "
+        "approaches its "
+        f"new reading slowly, one that slips at both points swings.{dots} Middle: ramps of the "
+        f"flow past the fold "
         "ω₀₄; the faster the ramp, the later the ball catches up; dashed: SS where it is unstable. "
-        "Right: by how much the flow has passed ω₀₄ when the ball's lag has halved; dashed: the law of slow ramps, "
+        "Right: by how much the flow has passed ω₀₄ when the ball's lag has halved; dashed: the "
+        "law of slow ramps, "
         "2.338 (ρ²/(ab))^(1/3).",
         states=measured,
     )
@@ -160,9 +221,16 @@ def _measured(protocol: str, evidence: Evidence) -> Iterator[Measurement]:
 
 
 FIGURES = {
-    name: diagram(name, f"Unsteady flow: {title}", "reference", draw, claims, partial(_measured, name))
+    name: diagram(
+        name, f"Unsteady flow: {title}", "reference", draw, claims, partial(_measured, name)
+    )
     for name, title, draw, claims in (
-        ("pulsation", "pulsation", draw_pulsation, ("pulsation-lag", "pulsation-slip", "pulsation-mean")),
+        (
+            "pulsation",
+            "pulsation",
+            draw_pulsation,
+            ("pulsation-lag", "pulsation-slip", "pulsation-mean"),
+        ),
         ("unsteady", "jumps and ramps", draw_unsteady, ("jump-slipping", "ramp-fold")),
     )
 }

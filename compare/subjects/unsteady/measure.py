@@ -1,14 +1,15 @@
 """Flows that change: pulsation, jumps, ramps.
 
-* A ball rolls in a pulsating flow: how it follows, at which amplitude it slips, what it then reads on average. A small
-  pulsation about a fixed part of the flow at which two-point rolling ends shows how the ball follows; every other run
-  starts from there, so that it need not settle. With Stokes' law the response is linear; with another one the amplitude
-  is raised step by step until the ball slips, and each time settled anew. The ball slips where the engine shows slip at
-  both contacts. Frequencies are powers of two.
-* The flow changes once by a small jump. Half the difference of two runs, after a jump up and one down, is free of what
-  goes with the square of the jump.
-* A ramp starts from settled slipping well below the end of it, and ends well above; the ball has left slipping once it
-  lags by half as much as at first.
+* A ball rolls in a pulsating flow: how it follows, at which amplitude it slips, what it then reads
+  on average. A small pulsation about a fixed part of the flow at which two-point rolling ends shows
+  how the ball follows; every other run starts from there, so that it need not settle. With Stokes'
+  law the response is linear; with another one the amplitude is raised step by step until the ball
+  slips, and each time settled anew. The ball slips where the engine shows slip at both contacts.
+  Frequencies are powers of two.
+* The flow changes once by a small jump. Half the difference of two runs, after a jump up and one
+  down, is free of what goes with the square of the jump.
+* A ramp starts from settled slipping well below the end of it, and ends well above; the ball has
+  left slipping once it lags by half as much as at first.
 """
 
 from __future__ import annotations
@@ -40,10 +41,16 @@ class Changes:
     """Flows, and how they change."""
 
     rolls_at: float = 0.85  # flow of rolling, in units of that at which it ends
-    slips_at: float = 0.3  # of slipping, as a part of the way from there to where the wall carries the ball
-    ramp: tuple[float, float] = (0.75, 1.35)  # its ends, as parts of the way to where slipping ends in a jump
-    # Size of a jump from rolling divided by the flow, and from slipping by a third of the range of flows in which it
-    # is: the response to a small jump is wanted, and near the ends of that range it is far from linear.
+    slips_at: float = (
+        0.3  # of slipping, as a part of the way from there to where the wall carries the ball
+    )
+    ramp: tuple[float, float] = (
+        0.75,
+        1.35,
+    )  # its ends, as parts of the way to where slipping ends in a jump
+    # Size of a jump from rolling divided by the flow, and from slipping by a third of the range of
+    # flows in which it is: the response to a small jump is wanted, and near the ends of that range
+    # it is far from linear.
     jump: float = 1e-3
 
 
@@ -51,19 +58,29 @@ class Changes:
 class Driving:
     """How balls are driven by a pulsation."""
 
-    raised: float = 1.5  # factor by which the amplitude is raised at a time where the law of drag isn't Stokes'
+    raised: float = (
+        1.5  # factor by which the amplitude is raised at a time where the law of drag isn't Stokes'
+    )
     periods: int = 3  # in a run
     rounds: int = 5  # successive runs until it is settled, the last with half the step
-    lasting: int = 5  # samples for which slip must last to count: friction may be full for a moment before
+    lasting: int = (
+        5  # samples for which slip must last to count: friction may be full for a moment before
+    )
     phases: int = 8  # of a period at which the motion is started anew from its state
 
 
-def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def pulsation(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
     small = []  # about a flow at which a ball rolls, at several frequencies
     for name, p in sets.items():
         if (end := _threshold(records, name, "omega_01")) is None:
-            yield Missing("pulsation", name, "no flow was measured at which two-point rolling ends by slipping")
+            yield Missing(
+                "pulsation",
+                name,
+                "no flow was measured at which two-point rolling ends by slipping",
+            )
             continue
         q = p.replace(omega_0=Changes.rolls_at * end)
         room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
@@ -75,20 +92,32 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
             yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
             continue
         gain, lag, sure = abs(each.ratio), -cmath.phase(each.ratio), each.uncertainty
-        for quantity, value in (("gain", Measured(gain, sure)), ("phase_lag", Measured(lag, sure / gain))):
+        for quantity, value in (
+            ("gain", Measured(gain, sure)),
+            ("phase_lag", Measured(lag, sure / gain)),
+        ):
             yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
     rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
-    for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
+    for each, bracket in zip(
+        rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True
+    ):
         onset = _onset(lab, each, bracket)
         yield onset
         if isinstance(onset, Missing):
             continue
         # The predicted amplitude may be a tenth smaller than the measured one.
-        if COVERAGE * onset.uncertainty <= QUANTITIES["slip_amplitude"].resolves * 0.9 * onset.value:
+        if (
+            COVERAGE * onset.uncertainty
+            <= QUANTITIES["slip_amplitude"].resolves * 0.9 * onset.value
+        ):
             slipping.append((each, 1.5 * onset.value))
         else:
             at = f"a pulsation at {each.frequency:g} Hz"
-            yield Missing("pulsation", each.set, f"slip in {at} begins at no definite amplitude: no mean reading there")
+            yield Missing(
+                "pulsation",
+                each.set,
+                f"slip in {at} begins at no definite amplitude: no mean reading there",
+            )
     yield from mean_errors(lab, slipping)
 
 
@@ -126,18 +155,27 @@ class Pulsation:
         """The pulsation with a ball whose omega_c is this as a period begins, rad s-1."""
         return replace(self, lead=(omega_c - self.p.omega_0) / self.amplitude)
 
-    def task(self, lab: Lab, amplitude: float, x: Array, timing: Timing, largest: float = 0.0) -> Task:
-        """A run from a state, with as many steps in a period, a power of two, as the `largest` amplitude needs."""
+    def task(
+        self, lab: Lab, amplitude: float, x: Array, timing: Timing, largest: float = 0.0
+    ) -> Task:
+        """A run from a state, with as many steps in a period, a power of two, as the `largest`
+        amplitude needs."""
         fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
         least = max(lab.effort.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest)
         step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * timing.refine)
         flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, timing.phase)
         samples = round(timing.samples * timing.periods)
-        return lab.task(self.p, x, timing.periods / self.frequency, step, flow=flow, samples=samples)
+        return lab.task(
+            self.p, x, timing.periods / self.frequency, step, flow=flow, samples=samples
+        )
 
-    def row(self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float) -> Measurement:
+    def row(
+        self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float
+    ) -> Measurement:
         """A measurement in this pulsation."""
-        return measurement(lab, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at)
+        return measurement(
+            lab, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at
+        )
 
 
 def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
@@ -147,14 +185,24 @@ def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing
         return Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
     alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
     if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
-        return Missing("pulsation", each.set, f"in {at} one contact slips before both do, too little to tell when")
+        return Missing(
+            "pulsation",
+            each.set,
+            f"in {at} one contact slips before both do, too little to tell when",
+        )
     # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
     unseen = (math.pi * Driving.lasting / lab.effort.pulsation_samples) ** 2 / 2 * place.value
-    return each.row(lab, "slip_amplitude", Measured(place.value, math.hypot(place.uncertainty, unseen)), bracket.tasks)
+    return each.row(
+        lab,
+        "slip_amplitude",
+        Measured(place.value, math.hypot(place.uncertainty, unseen)),
+        bracket.tasks,
+    )
 
 
 class Round(NamedTuple):
-    """A run in a pulsation, and the limit of omega_c as its periods begin, from which the next one starts."""
+    """A run in a pulsation, and the limit of omega_c as its periods begin, from which the next one
+    starts."""
 
     task: Task
     run: Trajectory
@@ -164,20 +212,27 @@ class Round(NamedTuple):
 def _settled_rounds(
     lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
 ) -> list[list[Round] | str]:
-    """Run pulsations until they are settled: of each the last two rounds, the second with half the step, or its error.
-    A ball that slips goes on with the rest of its last state.
-    """
-    states, seen = [each.start(a) for each, a in driven], list[list[Round] | str]([[]] * len(driven))
+    """Run pulsations until they are settled: of each the last two rounds, the second with half the
+    step, or its error. A ball that slips goes on with the rest of its last state."""
+    states, seen = (
+        [each.start(a) for each, a in driven],
+        list[list[Round] | str]([[]] * len(driven)),
+    )
     for n in range(Driving.rounds):
         last = n == Driving.rounds - 1
-        timing = Timing(Driving.periods, samples, refine * (lab.effort.pulsation_refine if last else 1))
-        todo = [(k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)]
+        timing = Timing(
+            Driving.periods, samples, refine * (lab.effort.pulsation_refine if last else 1)
+        )
+        todo = [
+            (k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)
+        ]
         tasks = [each.task(lab, a, states[k], timing) for k, each, a, _ in todo]
         for (k, each, a, before), task, run in zip(todo, tasks, lab.each(tasks), strict=True):
             if isinstance(run, str):
                 seen[k] = f"the run {run}"
                 continue
-            # As the periods begin omega_c goes on as a geometric sequence to its limit, or diverges.
+            # As the periods begin omega_c goes on as a geometric sequence to its limit, or
+            # diverges.
             one, two, omega_c = run.omega_c[samples::samples][-3:].tolist()
             first, second = two - one, omega_c - two
             omega_c += second * second / (first - second) if abs(second) < abs(first) else 0.0
@@ -191,30 +246,56 @@ def _as_followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """Pulsations with omega_c at the beginning of a period as runs show it."""
     followed, samples = [], lab.effort.pulsation_samples
     last = slice(-2 * samples, None)
-    rounds = _settled_rounds(lab, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False)
+    rounds = _settled_rounds(
+        lab, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False
+    )
     for each, seen in zip(pulsations, rounds, strict=True):
         if isinstance(seen, str):
             followed.append(replace(each, failure=seen))
             continue
         first, ratio = (
-            complex(2j * np.mean(x[last] * np.exp(-2j * math.pi * each.frequency * t[last])) / each.amplitude)
+            complex(
+                2j
+                * np.mean(x[last] * np.exp(-2j * math.pi * each.frequency * t[last]))
+                / each.amplitude
+            )
             for t, x in ((run.time, run.omega_c) for _, run, _ in seen)
         )
-        failure = "" if rolls_on(seen[-1].run) else "a ball slips in a pulsation half as large as in a slow one"
-        new, change, tasks = each.with_omega_c(seen[-1].omega_c), abs(ratio - first), tuple(task for task, *_ in seen)
+        failure = (
+            ""
+            if rolls_on(seen[-1].run)
+            else "a ball slips in a pulsation half as large as in a slow one"
+        )
+        new, change, tasks = (
+            each.with_omega_c(seen[-1].omega_c),
+            abs(ratio - first),
+            tuple(task for task, *_ in seen),
+        )
         followed.append(replace(new, ratio=ratio, uncertainty=change, failure=failure, tasks=tasks))
     return followed
 
 
 def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
-    """Pulsations of the largest of rising amplitudes at which the ball still rolls, if drag isn't Stokes'."""
-    raised, todo = list(pulsations), [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
+    """Pulsations of the largest of rising amplitudes at which the ball still rolls, if drag isn't
+    Stokes'."""
+    raised, todo = (
+        list(pulsations),
+        [k for k, each in enumerate(pulsations) if each.p.drag != STOKES],
+    )
     for _ in range(12):
         higher = [
-            replace(each, amplitude=Driving.raised * each.amplitude, lead=each.lead * Driving.raised**each.power)
+            replace(
+                each,
+                amplitude=Driving.raised * each.amplitude,
+                lead=each.lead * Driving.raised**each.power,
+            )
             for each in (raised[k] for k in todo)
         ]
-        still = [(k, each) for k, each in zip(todo, _as_followed(lab, higher), strict=True) if not each.failure]
+        still = [
+            (k, each)
+            for k, each in zip(todo, _as_followed(lab, higher), strict=True)
+            if not each.failure
+        ]
         for k, each in still:
             raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, Driving.raised))
         todo = [k for k, _ in still]
@@ -222,33 +303,45 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
 
 
 def _search(lab: Lab, each: Pulsation) -> Search:
-    """A search for the amplitude at which slip begins, in runs of a period and a half without the first sixth."""
+    """A search for the amplitude at which slip begins, in runs of a period and a half without the
+    first sixth."""
 
     def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
         timing = Timing(1.5 * attempt.time, lab.effort.pulsation_samples, 2 * attempt.refine)
         return each.task(lab, amplitude, each.start(amplitude), timing, largest=first.high)
 
     if each.p.drag == STOKES:
-        # Slip may begin from about half the largest amplitude on: the width is taken relative to that.
+        # Slip may begin from about half the largest amplitude on: the width is taken relative to
+        # that.
         largest = each.reach / abs(each.ratio)
         first, size = Bracket(0.0, largest), largest / 2
     else:
-        first, size = Bracket(0.99 * each.amplitude, Driving.raised * each.amplitude), each.amplitude
+        first, size = (
+            Bracket(0.99 * each.amplitude, Driving.raised * each.amplitude),
+            each.amplitude,
+        )
     return Search(first, task, rolls_on, lab.effort.pulsation_width * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
-    """Whether after the first sixth the ball nowhere slips at both points or leaves the floor for `lasting` samples."""
-    gone = np.isin(run.case[run.time > run.time[-1] / 6], [Case.SS, *(case for case in Case if case.A is Contact.N)])
+    """Whether after the first sixth the ball nowhere slips at both points or leaves the floor for
+    `lasting` samples."""
+    gone = np.isin(
+        run.case[run.time > run.time[-1] / 6],
+        [Case.SS, *(case for case in Case if case.A is Contact.N)],
+    )
     return bool(np.convolve(gone, np.ones(Driving.lasting)).max() < Driving.lasting)
 
 
-def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterator[Measurement | Missing]:
-    """Means over the last period in pulsations of these amplitudes, with both steps, once periods repeat.
+def mean_errors(
+    lab: Lab, slipping: Sequence[tuple[Pulsation, float]]
+) -> Iterator[Measurement | Missing]:
+    """Means over the last period in pulsations of these amplitudes, with both steps, once periods
+    repeat.
 
-    The engine may remember what a state doesn't hold, such as how strongly floor and wall press against each other. How
-    much the mean depends on it is seen in periods that start anew from states of the last one.
-    """
+    The engine may remember what a state doesn't hold, such as how strongly floor and wall press
+    against each other. How much the mean depends on it is seen in periods that start anew from
+    states of the last one."""
 
     phases = Driving.phases
     samples = 8 * phases
@@ -263,7 +356,11 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
     for (each, amplitude), seen in zip(slipping, rounds, strict=True):
         at = f"the mean reading at {each.frequency:g} Hz"
         if isinstance(seen, str) or isinstance(again := next(begun), str):
-            yield Missing("pulsation", each.set, f"{at}: {seen if isinstance(seen, str) else f'the run {again}'}")
+            yield Missing(
+                "pulsation",
+                each.set,
+                f"{at}: {seen if isinstance(seen, str) else f'the run {again}'}",
+            )
             continue
         (_, run, _), (task, halved, _) = seen
         turns = np.array([period.theta[-1] - period.theta[0] for period in again])
@@ -272,7 +369,8 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         value = mean - each.p.omega_0
         spread = float(np.abs(turns * each.frequency - usual).max())
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
-        # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by half of that part.
+        # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by
+        # half of that part.
         within = abs(value) / round(task.steps / Driving.periods) if task.settings.timestep else 0.0
         error = Measured(value, drift + within)
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
@@ -280,18 +378,33 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
 
 
 def _threshold(records: Records, set: str, threshold: str) -> float | None:
-    """The flow (rad s-1) that the protocol `thresholds` measured as this threshold of a set, or None."""
-    return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
+    """The flow (rad s-1) that the protocol `thresholds` measured as this threshold of a set, or
+    None."""
+    return next(
+        (m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None
+    )
 
 
-def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at which a ramp ends it."""
-    flows: dict[str, tuple[float, float, float]] = {}  # where slipping begins, the wall carries the ball, a jump ends
-    trials, starts = list[Trial](), list[Start]()  # from rest, to settle slipping before a jump or a ramp
+def jumps(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at
+    which a ramp ends it."""
+    flows: dict[
+        str, tuple[float, float, float]
+    ] = {}  # where slipping begins, the wall carries the ball, a jump ends
+    trials, starts = (
+        list[Trial](),
+        list[Start](),
+    )  # from rest, to settle slipping before a jump or a ramp
     for name, p in sets.items():
         begins, holds, ends = (_threshold(records, name, f"omega_0{n}") for n in (1, 2, 4))
         if begins is None or holds is None:
-            yield Missing("unsteady", name, "no flows were measured between which the ball slips at both points")
+            yield Missing(
+                "unsteady",
+                name,
+                "no flows were measured between which the ball slips at both points",
+            )
             continue
         flows[name] = begins, holds, ends or math.nan
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
@@ -301,7 +414,11 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         q = p.replace(omega_0=begins + Changes.slips_at * (holds - begins))
         starts.append(Start(name, q, "jump", np.zeros(8)))
         if ends is None:
-            yield Missing("unsteady", name, "no flow was measured at which slipping at both points ends in a jump")
+            yield Missing(
+                "unsteady",
+                name,
+                "no flow was measured at which slipping at both points ends in a jump",
+            )
         else:
             q = p.replace(omega_0=begins + Changes.ramp[0] * (ends - begins))
             starts.append(Start(name, q, "ramp", np.zeros(8)))
@@ -312,9 +429,13 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             continue
         begins, holds, ends = flows[start.set]
         # At both walls to the last digit.
-        begun = replace(start, x0=State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked())
+        begun = replace(
+            start, x0=State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
+        )
         if start.name == "jump":
-            trials.append(_jump(lab, replace(begun, name="SS"), Changes.jump / 3 * (holds - begins)))
+            trials.append(
+                _jump(lab, replace(begun, name="SS"), Changes.jump / 3 * (holds - begins))
+            )
         else:
             trials += _ramps(lab, begun, begins, ends)
     for result in carry_out(lab, "unsteady", trials):
@@ -324,7 +445,9 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         trial, coarse, fine = result.trial, result.coarse, result.fine
         if trial.flow is None:
             for quantity in ("jump_delay",) if trial.name == "RR" else ("jump_peak", "jump_height"):
-                row = result.row(lab, quantity, with_step_error(coarse[quantity].value, fine[quantity]))
+                row = result.row(
+                    lab, quantity, with_step_error(coarse[quantity].value, fine[quantity])
+                )
                 yield if_found(row, f"{quantity} in {trial.name}: no peak")
         elif math.isfinite(coarse) and math.isfinite(fine):
             yield result.row(lab, "ramp_end", with_step_error(coarse, Measured(fine, 0.0)))
@@ -334,16 +457,32 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
 
 
 def _jump(lab: Lab, start: Start, size: float) -> Trial:
-    """The trial of jumps of the flow up and down, rad s-1, from a state in the case that the start is named by."""
+    """The trial of jumps of the flow up and down, rad s-1, from a state in the case that the start
+    is named by."""
     p, t_end = start.p, rounded_duration(start.p, lab.effort.unsteady_lasts)
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
-    samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
+    samples = max(
+        4000, round(t_end / (4 * coarse_step(p)))
+    )  # drag may be weak, and peaks come soon
     refine, at = lab.effort.unsteady_refine, {"case": start.name}
-    return Trial(start.set, p, start.name, start.x0, t_end, refine, samples, _jump_quantities, None, sides, at)
+    return Trial(
+        start.set,
+        p,
+        start.name,
+        start.x0,
+        t_end,
+        refine,
+        samples,
+        _jump_quantities,
+        None,
+        sides,
+        at,
+    )
 
 
 def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial]:
-    """Trials of ramps of the flow at several rates, rad s-2, from settled SS, which is between two flows."""
+    """Trials of ramps of the flow at several rates, rad s-2, from settled SS, which is between two
+    flows."""
     p, span = start.p, ends - begins
     last = begins + Changes.ramp[1] * span
     for rate in lab.effort.unsteady_rates:
@@ -354,19 +493,24 @@ def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:
-    """The part of omega_c (n,) that has the sign of the jump, relative to its last value: from 0 to 1."""
+    """The part of omega_c (n,) that has the sign of the jump, relative to its last value: from 0 to
+    1."""
     odd = up.omega_c - down.omega_c
     return np.asarray(odd / odd[-1])
 
 
 def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
-    """The delay; time and height of the highest peak, nan where there is none in the first half of the runs."""
+    """The delay; time and height of the highest peak, nan where there is none in the first half of
+    the runs."""
     t, y = up.time, odd_part(up, down)
     # Forces act in the middle of a step: times are known to half a finer step.
     late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
     k, later = peaks(y)
     highest = (k == y.argmax()) & (k < len(t) // 2)
-    at, height = (np.append(each[highest], math.nan)[0] for each in (t[k] + later * (t[1] - t[0]), top(y, k, later)))
+    at, height = (
+        np.append(each[highest], math.nan)[0]
+        for each in (t[k] + later * (t[1] - t[0]), top(y, k, later))
+    )
     return {
         "jump_delay": Measured(float(np.trapezoid(1 - y, t)), late),
         "jump_peak": Measured(float(at), late),
@@ -375,7 +519,8 @@ def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
 
 
 def caught_up(run: Trajectory) -> float:
-    """The flow in rad s-1 at which the lag has fallen to half of what it was at first; nan if it never does."""
+    """The flow in rad s-1 at which the lag has fallen to half of what it was at first; nan if it
+    never does."""
     lag = run.header.flow(run.time) - run.omega_c
     below = np.flatnonzero(lag < lag[0] / 2)
     if not len(below):
@@ -386,5 +531,7 @@ def caught_up(run: Trajectory) -> float:
 
 PROTOCOLS = (
     Protocol("pulsation", pulsation, ("thresholds",), cost=7),
-    Protocol("unsteady", jumps, ("thresholds",), drawn=lambda m: m.quantity == "jump_height", cost=5),
+    Protocol(
+        "unsteady", jumps, ("thresholds",), drawn=lambda m: m.quantity == "jump_height", cost=5
+    ),
 )

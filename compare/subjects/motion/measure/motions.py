@@ -1,13 +1,13 @@
-"""The equations of motion themselves, in all nine cases, by the engine's own contacts; and landings.
+"""The equations of motion themselves, in all nine cases, by the engine's own contacts; and
+landings.
 
-For `field`, balls start at random states of every case and move freely for a few hundredths of a second. In short
-windows during which the case does not change, polynomials through the samples give the state, its rate of change and
-the contact forces at the centre of the window.
+For `field`, balls start at random states of every case and move freely for a few hundredths of a
+second. In short windows during which the case does not change, polynomials through the samples give
+the state, its rate of change and the contact forces at the centre of the window.
 
-For `motions`, motions from fixed starts are cut into short pieces, each of which begins and ends away from changes of
-case, at which friction builds up or dies out. For `impacts`, a landing is looked at a few steps after the contact has
-closed, at the same moment with two time steps.
-"""
+For `motions`, motions from fixed starts are cut into short pieces, each of which begins and ends
+away from changes of case, at which friction builds up or dies out. For `impacts`, a landing is
+looked at a few steps after the contact has closed, at the same moment with two time steps."""
 
 from __future__ import annotations
 
@@ -53,19 +53,25 @@ class Windows:
     seed: int = 53  # of the random states
     centres: tuple[int, ...] = (16, 40, 64)
     around: int = 4  # steps in which the case doesn't change, either: friction has built up
-    # Largest change of a slip, and of that which friction alone would make, divided by the slip: where slip is about to
-    # vanish, or very small, friction turns too fast.
+    # Largest change of a slip, and of that which friction alone would make, divided by the slip:
+    # where slip is about to vanish, or very small, friction turns too fast.
     turn: float = 0.5
 
 
 MOVING = {
-    case: [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
+    case: [
+        k
+        for k, name in enumerate(VARIABLES)
+        if name in TRAITS[case].active and name not in ("y", "h")
+    ]
     for case in Case
 }
 """The variables whose rates of change are measured."""
 
 
-def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def field(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
     refine, trials = (REFINED * lab.effort.halves[0], REFINED * lab.effort.halves[1]), []
     for name, p in sets.items():
@@ -74,11 +80,17 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             x, unit = random_state(case, p, rng), time_unit(p)
             # Friction at two rolling contacts can balance only a slight lag.
             rolls = case is Case.RR
-            omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / unit
+            omega_0 = (
+                State.of(x).omega_c * rng.uniform(0.8, 1.2)
+                if rolls
+                else rng.uniform(0.3, 2.5) / unit
+            )
             q = p.replace(omega_0=omega_0)
             t_end = (Windows.centres[-1] + HALF_WINDOW + Windows.around) * coarse_step(q) / REFINED
             trials.append(Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0))
-            if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2:  # Reynolds numbers as in water
+            if (
+                p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2
+            ):  # Reynolds numbers as in water
                 _, v_y, omega_c, *_, h, v_h = x
                 speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
                 fast = q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * unit))
@@ -91,7 +103,11 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             results.append(result)
     kept = Counter[tuple[str, float, Case]]()
     for centre, result in product(Windows.centres, results):
-        set, p, case = result.trial.set, result.trial.p, Case(int(result.coarse.case[centre * lab.effort.halves[0]]))
+        set, p, case = (
+            result.trial.set,
+            result.trial.p,
+            Case(int(result.coarse.case[centre * lab.effort.halves[0]])),
+        )
         enough = kept[set, p.nu_f, case] >= lab.effort.field_kept
         if not enough and (found := _values(lab, case, result, centre)):
             kept[set, p.nu_f, case] += 1
@@ -105,47 +121,85 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             yield Missing("field", name, why, lacking * rows)
 
 
-def _values(lab: Lab, case: Case, result: TrialResult, centre: int) -> tuple[Array, dict[str, Measured]] | None:
-    """State (8,), rates and forces at the centre of a window; None if its case changes, or it `turns_or_hovers`.
+def _values(
+    lab: Lab, case: Case, result: TrialResult, centre: int
+) -> tuple[Array, dict[str, Measured]] | None:
+    """State (8,), rates and forces at the centre of a window; None if its case changes, or it
+    `turns_or_hovers`.
 
-    They are extrapolated to a vanishing step, and uncertain by what this and the degree of the polynomials change. The
-    largest relative change of the rates, or of the forces, is used for all of them, since that of one may vanish by
-    chance.
-    """
+    They are extrapolated to a vanishing step, and uncertain by what this and the degree of the
+    polynomials change. The largest relative change of the rates, or of the forces, is used for all
+    of them, since that of one may vanish by chance."""
     p, read = result.trial.p, []
     for run, times in zip((result.coarse, result.fine), lab.effort.halves, strict=True):
-        near, half, middle = ((HALF_WINDOW + Windows.around) * times, HALF_WINDOW * times, centre * times)
+        near, half, middle = (
+            (HALF_WINDOW + Windows.around) * times,
+            HALF_WINDOW * times,
+            centre * times,
+        )
         window = slice(middle - half, middle + half + 1)
-        if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(case, run, window):
+        if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(
+            case, run, window
+        ):
             return None
         time, at = run.time[window], float(run.time[middle])
         # The forces of a sample act from then on for a step: they belong to the middle of it.
         acting = time + (time[1] - time[0]) / lab.refine / 2
-        forces = polynomials(acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at)[0]
-        read.append(np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1))
+        forces = polynomials(
+            acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at
+        )[0]
+        read.append(
+            np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1)
+        )
     (one, _), (two, lower) = read
-    rows = np.stack([two + (two - one) * EXTRAPOLATION, two, lower])  # (3, 22): state, rates, forces at A and B
+    rows = np.stack(
+        [two + (two - one) * EXTRAPOLATION, two, lower]
+    )  # (3, 22): state, rates, forces at A and B
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
     moving, held = MOVING[case], [_forces(case, row) for row in rows[:, 16:]]
     rate_change, force_change = (
-        max((abs(a - b) * DOUBT / EXTRAPOLATION + abs(b - c) for a, b, c in np.transpose(each).tolist()), default=0.0)
-        for each in ((rows[:, 8:16] / scales)[:, moving], [[w / weight for w in each.values()] for each in held])
+        max(
+            (
+                abs(a - b) * DOUBT / EXTRAPOLATION + abs(b - c)
+                for a, b, c in np.transpose(each).tolist()
+            ),
+            default=0.0,
+        )
+        for each in (
+            (rows[:, 8:16] / scales)[:, moving],
+            [[w / weight for w in each.values()] for each in held],
+        )
     )
-    rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
-    values = {f"rate_{VARIABLES[k]}": Measured(rows[0, 8 + k], rate_change * scales[k]) for k in moving}
-    values |= {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in held[0].items()}
+    rate_change, force_change = (
+        max(rate_change, lag_error(p) * (1 + p.j) / p.j),
+        max(force_change, lag_error(p)),
+    )
+    values = {
+        f"rate_{VARIABLES[k]}": Measured(rows[0, 8 + k], rate_change * scales[k]) for k in moving
+    }
+    values |= {
+        f"moving_force_{name}": Measured(w, force_change * weight) for name, w in held[0].items()
+    }
     return constrained(case, rows[0, :8], p), values
 
 
 def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
-    """Whether a slipping contact carries almost no load, or its slip, by itself or by friction, changes too much."""
+    """Whether a slipping contact carries almost no load, or its slip, by itself or by friction,
+    changes too much."""
     p, time = run.header.parameters, float(np.ptp(run.time[window]))
     loads = (p.mu, run.force_A[window, 1]), (p.eta, run.force_B[window, 0])
-    for v, contact, (friction, load) in zip(slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True):
-        change = max(float(np.linalg.norm(v[-1] - v[0])), friction * load.max() * (1 + p.j) / (p.j * p.m) * time)
+    for v, contact, (friction, load) in zip(
+        slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True
+    ):
+        change = max(
+            float(np.linalg.norm(v[-1] - v[0])),
+            friction * load.max() * (1 + p.j) / (p.j * p.m) * time,
+        )
         hovers = load.min() < PRESSES * p.m * p.g
-        if contact is Contact.S and (hovers or change > Windows.turn * np.linalg.norm(v, axis=1).min()):
+        if contact is Contact.S and (
+            hovers or change > Windows.turn * np.linalg.norm(v, axis=1).min()
+        ):
             return True
     return False
 
@@ -160,7 +214,8 @@ def _forces(case: Case, forces: Array) -> dict[str, float]:
 
 
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
-    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
+    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both
+    # points, sticks.
     (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
     # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
     (1.03, (0.0, 0.0, -1.62, -0.005, 0.47, -0.14, 0.3, -0.12)),
@@ -180,12 +235,14 @@ class Pieces:
     """Of motions, in samples."""
 
     length: int = 40
-    # Between the ends of a piece and any change of case: three until a force has built up, three until the case is
-    # taken to have changed, and a few by which a change comes too early or late.
+    # Between the ends of a piece and any change of case: three until a force has built up, three
+    # until the case is taken to have changed, and a few by which a change comes too early or late.
     apart: int = 10
 
 
-def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def motions(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """The case at the end of every piece, with the state at its beginning."""
     starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
     tasks = []
@@ -209,19 +266,21 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             seen[name].add(case)
             at = state_of(constrained(Case(int(run.case[first])), run.x[first], p))
             time = float(run.time[last] - run.time[first])
-            yield measurement(lab, "motions", name, p, "case", case, [task], case=case.name, time=time, **at)
+            yield measurement(
+                lab, "motions", name, p, "case", case, [task], case=case.name, time=time, **at
+            )
     for name, cases in seen.items():
         if unseen := [case.name for case in Case if case not in cases]:
             yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
-    """Samples at which pieces of a run begin, about evenly spread, whose ends are away from changes of case.
+    """Samples at which pieces of a run begin, about evenly spread, whose ends are away from changes
+    of case.
 
-    There the gap of an open contact exceeds 1e-4 R, for an unloaded one may hover; a slipping one slips by more than
-    weight causes in the two steps by which landings may be late; a rolling one needs 1 % less friction than it may, for
-    else it creeps.
-    """
+    There the gap of an open contact exceeds 1e-4 R, for an unloaded one may hover; a slipping one
+    slips by more than weight causes in the two steps by which landings may be late; a rolling one
+    needs 1 % less friction than it may, for else it creeps."""
     p, A, B = run.header.parameters, run.force_A.T, run.force_B.T
     plain = np.full(len(run.time), True)
     for side, gap, speed, friction, limit in (
@@ -238,15 +297,21 @@ def pieces(run: Trajectory, count: int) -> list[int]:
         near = np.min(np.abs((firsts + end)[:, None] - changes), axis=1, initial=len(run.time))
         firsts = firsts[(near >= Pieces.apart) & plain[firsts + end]]
     # As many pieces with a change of case in them as without, as far as there are.
-    inside = np.any((changes > firsts[:, None]) & (changes < firsts[:, None] + Pieces.length), axis=1)
+    inside = np.any(
+        (changes > firsts[:, None]) & (changes < firsts[:, None] + Pieces.length), axis=1
+    )
     chosen: set[int] = set()
     for some in (firsts[inside], firsts[~inside]):
         if len(some):
-            chosen |= set(some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist())
+            chosen |= set(
+                some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist()
+            )
     return sorted(chosen)
 
 
-def _start(name: str, p: Parameters, Omega_0: float, state: tuple[float, ...], how: str = "") -> Start:
+def _start(
+    name: str, p: Parameters, Omega_0: float, state: tuple[float, ...], how: str = ""
+) -> Start:
     """A start from natural units: a flow, and a state (8)."""
     x = State.of(np.array(state) * state_units(p))
     if x.y == x.v_y == x.slip_x == 0 and x.h > 0:  # it rolls on the floor
@@ -267,10 +332,12 @@ LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 """Variables that a landing changes."""
 
 
-def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def impacts(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """The state six coarse steps after every landing, and in how many runs the contact opens again.
-    It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts are 4 to 5 times that
-    high, and of a plastic landing nothing is left but the fall within a step.
+    It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts
+    are 4 to 5 times that high, and of a plastic landing nothing is left but the fall within a step.
     """
     trials = []
     for name, p in sets.items():
@@ -279,7 +346,15 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             step = coarse_step(start.p) / REFINED
             conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
             t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
-            trials.append(Trial(**vars(start), t_end=t_end, refine=refine, conditions=conditions, rows=len(LANDED)))
+            trials.append(
+                Trial(
+                    **vars(start),
+                    t_end=t_end,
+                    refine=refine,
+                    conditions=conditions,
+                    rows=len(LANDED),
+                )
+            )
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
     for landing in carry_out(lab, "impacts", trials):
         if isinstance(landing, Missing):
@@ -289,7 +364,9 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         for run in (landing.coarse, landing.fine):
             gap = run.y if landing.trial.name.startswith("floor") else run.h
             low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
-            rebounds[landing.trial.set] += bool(gap[low:].max() > gap[low] + 1e-2 * landing.trial.p.R)
+            rebounds[landing.trial.set] += bool(
+                gap[low:].max() > gap[low] + 1e-2 * landing.trial.p.R
+            )
         yield from _landed(lab, landing)
     for name, count in rebounds.items():
         p = next(trial.p for trial in trials if trial.set == name)

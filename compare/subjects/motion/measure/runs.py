@@ -1,17 +1,20 @@
-"""Whole motions from given starts to their ends: flight, a contact that opens, slip on smooth walls and rough floors.
+"""Whole motions from given starts to their ends: flight, a contact that opens, slip on smooth walls
+and rough floors.
 
-Each start is carried out with two time steps; what the step changes is the uncertainty of the finer run.
+Each start is carried out with two time steps; what the step changes is the uncertainty of the finer
+run.
 
-* *Thrown*: the ball flies past the axis of the vessel without touching anything, long enough for drag to show; by the
-  quadratic law with another drag coefficient, too.
-* *Pulled off*: beside the wall, with a slip on the floor that drives it away from there; its wall contact carries
-  nothing, or almost nothing, and opens.
-* *Slips*, *rolls*, *sinks*: at one contact, at both, or off the wall, for a while, through whatever cases follow.
+* *Thrown*: the ball flies past the axis of the vessel without touching anything, long enough for
+  drag to show; by the quadratic law with another drag coefficient, too.
+* *Pulled off*: beside the wall, with a slip on the floor that drives it away from there; its wall
+  contact carries nothing, or almost nothing, and opens.
+* *Slips*, *rolls*, *sinks*: at one contact, at both, or off the wall, for a while, through whatever
+  cases follow.
 * *Rolls while the flow rises, falls*: at both points, in a flow that is steady at first.
-* *Smooth wall*: the ball goes round with the fluid, rolls on the floor and spins against a wall without friction, in
-  faster and faster flows. Does the floor hold it?
-* *Rough floor*, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster flows. It may jam
-  between floor and wall, or the slip may last.
+* *Smooth wall*: the ball goes round with the fluid, rolls on the floor and spins against a wall
+  without friction, in faster and faster flows. Does the floor hold it?
+* *Rough floor*, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster
+  flows. It may jam between floor and wall, or the slip may last.
 
 `torque` is apart: a ball whose spin a real fluid brakes settles.
 """
@@ -52,8 +55,11 @@ def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
     return Flow.ramp(p.omega_0, p.omega_0 + rate * time / 2, time / 2, time / 2)
 
 
-def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as `Parameters.fluid_torque`."""
+def torque(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as
+    `Parameters.fluid_torque`."""
     starts = []
     for name, p in sets.items():
         q = p.replace(mu=1.0, eta=1.0, fluid_torque=0.5 * p.c, omega_0=0.6 / time_unit(p))
@@ -61,25 +67,40 @@ def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
     yield from settled_readings(lab, "torque", starts)
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def measure(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
     """Where each start ends: its state, or on a smooth wall and a rough floor its case."""
-    for run in carry_out(lab, "runs", [trial for name, p in sets.items() for trial in _trials(name, p)]):
+    for run in carry_out(
+        lab, "runs", [trial for name, p in sets.items() for trial in _trials(name, p)]
+    ):
         if isinstance(run, Missing):
             yield run
             continue
         p, how, coarse, fine = run.trial.p, run.trial.name, run.coarse, run.fine
         time = float(fine.time[-1])
         if coarse.case[-1] != fine.case[-1]:
-            yield Missing("runs", run.trial.set, f"{how}: with half the time step the ball ends in another case")
+            yield Missing(
+                "runs",
+                run.trial.set,
+                f"{how}: with half the time step the ball ends in another case",
+            )
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
-            yield Missing("runs", run.trial.set, f"{how}: the contact force is so small that the ball may hover")
+            yield Missing(
+                "runs",
+                run.trial.set,
+                f"{how}: the contact force is so small that the ball may hover",
+            )
         elif how in ("smooth wall", "rough floor"):
             yield run.row(lab, "case", float(fine.case[-1]), time=time)
         else:
-            # The change of one variable may vanish by chance: the largest, in natural units, is used for all.
+            # The change of one variable may vanish by chance: the largest, in natural units, is
+            # used for all.
             units, ends = state_units(p), (coarse.x[-1], fine.x[-1])
             change = float(np.abs((ends[1] - ends[0]) / units).max())
-            for variable, value, size in zip(VARIABLES, ends[1].tolist(), units.tolist(), strict=True):
+            for variable, value, size in zip(
+                VARIABLES, ends[1].tolist(), units.tolist(), strict=True
+            ):
                 yield run.row(lab, f"end_{variable}", Measured(value, change * size), time=time)
 
 
@@ -87,13 +108,17 @@ def _trials(name: str, p: Parameters) -> Iterator[Trial]:
     """Trials of a set from all starts."""
     unit = time_unit(p)
 
-    def trial(how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None) -> Trial:
+    def trial(
+        how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None
+    ) -> Trial:
         count = round(lasts * unit / coarse_step(p))
         t_end, at = count * coarse_step(p), dict[str, Condition](start=how, **state_of(x.stacked()))
         flow = None
         if rate is not None:
             flow, at = late_ramp(p, rate, t_end), at | {"rate": rate}
-        return Trial(name, p, how, x.stacked(), t_end, (8, 16), count, flow=flow, conditions=at, rows=rows)
+        return Trial(
+            name, p, how, x.stacked(), t_end, (8, 16), count, flow=flow, conditions=at, rows=rows
+        )
 
     for how, (flow, lasts, x) in STARTS.items():
         start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)

@@ -1,4 +1,5 @@
-"""How slip begins: how a slight slip grows, from which flow on, and when a ball leaves the floor."""
+"""How slip begins: how a slight slip grows, from which flow on, and when a ball leaves the
+floor."""
 
 from __future__ import annotations
 

@@ -1,13 +1,14 @@
 """Where slip begins to grow, and where a ball leaves the floor (the dotted arrows of Fig. 6).
 
-`bounds` are gamma along straight lines of states, its zero and its slope. A ball goes round at a held omega_c in faster
-and faster flows; or with the flow, rolling at both points or hanging on the wall alone. Two flows show about where
-gamma passes through zero, and two more are taken around it. gamma is a line in omega_0, or in its square where the
-orbit goes with it; another law of drag than Stokes' makes it a cubic.
+`bounds` are gamma along straight lines of states, its zero and its slope. A ball goes round at a
+held omega_c in faster and faster flows; or with the flow, rolling at both points or hanging on the
+wall alone. Two flows show about where gamma passes through zero, and two more are taken around it.
+gamma is a line in omega_0, or in its square where the orbit goes with it; another law of drag than
+Stokes' makes it a cubic.
 
-For `lift`, states of a case differ only in omega_c, from slow, where the floor presses, to fast. A few show roughly
-where it stops pressing; at slower ones its force is measured and extrapolated to zero as a function of omega_c^2.
-"""
+For `lift`, states of a case differ only in omega_c, from slow, where the floor presses, to fast. A
+few show roughly where it stops pressing; at slower ones its force is measured and extrapolated to
+zero as a function of omega_c^2."""
 
 from __future__ import annotations
 
@@ -22,7 +23,15 @@ from compare.kit.record import Measurement, Missing, Records, if_found, measurem
 from compare.kit.settling import named_start, settle_groups
 from compare.kit.statistics import Measured, extrapolated_zero, straight_line, zero_and_slope
 from compare.kit.tasks import Task
-from compare.kit.trials import DOUBT, EXTRAPOLATION, REFINED, Start, lag_error, polynomials, slip_unit
+from compare.kit.trials import (
+    DOUBT,
+    EXTRAPOLATION,
+    REFINED,
+    Start,
+    lag_error,
+    polynomials,
+    slip_unit,
+)
 from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, limit_of_no_size
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -34,40 +43,77 @@ from model.kinematics import state_units
 class Bounds:
     """How the bounds of growing slip are looked for."""
 
-    around: tuple[float, float] = (0.7, 1.3)  # second two flows, divided by the zero that the first two show
+    around: tuple[float, float] = (
+        0.7,
+        1.3,
+    )  # second two flows, divided by the zero that the first two show
     around_bent: tuple[float, float] = (0.8, 1.1)  # where the law of drag bends the line
-    slips: tuple[float, float] = (1.0, 0.5)  # as `Push.sizes`, of a ball that hangs on a smooth wall, and so goes fast
-    beyond: float = 2.1  # largest zero recorded, divided by the largest value at which slip stayed in its case
+    slips: tuple[float, float] = (
+        1.0,
+        0.5,
+    )  # as `Push.sizes`, of a ball that hangs on a smooth wall, and so goes fast
+    beyond: float = (
+        2.1  # largest zero recorded, divided by the largest value at which slip stayed in its case
+    )
     followed: float = 100.0  # largest zero followed, divided by the largest of the first flows
-    hanging: tuple[float, ...] = (1.05, 1.6, 1.3)  # flows, divided by the one at which a ball ceases to hang
+    hanging: tuple[float, ...] = (
+        1.05,
+        1.6,
+        1.3,
+    )  # flows, divided by the one at which a ball ceases to hang
 
 
-def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Zero and slope of gamma along every line: from two flows, then from two more around the zero that these show."""
-    yield from (Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta))
+def bounds(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Zero and slope of gamma along every line: from two flows, then from two more around the zero
+    that these show."""
+    yield from (
+        Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta)
+    )
     sets = {name: p for name, p in sets.items() if p.mu and p.eta}
     lines = [line for name, p in sets.items() for line in _lines_from_rolling(name, p)]
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
     starts = [
-        [named_start(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in Bounds.hanging]
+        [
+            named_start(name, sets[name].replace(omega_0=end * factor), "on the wall")
+            for factor in Bounds.hanging
+        ]
         for name, end in ends.items()
     ]
-    hangs = set[str]()  # sets whose wall alone carries the ball: there it is pushed out of settled states
+    hangs = set[
+        str
+    ]()  # sets whose wall alone carries the ball: there it is pushed out of settled states
     for name, states in zip(ends, settle_groups(lab, starts), strict=True):
         if not any(state.failure or state.case is not Case.NR for state in states):
             hangs.add(name)
-            rides = [(state.start.p, np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0])) for state in states]
+            rides = [
+                (state.start.p, np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0]))
+                for state in states
+            ]
             begun = [Start(name, p, "stationary", x) for p, x in rides]
-            lines.append(Crossing(tuple(Push(start, Case.NR, Case.NS, np.array([0, 0, 1])) for start in begun)))
+            lines.append(
+                Crossing(
+                    tuple(Push(start, Case.NR, Case.NS, np.array([0, 0, 1])) for start in begun)
+                )
+            )
     for name in (name for name in sets if name not in hangs):
         yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
     first = _growths(lab, [line.pushes[:2] for line in lines])
-    around = _growths(lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)])
+    around = _growths(
+        lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)]
+    )
     for line, seen, more in zip(lines, first, around, strict=True):
-        push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*seen.tasks, *more.tasks]
+        push, square, tasks = (
+            line.pushes[0],
+            "_square" if line.power == 2 else "",
+            [*seen.tasks, *more.tasks],
+        )
         name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
         if np.isnan(seen.points[1]).any():
-            yield from seen.strays or [Missing("bounds", name, f"slips {slips} pass through several cases", 2)]
+            yield from seen.strays or [
+                Missing("bounds", name, f"slips {slips} pass through several cases", 2)
+            ]
             continue
         points = np.concatenate([seen.points, more.points], axis=1)
         flows, gamma, noise = points[:, ~np.isnan(points[1])]
@@ -79,11 +125,15 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
         growth = f"growth of slip {slips}, {push.start.name},"
         if abs(zero.value) <= Bounds.beyond * np.abs(q).max():
-            yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
+            yield if_found(
+                push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero"
+            )
         else:
             why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
             yield Missing("bounds", name, why)
-        yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
+        yield if_found(
+            push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,20 +141,24 @@ class Crossing:
     """Pushes at several flows, between which gamma passes through zero."""
 
     pushes: tuple[Push, ...]
-    """At the first two flows; and others than those around the zero, where the ball can't be at that."""
+    """At the first two flows; and others than those around the zero, where the ball can't be at
+    that."""
 
     @property
     def power(self) -> int:
-        """Power of omega_0 in which gamma is a line: 1 where the orbit is held, 2 where it goes with the flow."""
+        """Power of omega_0 in which gamma is a line: 1 where the orbit is held, 2 where it goes
+        with the flow."""
         return 1 if self.pushes[0].start.name == "held" else 2
 
     @property
     def is_curved(self) -> bool:
-        """Whether gamma isn't a straight line over omega_0, because drag isn't in proportion to the lag."""
+        """Whether gamma isn't a straight line over omega_0, because drag isn't in proportion to the
+        lag."""
         return self.power == 1 and self.pushes[0].start.p.drag != STOKES
 
     def around(self, gammas: Array) -> tuple[Push, ...]:
-        """Pushes at two flows around the zero of the line through the first two; none if there is none ahead."""
+        """Pushes at two flows around the zero of the line through the first two; none if there is
+        none ahead."""
         if len(self.pushes) > 2:
             return self.pushes[2:]
         flows = np.array([push.start.p.omega_0 for push in self.pushes])
@@ -129,11 +183,14 @@ class Growths:
 
     points: Array  # flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2; gamma is nan where a slip didn't last
     tasks: list[Task]
-    strays: list[Measurement | Missing]  # what became of slips that didn't last, and of runs that broke down
+    strays: list[
+        Measurement | Missing
+    ]  # what became of slips that didn't last, and of runs that broke down
 
 
 def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
-    """gamma for every row of pushes, from two sizes of slip with the shorter step, and one with the longer one.
+    """gamma for every row of pushes, from two sizes of slip with the shorter step, and one with the
+    longer one.
 
     It is uncertain by what the step and the degree of the polynomials change.
     """
@@ -148,7 +205,9 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
             p, (own, runs) = push.start.p, next(results)
             used += own
             if isinstance(runs, str):
-                strays.append(Missing("bounds", push.start.set, f"from {push.inner.name}: the run {runs}", 2))
+                strays.append(
+                    Missing("bounds", push.start.set, f"from {push.inner.name}: the run {runs}", 2)
+                )
                 points.append((p.omega_0, math.nan, math.nan))
                 continue
             size = push.sizes[0] if push.inner is not Case.NR else Bounds.slips[0]
@@ -156,14 +215,17 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
             best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
-            noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p, refine) * slip_unit(p))
+            noise = math.hypot(
+                change * DOUBT, best[1] - best[0], lag_error(p, refine) * slip_unit(p)
+            )
             points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
         found.append(Growths(np.reshape(points, (-1, 3)).T, used, strays))
     return found
 
 
 def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
-    """Pushes out of rolling at both points at flows along a line, scaled by friction and inertia, for every bound."""
+    """Pushes out of rolling at both points at flows along a line, scaled by friction and inertia,
+    for every bound."""
     unit = time_unit(p)
     slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     rubbing, spinning = math.sqrt(p.mu) / unit, math.sqrt(1 / p.j) / unit
@@ -192,7 +254,8 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.SR, Case.NR): (-0.6, 0.0, 0.0),
     (Case.SS, Case.NS): (0.3, 0.1, 0.8),
 }
-"""Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
+"""Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r
+omega_c."""
 
 
 @dataclass(frozen=True)
@@ -200,26 +263,54 @@ class Lifts:
     """How it is looked for where a ball leaves the floor."""
 
     leads: float = 1.5  # how much faster than the ball the fluid goes round where a contact slips
-    orbits: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)  # the first ones, omega_c sqrt(R/g)
-    later: tuple[float, ...] = (0.05, 0.08, 0.12, 0.17)  # relative distances of others below that at which it leaves
+    orbits: tuple[float, ...] = (
+        0.5,
+        1.0,
+        1.5,
+        2.0,
+        2.5,
+        3.0,
+        3.5,
+    )  # the first ones, omega_c sqrt(R/g)
+    later: tuple[float, ...] = (
+        0.05,
+        0.08,
+        0.12,
+        0.17,
+    )  # relative distances of others below that at which it leaves
     steps: int = 16  # of a run
     skipped: int = 4  # at its start, in which contact forces build up
     fewest: int = 5  # that must be left
-    degrees: tuple[int, int] = (3, 2)  # of the polynomials; the lower one shows what the degree changes
+    degrees: tuple[int, int] = (
+        3,
+        2,
+    )  # of the polynomials; the lower one shows what the degree changes
 
 
-def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
+def lift(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the
+    fastest orbit."""
     arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
-    orbits = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in Lifts.orbits] for arrow in arrows]
+    orbits = [
+        [arrow.task(Omega / time_unit(arrow.p)) for Omega in Lifts.orbits] for arrow in arrows
+    ]
     first = list(lab.groups(orbits))
-    kept = [[] if isinstance(got, str) else arrow.staying(got) for arrow, got in zip(arrows, first, strict=True)]
+    kept = [
+        [] if isinstance(got, str) else arrow.staying(got)
+        for arrow, got in zip(arrows, first, strict=True)
+    ]
     nearer = [arrow.tasks_near_onset(runs) for arrow, runs in zip(arrows, kept, strict=True)]
     rows = zip(arrows, orbits, first, kept, nearer, lab.groups(nearer), strict=True)
     for arrow, tasks, got, runs, later, near in rows:
         leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
         if not runs:
-            why = f"the run {got}" if isinstance(got, str) else "the ball doesn't stay in it at any orbit"
+            why = (
+                f"the run {got}"
+                if isinstance(got, str)
+                else "the ball doesn't stay in it at any orbit"
+            )
             yield Missing("lift", arrow.set, f"out of {arrow.inner.name}: {why}")
         elif leaves is None:
             yield arrow.row("lifts", float(runs[-1].omega_c[0]), 0.0, tasks)
@@ -227,7 +318,11 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
             why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
             yield Missing("lift", arrow.set, why)
         elif isinstance(near, str) or (onset := _onset(near)) is None:
-            why = f"the run {near}" if isinstance(near, str) else "the contact at the floor opens and closes"
+            why = (
+                f"the run {near}"
+                if isinstance(near, str)
+                else "the contact at the floor opens and closes"
+            )
             yield Missing("lift", arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
         else:
             yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, later)
@@ -247,22 +342,31 @@ class Arrow:
         """Parameters with the flow, and the state (8,), of a ball that goes round with omega_c."""
         unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
-        leads = 1.0 if self.inner is Case.RR else Lifts.leads  # a ball that rolls at both points can hardly lag
-        return self.p.replace(omega_0=leads * omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
+        leads = (
+            1.0 if self.inner is Case.RR else Lifts.leads
+        )  # a ball that rolls at both points can hardly lag
+        return self.p.replace(omega_0=leads * omega_c), np.array(
+            [0.0, 0.0, omega_c, *slips, 0.0, 0.0]
+        )
 
     def task(self, omega_c: float, times: int = 1) -> Task:
-        """A short run from the orbit at omega_c, with steps half as long as those of `REFINED`, divided by `times`."""
+        """A short run from the orbit at omega_c, with steps half as long as those of `REFINED`,
+        divided by `times`."""
         step = coarse_step(self.p) / (2 * REFINED * times)
         return self.lab.task(*self.start(omega_c), Lifts.steps * step, step, samples=Lifts.steps)
 
     def staying(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
-        """The first runs in succession, in the order of their orbits, that stay in the two cases of the arrow."""
-        strays = [not np.isin(run.case[Lifts.skipped :], [self.inner, self.outer]).all() for run in runs]
+        """The first runs in succession, in the order of their orbits, that stay in the two cases of
+        the arrow."""
+        strays = [
+            not np.isin(run.case[Lifts.skipped :], [self.inner, self.outer]).all() for run in runs
+        ]
         first = [*strays, False].index(False)
         return runs[first : [*strays, True].index(True, first)]
 
     def tasks_near_onset(self, kept: Sequence[Trajectory]) -> list[Task]:
-        """Tasks just below the orbit at which the ball lifts off by a line through the last two forces of the floor."""
+        """Tasks just below the orbit at which the ball lifts off by a line through the last two
+        forces of the floor."""
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
         if not 2 <= len(pressed) < len(kept):
             return []
@@ -271,7 +375,9 @@ class Arrow:
         orbits = [where * (1 - part) for part in Lifts.later if where]
         return [self.task(orbit, times) for orbit in orbits for times in self.lab.effort.halves]
 
-    def row(self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]) -> Measurement:
+    def row(
+        self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]
+    ) -> Measurement:
         """A measurement along the arrow, with the state at one orbit as conditions."""
         p, x0 = self.start(omega_c)
         at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(x0)
@@ -279,7 +385,8 @@ class Arrow:
 
 
 def _force(run: Trajectory) -> Measured | None:
-    """Force of the floor at the beginning divided by the weight; None where it doesn't press for long enough."""
+    """Force of the floor at the beginning divided by the weight; None where it doesn't press for
+    long enough."""
     p, force = run.header.parameters, run.force_A[Lifts.skipped :, 1]
     pressed = int(np.argmax(np.append(force <= 0, True)))
     if pressed < Lifts.fewest:
@@ -287,18 +394,25 @@ def _force(run: Trajectory) -> Measured | None:
     time = run.time[Lifts.skipped :][:pressed]
     # The force of a sample acts from then on for a step: it belongs to the middle of it.
     begin = -(time[1] - time[0]) / 2
-    value, lower = (polynomials(time, force[:pressed], Lifts.degrees, begin)[0] / (p.m * p.g)).tolist()
+    value, lower = (
+        polynomials(time, force[:pressed], Lifts.degrees, begin)[0] / (p.m * p.g)
+    ).tolist()
     return Measured(value, abs(value - lower))
 
 
 def _onset(runs: Sequence[Trajectory]) -> Measured | None:
-    """omega_c at which the floor's force is zero, from runs with both steps; None if it doesn't fall smoothly."""
+    """omega_c at which the floor's force is zero, from runs with both steps; None if it doesn't
+    fall smoothly."""
     squares, forces = np.array([run.omega_c[0] ** 2 for run in runs[::2]]), []
     for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:
             return None
         change = fine.value - coarse.value
-        forces.append(Measured(fine.value + change * EXTRAPOLATION, math.hypot(fine.uncertainty, change * DOUBT)))
+        forces.append(
+            Measured(
+                fine.value + change * EXTRAPOLATION, math.hypot(fine.uncertainty, change * DOUBT)
+            )
+        )
     square = extrapolated_zero(squares, forces) if forces else Measured(0.0, math.inf)
     if not square.value > 0 or math.isinf(square.uncertainty):
         return None

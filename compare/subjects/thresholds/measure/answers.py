@@ -1,4 +1,5 @@
-"""What runs at held flows say: whether a ball goes on as it began, settles, or leaves floor or wall."""
+"""What runs at held flows say: whether a ball goes on as it began, settles, or leaves floor or
+wall."""
 
 from __future__ import annotations
 
@@ -14,19 +15,20 @@ from model import Case, Contact, Trajectory
 from model.arrays import Array
 
 SLIPPING_SPEED = 3e-8
-"""Slip speed, divided by sqrt(g R), that counts as slip: contacts are solved to 1e-12, and a ball whose friction falls
-short by a millionth reaches it within a run."""
+"""Slip speed, divided by sqrt(g R), that counts as slip: contacts are solved to 1e-12, and a ball
+whose friction falls short by a millionth reaches it within a run."""
 CREEPS = 100.0
-"""Slip, in units of that, at which a ball may creep while it comes to rest jammed between floor and wall."""
+"""Slip, in units of that, at which a ball may creep while it comes to rest jammed between floor and
+wall."""
 
 
 def lifts(end: Bracket) -> bool:
-    """Whether rolling at both points ends by lifting off the floor, not by slip, from the runs at its end.
+    """Whether rolling at both points ends by lifting off the floor, not by slip, from the runs at
+    its end.
 
-    Just below omega_03 the floor carries as little, but rolling may end there by slip at both contacts, which is as
-    fast at one as at the other, and lasts. A ball that lifts off slips on the floor alone before, or rolls on the wall
-    in the end.
-    """
+    Just below omega_03 the floor carries as little, but rolling may end there by slip at both
+    contacts, which is as fast at one as at the other, and lasts. A ball that lifts off slips on the
+    floor alone before, or rolls on the wall in the end."""
     if (run := end.runs[1]) is None:
         return False
     p = run.header.parameters
@@ -34,23 +36,27 @@ def lifts(end: Bracket) -> bool:
     lifted = [case.A is Contact.N for case in run.cases]
     on = slice(0, lifted.index(True) if any(lifted) else None)
     floor, wall = sliding_speeds(run)
-    return unloaded and bool(slip(wall, run) < 1 or wall[on].max(initial=0.0) <= floor[on].max(initial=0.0) / 2)
+    return unloaded and bool(
+        slip(wall, run) < 1 or wall[on].max(initial=0.0) <= floor[on].max(initial=0.0) / 2
+    )
 
 
 def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
-    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPPING_SPEED` sqrt(g R)."""
+    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPPING_SPEED`
+    sqrt(g R)."""
     p = run.header.parameters
     return float(speeds[tail(run, share)].max() / (SLIPPING_SPEED * math.sqrt(p.g * p.R)))
 
 
 def stays_rolling(run: Trajectory) -> bool | None:
-    """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
+    """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip
+    still dies out.
 
-    None, too, while it touches the floor now and then: where friction alone could hold it, it may come to rest there.
-    Slip dies out that has fallen below 0.6 of what it was in the second half (moved from 0.9 after results had been
-    seen); slip below a hundredth of what counts is none. On a floor that carries next to nothing slip up to `CREEPS`
-    shows nothing (chosen after a set with mu eta = 0.8 had crept so below its threshold).
-    """
+    None, too, while it touches the floor now and then: where friction alone could hold it, it may
+    come to rest there. Slip dies out that has fallen below 0.6 of what it was in the second half
+    (moved from 0.9 after results had been seen); slip below a hundredth of what counts is none. On
+    a floor that carries next to nothing slip up to `CREEPS` shows nothing (chosen after a set with
+    mu eta = 0.8 had crept so below its threshold)."""
     if not presses(run):
         return None if np.any(run.force_A[tail(run), 1] > 0) else False
     speeds, _ = sliding_speeds(run)
@@ -63,11 +69,12 @@ def stays_rolling(run: Trajectory) -> bool | None:
 
 
 def may_settle(run: Trajectory) -> bool | None:
-    """Whether a ball settles on the floor, judged after 10/c (None if not clear yet) or after 40/c (True if not clear).
+    """Whether a ball settles on the floor, judged after 10/c (None if not clear yet) or after 40/c
+    (True if not clear).
 
-    Other motions still die out in a short run: with the usual share of change a ball just above a fold seemed to
-    settle on some sets. (A tenth of it was chosen after that had been seen; a hundredth gives the same brackets.)
-    """
+    Other motions still die out in a short run: with the usual share of change a ball just above a
+    fold seemed to settle on some sets. (A tenth of it was chosen after that had been seen; a
+    hundredth gives the same brackets.)"""
     brief = run.time[-1] * run.header.parameters.c < 20
     return settles(run, 0.02) if brief else settles(run) is not False
 
@@ -78,16 +85,18 @@ def presses(run: Trajectory) -> bool:
 
 
 def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
-    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the run is too short.
+    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the
+    run is too short.
 
-    In the last tenth its speed must change by less than a share `slowed` of what it does in the tenth before the
-    middle. On the way past a fold that it has missed the change falls at most like 1/time^2, from one to the other to
-    0.22; after that it rises.
-    """
+    In the last tenth its speed must change by less than a share `slowed` of what it does in the
+    tenth before the middle. On the way past a fold that it has missed the change falls at most like
+    1/time^2, from one to the other to 0.22; after that it rises."""
     if settled_case(run).A is Contact.N or settled_case(run) is Case.SR or not presses(run):
         return False
     middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
-    slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
+    slowing = (
+        last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0
+    )  # round-off: at rest
     return False if slowing > 1 else True if slowing < slowed else None
 
 
@@ -101,5 +110,5 @@ ASKED: dict[str, tuple[float, Answer]] = {
 }
 """How long a run takes, in units of 1/c, and what is asked of it: yes below a threshold, no above.
 
-The ball still rolls; the wall doesn't hold it; it settles on the floor, or may; it begins to slip on the wall; pressed
-to the floor it rolls on both again; it settles on the floor."""
+The ball still rolls; the wall doesn't hold it; it settles on the floor, or may; it begins to slip
+on the wall; pressed to the floor it rolls on both again; it settles on the floor."""

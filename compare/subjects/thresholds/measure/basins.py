@@ -1,12 +1,13 @@
-"""Which motions there are: cases reached over the planes of Figs. 7 and 8, and the border between two basins.
+"""Which motions there are: cases reached over the planes of Figs. 7 and 8, and the border between
+two basins.
 
-In a plane of eta and omega_0 points are spread evenly first; more are put where neighbours differ, each kind of border
-in turn, and among rare ones.
+In a plane of eta and omega_0 points are spread evenly first; more are put where neighbours differ,
+each kind of border in turn, and among rare ones.
 
-Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR at y = 0), the straight
-line between the two states crosses the border between their basins. Two runs close to it on either side stay together
-for a while near the unstable state. The mean of their states while they are together begins the next line.
-"""
+Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR at y
+= 0), the straight line between the two states crosses the border between their basins. Two runs
+close to it on either side stay together for a while near the unstable state. The mean of their
+states while they are together begins the next line."""
 
 from __future__ import annotations
 
@@ -23,7 +24,13 @@ from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
-from compare.kit.settling import Patience, named_start, physical_case, rounded_duration, settle_groups
+from compare.kit.settling import (
+    Patience,
+    named_start,
+    physical_case,
+    rounded_duration,
+    settle_groups,
+)
 from compare.kit.statistics import Measured, extrapolated_zero, tail, taper
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
@@ -48,29 +55,40 @@ class Plane:
     """Points at which all runs settled, and bit masks of the cases reached."""
 
 
-def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
+def planes(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is
+    left out."""
     from scipy.stats import qmc  # slow to import
 
-    # In such drag states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry.
+    # In such drag states settle within seconds, and slipping still lasts beyond the flow at which
+    # the wall can carry.
     p = sets["reference"].replace(c=1.25)
-    spread = [list(qmc.Halton(2, seed=7 + k).random(lab.effort.plane_spread)) for k in range(len(FIGURES))]
+    spread = [
+        list(qmc.Halton(2, seed=7 + k).random(lab.effort.plane_spread)) for k in range(len(FIGURES))
+    ]
     both = [Plane(figure, points) for figure, points in zip(FIGURES, spread, strict=True)]
     for count in (*lab.effort.plane_added, 0):
         chosen = [(plane, u) for plane in both for u in plane.points]
         starts = []
         for plane, u in chosen:
             eta, flow = (np.array([0.02, 0.45]) + u * np.array([0.78, 3.15])).tolist()
-            q = p.replace(eta=eta, omega_0=flow / time_unit(p), mu=eta if plane.figure == "fig-8" else p.mu)
+            q = p.replace(
+                eta=eta, omega_0=flow / time_unit(p), mu=eta if plane.figure == "fig-8" else p.mu
+            )
             starts.append([named_start(plane.figure, q, how) for how in WAYS])
-        # Only the case matters: states may drift a thousand times as far as those whose values are compared.
+        # Only the case matters: states may drift a thousand times as far as those whose values are
+        # compared.
         patience = Patience(span=20.0, loose=1000.0, rounds=lab.effort.plane_rounds)
         for (plane, u), states in zip(chosen, settle_groups(lab, starts, patience), strict=True):
             if not any(each.failure for each in states):
                 mask = sum(1 << case for case in {physical_case(each.case) for each in states})
                 plane.seen.append((u, mask))
                 q, tasks = states[0].start.p, [each.task for each in states]
-                yield measurement(lab, "plane", "reference", q, "cases", mask, tasks, figure=plane.figure)
+                yield measurement(
+                    lab, "plane", "reference", q, "cases", mask, tasks, figure=plane.figure
+                )
         for plane in both:
             plane.tried |= {tuple(u.tolist()) for u in plane.points}
             fresh = (u for u in added_points(plane.seen) if tuple(u.tolist()) not in plane.tried)
@@ -78,11 +96,14 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
     for plane in both:
         if out := len(plane.tried) - len(plane.seen):
             at = f"{plane.figure}: {out} of {len(plane.tried)} points"
-            yield Missing("plane", "reference", f"{at} are left out, too close to a change of case to settle")
+            yield Missing(
+                "plane", "reference", f"{at} are left out, too close to a change of case to settle"
+            )
 
 
 def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
-    """Points to measure next: midpoints between neighbours of other cases, at each kind of border, and at rare cases.
+    """Points to measure next: midpoints between neighbours of other cases, at each kind of border,
+    and at rare cases.
 
     A set of cases is rare if it was seen less than half as often as if all were seen equally often.
     """
@@ -92,7 +113,11 @@ def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     often = Counter(masks)
     rare = {m for m, number in often.items() if number < 0.5 * len(masks) / len(often)}
     borders: dict[tuple[int, ...], list[tuple[float, int, int]]] = {}
-    for a, b in {tuple(sorted((int(t[i]), int(t[i - 1])))) for t in Delaunay(places).simplices for i in range(3)}:
+    for a, b in {
+        tuple(sorted((int(t[i]), int(t[i - 1]))))
+        for t in Delaunay(places).simplices
+        for i in range(3)
+    }:
         if masks[a] != masks[b] or masks[a] in rare:
             length = float(np.hypot(*(places[a] - places[b])))
             borders.setdefault(tuple(sorted((masks[a], masks[b]))), []).append((-length, a, b))
@@ -105,17 +130,23 @@ def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
 class Borders:
     """How the border between two basins is followed."""
 
-    far: float = 0.1  # a long way, in two fifths of a run, divided by the distance of the attractors
+    far: float = (
+        0.1  # a long way, in two fifths of a run, divided by the distance of the attractors
+    )
     arrived: float = 0.01  # distance at which a ball has arrived, divided likewise
-    # Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins.
+    # Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where
+    # it begins.
     closing: tuple[float, ...] = (0.1, 0.17, 0.26, 0.38)
 
 
-def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The state on the border between two basins, at flows between omega_02 and omega_04; not with quadratic drag.
+def borders(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """The state on the border between two basins, at flows between omega_02 and omega_04; not with
+    quadratic drag.
 
-    At the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
-    """
+    At the quick level the edge is followed to where it begins for the set with most drag alone,
+    which settles soonest."""
     limits: dict[str, tuple[float, float]] = {}
     for name, p in sets.items():
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
@@ -125,32 +156,53 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         elif holds and folds:
             limits[name] = holds.value, folds.value
         else:
-            yield Missing("edge", name, "at no flow are a slipping ball and a lifted one both settled")
-    soonest = max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
+            yield Missing(
+                "edge", name, "at no flow are a slipping ball and a lifted one both settled"
+            )
+    soonest = (
+        max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
+    )
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
         for part in (Borders.closing if name == soonest else lab.effort.edge_flows)
     ]
-    starts = [[named_start(name, p, "rest"), named_start(name, p, "on the wall")] for name, p in flows]
+    starts = [
+        [named_start(name, p, "rest"), named_start(name, p, "on the wall")] for name, p in flows
+    ]
     edges = []  # first on the line between the two attractors
-    for (name, p), (slipping, lifted) in zip(flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True):
-        if slipping.failure or lifted.failure or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR):
+    for (name, p), (slipping, lifted) in zip(
+        flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True
+    ):
+        if (
+            slipping.failure
+            or lifted.failure
+            or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR)
+        ):
             fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
-            yield Missing("edge", name, f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}")
+            yield Missing(
+                "edge",
+                name,
+                f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}",
+            )
         else:
             a, b = _on_floor_and_wall(slipping.mean), _on_floor_and_wall(lifted.mean)
             edges.append(Edge(name, p, a, b, a, b - a))
     for _ in range(lab.effort.edge_lines):
         lines = [_next_line(edge) for edge in edges]
         brackets = narrow(lab, [_search(lab, line) for line in lines], careful=False)
-        edges = [e.crossed(line, bracket) for e, line, bracket in zip(edges, lines, brackets, strict=True)]
+        edges = [
+            e.crossed(line, bracket)
+            for e, line, bracket in zip(edges, lines, brackets, strict=True)
+        ]
     for edge in edges:
         yield from _edge_rows(lab, edge)
     for name, (low, high) in limits.items():
         last = low + (max(Borders.closing) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
-        if len(near) >= len(Borders.closing):  # the edge meets the lifted ball where both have the same omega_c
+        if len(near) >= len(
+            Borders.closing
+        ):  # the edge meets the lifted ball where both have the same omega_c
             noise = max(float(_uncertainty(edge)[2]) for edge in near)
             apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
             place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
@@ -160,12 +212,17 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             row = measurement(lab, "edge", name, p, "omega_02", place, tasks, **at)
             yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
         elif name == soonest or lab.level > Level.QUICK:
-            yield Missing("edge", name, "too few crossings to follow the edge to where it meets the lifted ball")
+            yield Missing(
+                "edge",
+                name,
+                "too few crossings to follow the edge to where it meets the lifted ball",
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """The border between the basins of two attractors at one flow, and where it crosses a line; states are (8,)."""
+    """The border between the basins of two attractors at one flow, and where it crosses a line;
+    states are (8,)."""
 
     set: str
     p: Parameters
@@ -175,7 +232,9 @@ class Edge:
     line: Array  # direction of the line; its length is the distance of the attractors
     missed: int = 0  # how many lines since the last crossing were too short
     bracket: Bracket | None = None
-    moves: tuple[Array, ...] = ()  # by how much each of the last crossings differs from that of the line before
+    moves: tuple[
+        Array, ...
+    ] = ()  # by how much each of the last crossings differs from that of the line before
 
     @property
     def crossing(self) -> Array:
@@ -184,20 +243,26 @@ class Edge:
         return np.asarray(self.centre + self.bracket.place.value * self.line)
 
     def crossed(self, line: Edge, bracket: Bracket) -> Edge:
-        """The edge after the search on one more line: with the bracket found there, or counted as missed."""
+        """The edge after the search on one more line: with the bracket found there, or counted as
+        missed."""
         if None in bracket.runs:
             return replace(self, moves=(), missed=self.missed + 1)
         crossed = replace(line, bracket=bracket, missed=0)
-        return replace(crossed, moves=(*self.moves, np.abs(crossed.crossing - self.crossing)) if self.bracket else ())
+        return replace(
+            crossed,
+            moves=(*self.moves, np.abs(crossed.crossing - self.crossing)) if self.bracket else (),
+        )
 
 
 def _on_floor_and_wall(x: Array) -> Array:
-    """The state put on floor and wall, with y, v_y, h and v_h zero: a lifted ball moves alike at every height."""
+    """The state put on floor and wall, with y, v_y, h and v_h zero: a lifted ball moves alike at
+    every height."""
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
 
 def _search(lab: Lab, edge: Edge) -> Search:
-    """A search for the place on an edge's line at which the border is, first between the attractors.
+    """A search for the place on an edge's line at which the border is, first between the
+    attractors.
 
     Later lines are a hundredth as long, and four times as long after each that missed the border.
     """
@@ -207,30 +272,39 @@ def _search(lab: Lab, edge: Edge) -> Search:
 
     def task(s: float, bracket: Bracket, attempt: Attempt) -> Task:
         lasts = t_end * attempt.time
-        return lab.task(edge.p, edge.centre + s * edge.line, lasts, step, samples=round(lasts / (8 * step)))
+        return lab.task(
+            edge.p, edge.centre + s * edge.line, lasts, step, samples=round(lasts / (8 * step))
+        )
 
     return Search(around, task, partial(ends_slipping, edge=edge), width)
 
 
 def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
-    """Whether a run tends to slipping: by the direction in which it moves, or the rest state it is extrapolated to.
+    """Whether a run tends to slipping: by the direction in which it moves, or the rest state it is
+    extrapolated to.
 
-    None while it moves by little, ever more slowly, and to neither attractor: then it isn't the border's instability
-    that moves it.
-    """
+    None while it moves by little, ever more slowly, and to neither attractor: then it isn't the
+    border's instability that moves it."""
     slipping, lifted = (float(State.of(x).omega_c) for x in (edge.slipping, edge.lifted))
     parts = np.array_split(run.omega_c[tail(run, 0.4)], 4)
-    first, second, third, last = (float(taper(len(part)) @ part / taper(len(part)).sum()) for part in parts)
+    first, second, third, last = (
+        float(taper(len(part)) @ part / taper(len(part)).sum()) for part in parts
+    )
     before, now, way = second - first, last - third, abs(lifted - slipping)
-    if abs(last - first) > Borders.far * way or (before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)):
+    if abs(last - first) > Borders.far * way or (
+        before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)
+    ):
         return (last - first) * (slipping - lifted) > 0
-    end = last + now * abs(now) / max(abs(before) - abs(now), abs(now), 1e-300)  # by a geometric series
+    end = last + now * abs(now) / max(
+        abs(before) - abs(now), abs(now), 1e-300
+    )  # by a geometric series
     rests = [abs(end - each) < Borders.arrived * way for each in (slipping, lifted)]
     return rests[0] if any(rests) else None
 
 
 def _next_line(edge: Edge) -> Edge:
-    """The edge with the next line to search: from where the last two runs still agreed, along which they part.
+    """The edge with the next line to search: from where the last two runs still agreed, along which
+    they part.
 
     Together they are within 2e-3 of the distance of the attractors.
     """
@@ -249,11 +323,12 @@ def _next_line(edge: Edge) -> Edge:
 
 
 def _uncertainty(edge: Edge) -> Array:
-    """Standard uncertainty of the crossing (8,), by the last bracket's width and by how far more lines would move it.
+    """Standard uncertainty of the crossing (8,), by the last bracket's width and by how far more
+    lines would move it.
 
-    They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size;
-    and no less than the distance from the crossing to the next line, through the mean of the last two runs.
-    """
+    They are taken to shrink as the last two did: together they are at least the last one, and at
+    most ten of its size; and no less than the distance from the crossing to the next line, through
+    the mean of the last two runs."""
     assert edge.bracket is not None
     *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in edge.moves))
     ratio = min(last / before, 0.9) if before else 0.0
@@ -269,12 +344,19 @@ def _edge_rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
     """Measurements of the state on an edge: omega_c, slips and the spin on the wall."""
     if not (edge.moves and edge.bracket):  # it is to be crossed by the last line, and by one before
         at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
-        yield Missing("edge", edge.set, f"{at} the last lines missed the border between the two attractors", 5)
+        yield Missing(
+            "edge", edge.set, f"{at} the last lines missed the border between the two attractors", 5
+        )
         return
     x, sure = State.of(edge.crossing), State.of(_uncertainty(edge))
-    roll, values = edge.p.R / edge.p.r, {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
+    roll, values = (
+        edge.p.R / edge.p.r,
+        {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")},
+    )
     values["wall_spin"] = x.slip_x + roll * x.omega_c
     slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
     for name, value in values.items():
         of = Measured(value, slips / roll if name == "omega_c" else slips)
-        yield measurement(lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
+        yield measurement(
+            lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS"
+        )

@@ -1,8 +1,9 @@
-"""The critical drag: below it slipping at both points ends in a fold, above it passes to the wall without a jump.
+"""The critical drag: below it slipping at both points ends in a fold, above it passes to the wall
+without a jump.
 
-At the end of the branch the floor carries nothing; the sign of the slope of omega_0 over the floor's force there
-decides whether the branch turns back. States are settled in stronger drag than that, where they last up to the end.
-"""
+At the end of the branch the floor carries nothing; the sign of the slope of omega_0 over the
+floor's force there decides whether the branch turns back. States are settled in stronger drag than
+that, where they last up to the end."""
 
 from __future__ import annotations
 
@@ -24,8 +25,17 @@ class Births:
     """Where the birth of a fold is looked for."""
 
     first: tuple[float, float] = (2.0, 4.0)  # values of c sqrt(R/g)
-    nearer: tuple[float, float] = (1.6, 2.6)  # of the drag extrapolated from those: far off, where states settle soon
-    before: tuple[float, ...] = (0.02, 0.035, 0.055, 0.08, 0.12)  # omega_02, in parts of the range of slipping
+    nearer: tuple[float, float] = (
+        1.6,
+        2.6,
+    )  # of the drag extrapolated from those: far off, where states settle soon
+    before: tuple[float, ...] = (
+        0.02,
+        0.035,
+        0.055,
+        0.08,
+        0.12,
+    )  # omega_02, in parts of the range of slipping
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +47,11 @@ class BranchEnd:
     tasks: list[Task]
 
 
-def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The drag at which the fold is born, where d omega_0/dA_y along the branch of SS is zero at its end, A_y = 0.
+def birth(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """The drag at which the fold is born, where d omega_0/dA_y along the branch of SS is zero at
+    its end, A_y = 0.
 
     The zero of the straight line through the slopes as a function of 1/c.
     """
@@ -53,7 +66,9 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     for _ in (Births.first, Births.nearer):
         starts = [
             [
-                named_start(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest")
+                named_start(
+                    name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest"
+                )
                 for part in Births.before
             ]
             for name, c in drags
@@ -66,14 +81,27 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
                 found[name].append(BranchEnd(1 / c, slope, [state.task for state in states]))
         for name, own in found.items():
             if len(own) >= len(Births.first):
-                values, noise = zip(*((end.slope.value, end.slope.uncertainty) for end in own), strict=True)
+                values, noise = zip(
+                    *((end.slope.value, end.slope.uncertainty) for end in own), strict=True
+                )
                 lags[name], _ = straight_line([end.lag for end in own], values, noise)
-        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in Births.nearer]
+        drags = [
+            (name, 1 / lag.value * k)
+            for name, lag in lags.items()
+            if lag.value > 0
+            for k in Births.nearer
+        ]
     for name, p in sets.items():
         if name not in ranges:
-            yield Missing("birth", name, "there is no range of slipping at both points that ends at the wall")
+            yield Missing(
+                "birth", name, "there is no range of slipping at both points that ends at the wall"
+            )
         elif len(found[name]) < len(Births.first) + len(Births.nearer):
-            yield Missing("birth", name, "too few states of slipping at both points settle near the end of the branch")
+            yield Missing(
+                "birth",
+                name,
+                "too few states of slipping at both points settle near the end of the branch",
+            )
         else:
             drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)
             tasks = [task for end in found[name] for task in end.tasks]

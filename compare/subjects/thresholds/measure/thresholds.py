@@ -1,10 +1,13 @@
-"""The thresholds of the bifurcation diagram, each measured in two ways that have nothing in common but the engine.
+"""The thresholds of the bifurcation diagram, each measured in two ways that have nothing in common
+but the engine.
 
-* Bisected, by the engine's own contacts: the largest flow at which a rolling ball stays without slip, or on the floor;
-  the least at which the wall holds a ball that rides it; the flow up to which a lifted ball, pressed lightly on the
-  floor, goes back to rolling on both; the largest flow at which a slipping ball settles.
-* Extrapolated from settled states on one side: the flow at which their lag behind the fluid, their sinking or the force
-  of the floor would vanish, or at which omega_0 along the branch has its maximum.
+* Bisected, by the engine's own contacts: the largest flow at which a rolling ball stays without
+  slip, or on the floor; the least at which the wall holds a ball that rides it; the flow up to
+  which a lifted ball, pressed lightly on the floor, goes back to rolling on both; the largest flow
+  at which a slipping ball settles.
+* Extrapolated from settled states on one side: the flow at which their lag behind the fluid, their
+  sinking or the force of the floor would vanish, or at which omega_0 along the branch has its
+  maximum.
 """
 
 from __future__ import annotations
@@ -23,7 +26,13 @@ from compare.kit.engines import sliding_speeds
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.settling import Patience, Settled
-from compare.kit.statistics import COVERAGE, POINTS, Measured, extrapolated_maximum, extrapolated_zero
+from compare.kit.statistics import (
+    COVERAGE,
+    POINTS,
+    Measured,
+    extrapolated_maximum,
+    extrapolated_zero,
+)
 from compare.kit.tasks import Task
 from compare.subjects.thresholds.measure.answers import ASKED, lifts, slip
 from model import Case, Parameters, State
@@ -35,9 +44,12 @@ class Distances:
     """Relative distances of flows."""
 
     coarse: float = 1e-2  # width of a bracket where only the neighbourhood is wanted
-    away: float = 0.03  # from a known end of rolling, where an engine beside the one on trial looks for it
-    # Of settled states from where something vanishes; below a fold, where slip goes like the root of the distance, in
-    # parts of the range of slipping; and from where a ball rides the wall as slowly as it can.
+    away: float = (
+        0.03  # from a known end of rolling, where an engine beside the one on trial looks for it
+    )
+    # Of settled states from where something vanishes; below a fold, where slip goes like the root
+    # of the distance, in parts of the range of slipping; and from where a ball rides the wall as
+    # slowly as it can.
     settled: tuple[float, ...] = (0.005, 0.01, 0.02, 0.03, 0.05)
     turning: tuple[float, ...] = (0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15)
     riding: tuple[float, ...] = (0.002, 0.008, 0.02, 0.035, 0.05)
@@ -51,8 +63,11 @@ From = Callable[[Parameters], Array]
 """The state in which a ball starts, by its parameters."""
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The thresholds of each set: bisected between flows whose settled cases differ, and extrapolated from states."""
+def measure(
+    lab: Lab, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """The thresholds of each set: bisected between flows whose settled cases differ, and
+    extrapolated from states."""
     sure = not lab.effort.granted
     found = [_where_cases_change(lab, name, p, records) for name, p in sets.items()]
     _narrow(lab, found, _end_of_rolling, careful=sure)
@@ -63,7 +78,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for each in found:
         for kind, bracket in each.brackets.items():
             if bracket.failure and kind != "sinking":  # which is looked for roughly
-                yield each.missing(f"{kind}: its limit is known less well, as a run {bracket.failure}", 0)
+                yield each.missing(
+                    f"{kind}: its limit is known less well, as a run {bracket.failure}", 0
+                )
         yield from _rows(each)
         yield from _rows_of_slipping(each)
 
@@ -72,32 +89,43 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 class Findings:
     """What was found on one set so far, by kind of change of the motion.
 
-    Kinds: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or where slip of a "riding" ball ends.
-    """
+    Kinds: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or where slip of a
+    "riding" ball ends."""
 
     lab: Lab
     set: str
     p: Parameters
-    cases: Mapping[str, Mapping[float, Case]]  # in which cases balls were seen to settle, by flow, the slowest first
+    cases: Mapping[
+        str, Mapping[float, Case]
+    ]  # in which cases balls were seen to settle, by flow, the slowest first
     changes: Mapping[str, Bracket]  # flows between which it is looked for
     brackets: dict[str, Bracket] = field(default_factory=dict)
     states: dict[str, list[Settled]] = field(default_factory=dict)
-    """Settled states beside a change, the nearest first, by kind: of "riding", "sinking", "lifted" balls; of "slipping"
-    ones near its beginning, and "turning" ones near its end."""
+    """Settled states beside a change, the nearest first, by kind: of "riding", "sinking", "lifted"
+    balls; of "slipping" ones near its beginning, and "turning" ones near its end."""
 
     def search(
         self, kind: str, around: Bracket, width: float, start: From | None = None, time: float = 1.0
     ) -> tuple[str, Search]:
-        """A search that narrows a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
+        """A search that narrows a bracket by runs at held flows, `time` times as long as a question
+        of `ASKED` takes.
 
-        They start as `STARTS` says, unless another start is given; for the end of slipping, from the state that the
-        ball reached at the largest flow so far.
-        """
+        They start as `STARTS` says, unless another start is given; for the end of slipping, from
+        the state that the ball reached at the largest flow so far."""
         units, answer = ASKED[kind]
 
         def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
-            q, last = self.p.replace(omega_0=float(omega)), bracket.runs[0] if kind == "slipping" else None
-            x0 = last.x[-1] if last else start(q) if start else settling.named_start("", q, STARTS[kind]).x0
+            q, last = (
+                self.p.replace(omega_0=float(omega)),
+                bracket.runs[0] if kind == "slipping" else None,
+            )
+            x0 = (
+                last.x[-1]
+                if last
+                else start(q)
+                if start
+                else settling.named_start("", q, STARTS[kind]).x0
+            )
             t_end = settling.rounded_duration(q, units * time * attempt.time)
             return self.lab.task(q, x0, t_end, coarse_step(q) / attempt.refine)
 
@@ -115,35 +143,47 @@ class Findings:
     def row(
         self, quantity: str, at: Measured | float | None, tasks: Sequence[Task], **how: str
     ) -> Measurement | Missing:
-        """The measurement of a threshold, or of a number on the set; or why the threshold was not found."""
+        """The measurement of a threshold, or of a number on the set; or why the threshold was not
+        found."""
         if at is None:
             why = f"too few states settled for {quantity} by {how['by']}, or their extrapolation has no zero"
             return self.missing(why)
         p = self.p.replace(omega_0=at.value) if isinstance(at, Measured) else self.p
         return measurement(self.lab, "thresholds", self.set, p, quantity, at, tasks, **how)
 
-    def row_of_bracket(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
+    def row_of_bracket(
+        self, quantity: str, of: Bracket, side: str, by: str
+    ) -> Measurement | Missing:
         """The measurement of a threshold that lies in a bracket."""
-        # Slip that is still too small to count may have begun below: it is proportional to the distance.
-        speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run))
+        # Slip that is still too small to count may have begun below: it is proportional to the
+        # distance.
+        speed = max(
+            slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run)
+        )
         unseen = of.width / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
         return self.row(quantity, place, of.tasks, side=side, by=by)
 
-    def rows_of_zero(self, kind: str, what: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
-        """The measurement of a threshold at which something is zero, extrapolated from settled states beside it."""
+    def rows_of_zero(
+        self, kind: str, what: str, quantity: str, side: str, by: str
+    ) -> Iterator[Measurement | Missing]:
+        """The measurement of a threshold at which something is zero, extrapolated from settled
+        states beside it."""
         if kind in self.states:
             states = self.states[kind]
-            place, tasks = extrapolated(states, what, extrapolated_zero), [state.task for state in states]
+            place, tasks = (
+                extrapolated(states, what, extrapolated_zero),
+                [state.task for state in states],
+            )
             yield self.row(quantity, place, tasks, side=side, by=f"{by} → 0")
 
 
 def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
-    """For each kind of change a bracket to search: the flows of settled states between which the case changes.
+    """For each kind of change a bracket to search: the flows of settled states between which the
+    case changes.
 
-    Without such flows from half the slowest, or up to twice the fastest. An engine beside the one on trial looks where
-    that one found something.
-    """
+    Without such flows from half the slowest, or up to twice the fastest. An engine beside the one
+    on trial looks where that one found something."""
     starts = STARTS | {"slipping": lab.effort.settled_starts[0][0]}
     cases = {kind: settling.settled_cases(records, name, how) for kind, how in starts.items()}
     changes = {}
@@ -151,11 +191,15 @@ def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) ->
         if flows := list(seen):
             ended = {Case.NR} if kind != "rolling" else set(Case) - {Case.RR}
             low = max((flow for flow in flows if seen[flow] not in ended), default=flows[0] / 2)
-            changes[kind] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
+            changes[kind] = Bracket(
+                low, next((flow for flow in flows if flow > low), 2 * flows[-1])
+            )
     if any(m.set == name for m in records.select("thresholds")):
         changes = {}
         for kind, quantities in FOUND.items():
-            for known in filter(None, (records.threshold(name, quantity) for quantity in quantities)):
+            for known in filter(
+                None, (records.threshold(name, quantity) for quantity in quantities)
+            ):
                 away = Distances.away if kind == "rolling" else Distances.coarse / 3
                 changes[kind] = Bracket(known.value * (1 - away), known.value * (1 + away))
     return Findings(lab, name, p, cases, changes)
@@ -182,7 +226,8 @@ def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
 
 
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
-    """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles on the floor."""
+    """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles
+    on the floor."""
     if change := each.changes.get("sinking"):
         yield each.search("sinking", change, Distances.coarse * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
@@ -192,16 +237,25 @@ def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
 
 
 def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
-    """Settle states beside every change; those count that did settle, in the case that belongs there.
+    """Settle states beside every change; those count that did settle, in the case that belongs
+    there.
 
-    A bracket is taken for a change only if something was seen beyond it, or that may be taken for granted.
-    """
-    beside: list[tuple[Findings, str, str, Array]] = []  # findings, kind of state, how it starts, flows in rad s-1
+    A bracket is taken for a change only if something was seen beyond it, or that may be taken for
+    granted."""
+    beside: list[
+        tuple[Findings, str, str, Array]
+    ] = []  # findings, kind of state, how it starts, flows in rad s-1
     for each in found:
-        unseen = [kind for kind, b in each.brackets.items() if not (b.runs[1] or b.high in each.cases[kind])]
+        unseen = [
+            kind
+            for kind, b in each.brackets.items()
+            if not (b.runs[1] or b.high in each.cases[kind])
+        ]
         for kind in unseen if not lab.effort.granted else ():
             del each.brackets[kind]
-        settled, turning, riding = (np.array(row) for row in (Distances.settled, Distances.turning, Distances.riding))
+        settled, turning, riding = (
+            np.array(row) for row in (Distances.settled, Distances.turning, Distances.riding)
+        )
         if carried := each.brackets.get("sinking"):
             beside.append((each, "riding", "on the wall", carried.high * (1 + riding)))
             if lab.effort.slow:  # a ball that sinks swings for long
@@ -214,21 +268,29 @@ def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
             beside.append((each, "slipping", "rest", end.high + settled * min(span, end.high)))
             beside.append((each, "turning", "rest", last.low - turning * span))
     starts = [
-        [settling.named_start(each.set, each.p.replace(omega_0=flow), how) for flow in flows.tolist()]
+        [
+            settling.named_start(each.set, each.p.replace(omega_0=flow), how)
+            for flow in flows.tolist()
+        ]
         for each, _, how, flows in beside
     ]
     patience = Patience(loose=lab.effort.thresholds_loose, rounds=lab.effort.thresholds_rounds)
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
-    for (each, kind, *_), states in zip(beside, settling.settle_groups(lab, starts, patience), strict=True):
+    for (each, kind, *_), states in zip(
+        beside, settling.settle_groups(lab, starts, patience), strict=True
+    ):
         case = belongs.get(kind, Case.NR)
-        each.states[kind] = [s for s in states if not s.failure and settling.physical_case(s.case) is case]
+        each.states[kind] = [
+            s for s in states if not s.failure and settling.physical_case(s.case) is case
+        ]
 
 
 def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
-    """Searches for where a ball on the wall begins to slip, and up to where one pressed to the floor rolls again.
+    """Searches for where a ball on the wall begins to slip, and up to where one pressed to the
+    floor rolls again.
 
-    They begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
-    """
+    They begin from settled states continued to each flow; the pressed one has a thousandth less
+    spin on the wall."""
     width = each.lab.effort.thresholds_width
     begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
     if begins and len(riding) == len(Distances.riding):
@@ -237,13 +299,18 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
     end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
     if end and len(lifted) == len(Distances.riding):
         change = Bracket(end.low * (1 - Distances.coarse), end.high * (1 + Distances.coarse))
-        yield each.search("leaning", change, width * end.high, riding_start(lifted, height=0.0, less=1e-3))
+        yield each.search(
+            "leaning", change, width * end.high, riding_start(lifted, height=0.0, less=1e-3)
+        )
 
 
 def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) -> From:
-    """A state that rides the wall at a height, continued in omega_0 from settled states, with less spin."""
+    """A state that rides the wall at a height, continued in omega_0 from settled states, with less
+    spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
-    fit = np.polynomial.Polynomial.fit(omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1)
+    fit = np.polynomial.Polynomial.fit(
+        omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1
+    )
 
     def ride(p: Parameters) -> Array:
         slip_x = float(fit(p.omega_0))
@@ -254,16 +321,22 @@ def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) ->
 
 
 def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
-    """The maximum of omega_0 along the branch of slipping, if it ends in a fold; and whether it ends without one.
+    """The maximum of omega_0 along the branch of slipping, if it ends in a fold; and whether it
+    ends without one.
 
-    There is no fold where the floor would have to pull at that maximum, or there is none and the floor's force vanishes
-    just where the wall begins to carry the ball.
-    """
+    There is no fold where the floor would have to pull at that maximum, or there is none and the
+    floor's force vanishes just where the wall begins to carry the ball."""
     turned, held = each.states.get("turning", []), each.brackets.get("riding")
     top = extrapolated(turned, "slip_x", extrapolated_maximum)
     unloaded = extrapolated(turned, "force_Ay", extrapolated_zero)
-    off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
-    forces = partial(extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in turned]))
+    off = (
+        max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty)
+        if held and unloaded
+        else math.inf
+    )
+    forces = partial(
+        extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in turned])
+    )
     if pressing := extrapolated(turned, "slip_x", forces):
         sure = COVERAGE * pressing.uncertainty
         return top if pressing.value > sure else None, pressing.value < -sure
@@ -273,19 +346,24 @@ def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
 def extrapolated(
     states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Measured]], Measured]
 ) -> Measured | None:
-    """The flow to which a quantity of settled states is extrapolated; None if they are too few, or there is none."""
+    """The flow to which a quantity of settled states is extrapolated; None if they are too few, or
+    there is none."""
     if len(states) < POINTS:
         return None
     flows = [state.start.p.omega_0 for state in states]
     values = [state.values["omega_c" if quantity == "lag" else quantity] for state in states]
     if quantity == "lag":
-        values = [Measured(flow - orbit.value, orbit.uncertainty) for flow, orbit in zip(flows, values, strict=True)]
+        values = [
+            Measured(flow - orbit.value, orbit.uncertainty)
+            for flow, orbit in zip(flows, values, strict=True)
+        ]
     place = to(np.array(flows), values)
     return place if math.isfinite(place.uncertainty) else None
 
 
 def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
-    """A search for the largest flow at which a ball on the floor settles, about the maximum of omega_0 on the branch.
+    """A search for the largest flow at which a ball on the floor settles, about the maximum of
+    omega_0 on the branch.
 
     At a fold all slows down, like the root of the distance.
     """
@@ -293,12 +371,18 @@ def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
     if top and each.lab.effort.slow:
         narrowest = each.lab.effort.thresholds_fold
         half = max(narrowest, 5.0 * top.uncertainty / top.value)
-        change, nearest = Bracket(top.value * (1 - half), top.value * (1 + half)), each.states["turning"][0]
-        yield each.search("fold", change, narrowest * top.value, lambda _: nearest.mean, 1 / math.sqrt(narrowest))
+        change, nearest = (
+            Bracket(top.value * (1 - half), top.value * (1 + half)),
+            each.states["turning"][0],
+        )
+        yield each.search(
+            "fold", change, narrowest * top.value, lambda _: nearest.mean, 1 / math.sqrt(narrowest)
+        )
 
 
 def _rows(each: Findings) -> Iterator[Measurement | Missing]:
-    """Measurements of the end of rolling (omega_01 or omega_03), and of omega_02, the least that holds a ball up."""
+    """Measurements of the end of rolling (omega_01 or omega_03), and of omega_02, the least that
+    holds a ball up."""
     none = "no flow that was tried, up to twice the fastest of the settled states,"
     if not (rolling := each.bracket_seen("rolling")):
         yield each.missing(f"{none} ends two-point rolling")
@@ -306,30 +390,39 @@ def _rows(each: Findings) -> Iterator[Measurement | Missing]:
         yield each.row("lifts", 1.0, rolling.tasks)
         yield each.row_of_bracket("omega_03", rolling, "from below", "loss of the floor")
         if leaning := each.bracket_seen("leaning"):
-            yield each.row_of_bracket("omega_03", leaning, "from above", "return to rolling when pressed")
+            yield each.row_of_bracket(
+                "omega_03", leaning, "from above", "return to rolling when pressed"
+            )
         else:
             why = "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
             yield each.missing(why)
     else:
         yield each.row("lifts", 0.0, rolling.tasks)
         yield each.row_of_bracket("omega_01", rolling, "from below", "onset of slip")
-        yield from each.rows_of_zero("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
+        yield from each.rows_of_zero(
+            "slipping", "lag", "omega_01", "from above", "lag of settled slipping"
+        )
     if riding := each.bracket_seen("riding"):
         yield each.row_of_bracket("omega_02", riding, "from above", "onset of sliding on the wall")
     else:
         yield each.missing(f"{none} is the least to hold a ball on the wall")
-    yield from each.rows_of_zero("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
+    yield from each.rows_of_zero(
+        "sinking", "v_y", "omega_02", "from below", "speed of settled sinking"
+    )
 
 
 def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
-    """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the number of folds."""
+    """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the
+    number of folds."""
     if "turning" not in each.states:
         if (rolling := each.bracket_seen("rolling")) and not lifts(rolling):
             yield each.missing("no end of slipping at both points was found", 3)
         return
     (top, smooth), tasks = _end_of_slipping(each), [state.task for state in each.states["turning"]]
     # At how many of the rising flows that were tried a ball from rest ceases to settle in SS.
-    said: dict[float, bool | None] = {flow: case is Case.SS for flow, case in each.cases["slipping"].items()}
+    said: dict[float, bool | None] = {
+        flow: case is Case.SS for flow, case in each.cases["slipping"].items()
+    }
     if tried := each.brackets.get("slipping"):
         said |= dict(tried.said)
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
@@ -338,14 +431,22 @@ def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
     if settles and (ends or not each.lab.effort.granted):
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
-        yield from each.rows_of_zero("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
+        yield from each.rows_of_zero(
+            "turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping"
+        )
     elif top is None:
-        yield each.missing("settled slipping points to no flow at which it ends", 2 if settles else 3)
+        yield each.missing(
+            "settled slipping points to no flow at which it ends", 2 if settles else 3
+        )
     else:
-        yield each.row("omega_04", top, tasks, side="from below", by="maximum of omega_0 along the branch")
+        yield each.row(
+            "omega_04", top, tasks, side="from below", by="maximum of omega_0 along the branch"
+        )
         if fold := each.bracket_seen("fold"):
             yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
         else:
             slow = "costs more than an engine beside the one on trial may"
             why = "could not be done" if each.lab.effort.slow else slow
-            yield each.missing(f"the end of slipping at both points is extrapolated; to bracket it {why}")
+            yield each.missing(
+                f"the end of slipping at both points is extrapolated; to bracket it {why}"
+            )
