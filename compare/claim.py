@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
+from functools import cached_property
 from statistics import median
 from typing import Any
 
@@ -107,6 +108,19 @@ class Claim:
             )
         if self.algebra:
             object.__setattr__(self, "text", Text.FORMAL)
+
+    @cached_property
+    def numbers(self) -> frozenset[int]:
+        """Which bearings predict a number, and not a case, a count, or a bound on one side only."""
+        sides = {(each.protocol, each.quantity, each.relation) for each in self.bearings}
+
+        def predicts(of: Bearing) -> bool:
+            if of.relation is Relation.EQUAL:
+                return quantity(of.quantity).resolves > 0
+            both = Relation.AT_MOST, Relation.AT_LEAST
+            return all((of.protocol, of.quantity, each) in sides for each in both)
+
+        return frozenset(n for n, each in enumerate(self.bearings) if predicts(each))
 
     @property
     def protocols(self) -> frozenset[str]:

@@ -13,7 +13,7 @@ import analytic
 from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.quantities import quantity
-from compare.kit.record import Check, Measurement, Missing, Records, Relation
+from compare.kit.record import Check, Measurement, Missing, Records
 from compare.kit.settling import ERROR_GROUPS, scale
 from compare.kit.statistics import COVERAGE, Measured
 from compare.kit.trials import slip_unit
@@ -29,6 +29,10 @@ best."""
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 """What a prediction raises where theory knows no such state or motion: that is a deviation, not a
 breakdown."""
+
+ENOUGH = 1 / 2
+"""Part of the numbers of each bearing that must be able to tell."""
+SILENT = "its protocol measured nothing, and does not say why"
 
 _RATIOS = frozenset({"slope", "steepest", "filippov_share", "response", "law_in_motion"})
 """Ratios, angles, and deviations that are divided by their scales already."""
@@ -74,15 +78,15 @@ def forget() -> None:
 def verdict(claim: Claim, records: Records) -> Verdict:
     """The verdict on a claim: each measurement beside its prediction, and the outcome.
 
-    Refuted if one check deviates beyond its tolerance; else inconclusive if of a bearing fewer than
-    half of the checks are fine enough to tell; else not run if the claim predicts numbers and has
-    none, since counts confirm no number; else confirmed. A check that is too coarse confirms
-    nothing, and is counted apart. Whatever a prediction raises makes the verdict an error of this
-    claim alone."""
+    Refuted if one check deviates beyond its tolerance; else inconclusive if of a bearing too few
+    checks are fine enough to tell, see `ENOUGH`; else not run if the claim predicts numbers and has
+    none, since counts confirm no number; else inconclusive if planned numbers are lost without a
+    reason that their protocol gave; else confirmed. A check that is too coarse confirms nothing, and is
+    counted apart. Whatever a prediction raises makes the verdict an error of this claim alone."""
+    lost = lost_to(claim, records)
     left_out = Counter[Missing]()
-    for each in records.missing:
-        if each.protocol in claim.protocols:
-            left_out[replace(each, rows=0)] += each.rows
+    for each in (*lost, *(m for m in records.missing if m.protocol in claim.protocols)):
+        left_out[replace(each, rows=0)] += each.rows
     missing = tuple(replace(each, rows=rows) for each, rows in left_out.most_common())
     try:
         checks = tuple(claim.algebra() if claim.algebra else checks_of(claim, records))
@@ -101,28 +105,35 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         )
     return Verdict(
         claim=claim,
-        outcome=outcome(claim, checks, per_bearing(checks)),
+        outcome=outcome(claim, checks, per_bearing(checks), lost),
         checks=checks,
         missing=missing,
     )
 
 
-def outcome(claim: Claim, checks: Sequence[Check], wanted: Counter[int]) -> Outcome:
+def outcome(
+    claim: Claim, checks: Sequence[Check], wanted: Counter[int], lost: Sequence[Missing] = ()
+) -> Outcome:
     """The outcome of a claim by its checks; `wanted` is how many were to be made for each bearing.
     See `verdict`."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
     if undecided_bearings(checks, wanted):
         return Outcome.INCONCLUSIVE
-    equal = {
-        n: each.quantity for n, each in enumerate(claim.bearings) if each.relation is Relation.EQUAL
-    }
-    numbers = {
-        n for n, name in equal.items() if quantity(name).resolves > 0
-    }  # no case, no count, no bound
-    if not checks or (numbers and numbers.isdisjoint(per_bearing(checks))):
+    if not checks or (claim.numbers and claim.numbers.isdisjoint(per_bearing(checks))):
         return Outcome.NOT_RUN
-    return Outcome.CONFIRMED
+    return Outcome.INCONCLUSIVE if lost else Outcome.CONFIRMED
+
+
+def lost_to(claim: Claim, records: Records) -> tuple[Missing, ...]:
+    """What a claim misses of the planned numbers, though no protocol said why."""
+    asked = {(each.protocol, each.quantity) for each in claim.bearings}
+    asked |= {(each.protocol, "") for each in claim.bearings}
+    return tuple(
+        Missing(protocol, of, f"{name} was measured and is lost" if name else SILENT, rows)
+        for (protocol, of, name), rows in sorted(records.lost.items())
+        if (protocol, name) in asked
+    )
 
 
 def per_bearing(checks: Iterable[Check]) -> Counter[int]:
@@ -131,10 +142,9 @@ def per_bearing(checks: Iterable[Check]) -> Counter[int]:
 
 
 def undecided_bearings(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
-    """Bearings of which fewer than half of the checks that are wanted can tell, and how many
-    can."""
+    """Bearings of which too few of the checks that are wanted can tell, and how many can."""
     told = per_bearing(check for check in checks if check.conclusive)
-    return {n: told[n] for n, count in wanted.items() if 2 * told[n] < count}
+    return {n: told[n] for n, count in wanted.items() if told[n] < ENOUGH * count}
 
 
 def checks_of(claim: Claim, records: Records) -> list[Check]:

@@ -125,7 +125,8 @@ def validate(
     count = workers if isinstance(workers, int) else workers.count
     with processes(min(count, os.cpu_count() or 1)) as work:
         draw = far.drawing(work.map) if report else None
-        _write(output, level, files, results.load_measurements(output, files), verdicts, draw)
+        measured = results.load_measurements(output, level.name, files)
+        _write(output, level, files, measured, verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
 
 
@@ -214,7 +215,8 @@ def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
 @cache
 def stored(directory: Path) -> RecordsByEngine:
     """The measurements of the last validation in a directory, read once in a process."""
-    return results.load_measurements(directory, results.load(directory).measurements)
+    summary = results.load(directory)
+    return results.load_measurements(directory, summary.level, summary.measurements)
 
 
 def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Evidence:

@@ -28,7 +28,14 @@ import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
 from compare.claim import Claim, Outcome, Verdict, Witness
-from compare.judge import checks_of, outcome, per_bearing, undecided_bearings, verdict
+from compare.judge import (
+    checks_of,
+    lost_to,
+    outcome,
+    per_bearing,
+    undecided_bearings,
+    verdict,
+)
 from compare.kit.engines import Engine, engine
 from compare.kit.lab import coarse_step, time_unit
 from compare.kit.quantities import quantity
@@ -127,7 +134,10 @@ def _testify(
     finest = {
         row.protocol: n for n, row in rows
     }  # the largest number by which the step of each was divided
-    missing = [row for n, row in rows if isinstance(row, Missing) and finest[row.protocol] == n]
+    lost = [each for own in steps.values() for each in lost_to(claim, own)]
+    missing = lost + [
+        row for n, row in rows if isinstance(row, Missing) and finest[row.protocol] == n
+    ]
     try:
         found = {n: checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
@@ -173,8 +183,8 @@ def _testify(
     )
     return Witness(
         engine=by.name,
-        outcome=outcome(claim, checks, wanted),
-        reason=_too_few(claim, checks, wanted, missing),
+        outcome=outcome(claim, checks, wanted, lost),
+        reason=_too_few(claim, checks, wanted, missing) or "; ".join(map(str, lost[:3])),
         checks=checks,
         order=median(orders) if orders else math.nan,
         deviations=_deviations(c for c, step in usual if by.allowance or step == USUAL_STEP),

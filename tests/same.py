@@ -22,7 +22,8 @@ def protocols(directory: Path) -> dict[str, Records]:
     for path in sorted(directory.glob("measurements/*/*.h5")):
         with h5py.File(path) as file:
             about = json.loads(file.attrs["about"])
-        found[f"{path.stem} by {about['engine']}, step/{about.get('step', 1)}"] = record.load(path)
+        by = about.get("by", about["engine"])
+        found[f"{path.stem} by {by}, step/{about.get('step', 1)}"] = record.load(path)
     return found
 
 

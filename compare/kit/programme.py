@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import KW_ONLY, asdict, dataclass, replace
+from functools import cached_property
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -18,7 +20,7 @@ from compare.kit import record
 from compare.kit.engines import Engine, Role
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import ASSIGNMENTS, MOST_WITNESSED, Assignment, Level, sets
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Measurement, Missing, Origin, Planned, Records
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
 from model import Parameters, StorageError
@@ -123,21 +125,31 @@ class Job:
             * self.lab.refine
         )
 
-    @property
-    def file(self) -> Path:
-        """Where its measurements are kept: elsewhere for each engine, step, level, choice of sets,
-        and program."""
+    @cached_property
+    def origin(self) -> Origin:
+        """Who measures, and by which plan."""
         engine = self.protocol.engine or self.lab.engine
         subject, measure, _ = self.protocol.measure.__module__.partition(".measure")
-        identity = [
+        plan = [
             engine.name,
             self.lab.refine,
             self.lab.level.name,
             {name: asdict(p) for name, p in self.sets.items()},
             sources(*engine.sources, "compare.kit", *([subject + measure] if measure else [])),
         ]
-        apart = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
-        return self.results / DIRECTORY / apart / f"{self.protocol.name}.h5"
+        return Origin(
+            protocol=self.protocol.name,
+            engine=self.lab.engine.name,
+            by=engine.name,
+            step=self.lab.refine,
+            level=self.lab.level.name,
+            plan=hashlib.sha256(json.dumps(plan).encode()).hexdigest()[:16],
+        )
+
+    @property
+    def file(self) -> Path:
+        """Where its measurements are kept: elsewhere for each plan."""
+        return self.results / DIRECTORY / self.origin.plan / f"{self.protocol.name}.h5"
 
 
 def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
@@ -215,7 +227,7 @@ def carry_out(job: Job, before: Records) -> Records:
     Its measurement file is the record of what is done: once it is there, only the runs that a
     figure draws are kept.
 
-    Raises `StorageError` where measurements can't be read or written.
+    Raises `StorageError` where measurements can't be read or written, or are another engine's.
     """
     path, protocol = job.file, job.protocol
     label = f"{protocol.name}-{path.parent.name}"
@@ -236,20 +248,18 @@ def carry_out(job: Job, before: Records) -> Records:
         else:
             rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(path.parent)
-        about = {
-            "protocol": protocol.name,
-            "engine": lab.engine.name,
-            "step": lab.refine,
-            "level": lab.level.name,
-        }
         place = f"{campaign.directory.name}/{label}.h5"
         for k, row in enumerate(rows):
             if isinstance(row, Measurement) and protocol.drawn(row) and not lab.is_witness:
                 rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         records = Records.of(rows)
+        said = {row.set for row in rows}
+        if said <= job.sets.keys():  # else the protocol has sets of its own
+            silent = (Planned(protocol.name, name, "") for name in job.sets if name not in said)
+            records = replace(records, planned=records.planned + Counter(silent))
         campaign.keep(
             {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run}
         )
-        record.save(records, path, about)
+        record.save(records, path, asdict(job.origin))
     campaign.reduce()
-    return record.load(path)
+    return record.load(path, **asdict(job.origin))

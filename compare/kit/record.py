@@ -12,11 +12,13 @@ import dataclasses
 import functools
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +34,7 @@ from model.versions import current_commit, current_versions
 
 SCHEMA, SCHEMA_VERSION = "dualball-measurements", 1
 Condition = float | str
+ANEW = "remove it, and 'dualball validate' measures anew"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +75,11 @@ class Measurement:
         """Unit of value and uncertainty."""
         return quantity(self.quantity).unit
 
+    @property
+    def finite(self) -> bool:
+        """Whether it is a number with an uncertainty, and neither is nan or infinite."""
+        return math.isfinite(self.value) and math.isfinite(self.uncertainty)
+
 
 def measurement(
     lab: Lab,
@@ -101,11 +109,7 @@ def measurement(
 def if_found(row: Measurement, why: str) -> Measurement | Missing:
     """The measurement if it has a finite number, however coarse; else a `Missing` with the
     reason."""
-    return (
-        row
-        if np.isfinite([row.value, row.uncertainty]).all()
-        else Missing(row.protocol, row.set, why)
-    )
+    return row if row.finite else Missing(row.protocol, row.set, why)
 
 
 def state_of(x: Array) -> dict[str, float]:
@@ -193,12 +197,34 @@ class Missing:
         return f"{self.set}: {self.reason}" + (f" ({self.rows} left out)" if self.rows > 1 else "")
 
 
+class Planned(NamedTuple):
+    """What a protocol has numbers of."""
+
+    protocol: str
+    set: str
+    quantity: str
+    """Empty for a set of which the protocol said nothing: no number, and no reason why."""
+
+
 @dataclass(frozen=True)
 class Records:
     """What has been measured so far."""
 
     measurements: tuple[Measurement, ...] = ()
     missing: tuple[Missing, ...] = ()
+    planned: Counter[Planned] = field(default=None)  # type: ignore[arg-type]  # see below
+    """How many numbers there were when they were measured; by default as many as there are."""
+
+    def __post_init__(self) -> None:
+        if self.planned is None:
+            rows = Counter(Planned(m.protocol, m.set, m.quantity) for m in self.measurements)
+            object.__setattr__(self, "planned", rows)
+
+    @cached_property
+    def lost(self) -> Counter[Planned]:
+        """How many of the planned numbers are gone, or are none: nan or infinite."""
+        numbers = (m for m in self.measurements if m.finite)
+        return self.planned - Counter(Planned(m.protocol, m.set, m.quantity) for m in numbers)
 
     @classmethod
     def of(cls, rows: Iterable[Measurement | Missing]) -> Records:
@@ -208,7 +234,11 @@ class Records:
         return cls(tuple(row for row in kept if isinstance(row, Measurement)), missing)
 
     def __add__(self, other: Records) -> Records:
-        return Records(self.measurements + other.measurements, self.missing + other.missing)
+        return Records(
+            self.measurements + other.measurements,
+            self.missing + other.missing,
+            self.planned + other.planned,
+        )
 
     @property
     def rows(self) -> tuple[Measurement | Missing, ...]:
@@ -221,10 +251,10 @@ class Records:
         quantity: str | None = None,
         where: Callable[[Measurement], bool] = lambda m: True,
     ) -> Iterator[Measurement]:
-        """The measurements of a protocol, of one quantity if it is named, for which `where`
+        """The finite measurements of a protocol, of one quantity if it is named, for which `where`
         holds."""
         for m in self.measurements:
-            if m.protocol == protocol and quantity in (None, m.quantity) and where(m):
+            if m.protocol == protocol and quantity in (None, m.quantity) and m.finite and where(m):
                 yield m
 
     def threshold(self, set: str, quantity: str) -> Measured | None:
@@ -243,10 +273,9 @@ _PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
 
 
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
-    """Write records, whole or not at all; `about` says what they are (JSON-able). Raises
-    `StorageError`.
+    """Write records, whole or not at all; `about` says whose they are (JSON-able, see `Origin`).
 
-    A condition that a row doesn't have is nan, or empty where it is text.
+    A condition that a row doesn't have is nan, or empty where it is text. Raises `StorageError`.
     """
     rows = records.measurements
     columns: dict[str, Sequence[Any]] = {"row": range(len(rows))}
@@ -263,6 +292,7 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
             schema_version=SCHEMA_VERSION,
             about=json.dumps(dict(about)),
             missing=json.dumps([dataclasses.asdict(each) for each in records.missing]),
+            planned=json.dumps([[*what, rows] for what, rows in records.planned.items()]),
             versions=json.dumps(dict(current_versions())),
             commit=current_commit(),
         )
@@ -270,14 +300,38 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
         whole.finish()
 
 
-def load(path: Path) -> Records:
-    """Read what `save` wrote.
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """Who measured what a file holds, and by which plan: elsewhere it is refused."""
 
-    Raises `StorageError`, naming the file, if it is missing, damaged, cut, changed, or of another
-    version."""
+    protocol: str
+    engine: str
+    """Of whose evidence it is a part."""
+    by: str
+    """Who measured: another engine where the protocol names one."""
+    step: int
+    """Time steps in one that a protocol asks for."""
+    level: str
+    plan: str
+    """Digest of engine, step, level, sets, and the sources that measure."""
+    program: str = field(default_factory=lambda: current_versions()["dualball"])
+
+
+def load(path: Path, **origin: Any) -> Records:
+    """Read what `save` wrote; `origin` are fields of the `Origin` that it must have.
+
+    Raises `StorageError`, naming the file, if it is missing, damaged, cut, changed, of another
+    version, or of another origin."""
     with reading(path) as file:
         if file.attrs.get("schema") != SCHEMA or file.attrs.get("schema_version") != SCHEMA_VERSION:
             raise StorageError("it does not hold measurements in this program's format")
+        about = json.loads(file.attrs["about"])
+        for name, expected in origin.items():
+            if name not in about:
+                raise StorageError(f"it doesn't say of which {name} it is; {ANEW}")
+            if about[name] != expected:
+                held = f"it holds measurements of {name} {about[name]}, not of {expected}"
+                raise StorageError(f"{held}; {ANEW}")
         columns = {name: column(dataset(file, name)).tolist() for name in file}
         parameters = functools.cache(
             lambda *values: Parameters(**dict(zip(_PARAMETERS, values, strict=True)))
@@ -298,6 +352,8 @@ def load(path: Path) -> Records:
                 },
             )
             rows.append(row)
-        return Records(
-            tuple(rows), tuple(Missing(**each) for each in json.loads(file.attrs["missing"]))
-        )
+        planned = Counter[Planned]()
+        for protocol, of, name, count in json.loads(file.attrs.get("planned", "[]")):
+            planned[Planned(protocol, of, name)] = count
+        missing = (Missing(**each) for each in json.loads(file.attrs["missing"]))
+        return Records(tuple(rows), tuple(missing), planned)

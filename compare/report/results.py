@@ -61,11 +61,26 @@ class Summary:
         )
 
 
-def load_measurements(directory: Path, files: Files) -> RecordsByEngine:
-    """The measurements in files of a directory; raises `StorageError` for one that is not whole."""
+def load_measurements(directory: Path, level: str, files: Files) -> RecordsByEngine:
+    """The measurements in files of a directory, at the level of that name.
+
+    Raises `StorageError` for a file that is not whole, or holds what another engine measured,
+    another protocol, or by another plan than its place says."""
+
+    def load(path: Path, engine: str, step: int) -> Records:
+        return record.load(
+            path,
+            protocol=path.stem,
+            engine=engine,
+            step=step,
+            level=level,
+            program=current_versions()["dualball"],
+            plan=path.parent.name,
+        )
+
     return {
         engine: {
-            n: sum((record.load(directory / name) for name in names), Records())
+            n: sum((load(directory / name, engine, n) for name in names), Records())
             for n, names in steps.items()
         }
         for engine, steps in files.items()

@@ -16,7 +16,7 @@ from compare.kit.drawing import GapError
 from compare.kit.engines import EVENT
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.record import Missing, Records
+from compare.kit.record import Missing, Origin, Records
 from compare.report import report, results
 from compare.report.results import Summary
 from model import Parameters, storage
@@ -57,7 +57,16 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
         measured("settled", "omega_c", 11.9, 1e-9, y=0.1),
         measured("settled", "force_Ay", 0.1, 1e-9),
     )
-    record.save(Records(rows, (Missing("settled", "x", "it never settles"),)), file, {})
+    origin = Origin(
+        protocol="settled",
+        engine="mujoco",
+        by="mujoco",
+        step=1,
+        level=Level.QUICK.name,
+        plan=file.parent.name,
+    )
+    missing = (Missing("settled", "x", "it never settles"),)
+    record.save(Records(rows, missing), file, dataclasses.asdict(origin))
     results.save(
         Summary.of([], Level.QUICK, {"mujoco": {1: ["measurements/settled.h5"]}}), made / "results"
     )

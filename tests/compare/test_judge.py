@@ -6,6 +6,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -16,8 +17,9 @@ from compare.claim import Bearing, Claim, Outcome, Text
 from compare.judge import judge, select, theory
 from compare.kit.levels import ASSIGNMENTS, Level, sets
 from compare.kit.quantities import quantity
-from compare.kit.record import Missing, Records, Relation
+from compare.kit.record import Missing, Planned, Records, Relation
 from compare.kit.statistics import COVERAGE, Measured
+from compare.witnesses import full_verdict
 from model import InputError, Parameters
 from tests import measured as made
 
@@ -45,7 +47,8 @@ def outcome(of, records):
         (P.omega_0 * (1 + 1e-5), FINE, Outcome.REFUTED),
         (P.omega_0, 0.01 * P.omega_0, Outcome.INCONCLUSIVE),  # too coarse, however well it agrees
         (2 * P.omega_0, 0.01 * P.omega_0, Outcome.REFUTED),  # even if it is coarse
-        (math.nan, FINE, Outcome.REFUTED),
+        (math.nan, FINE, Outcome.NOT_RUN),  # no number
+        (P.omega_0, math.inf, Outcome.NOT_RUN),
     ],
 )
 def test_a_verdict_is_computed_from_the_numbers(value, uncertainty, expected):
@@ -62,6 +65,53 @@ def test_without_measurements_it_was_not_run_and_the_reason_is_kept():
     assert verdict.missing == (replace(why, rows=2),)
     assert [str(each) for each in verdict.missing] == ["mine: nothing settles (2 left out)"]
     assert "no number bears on" in str(judge([claim()], measured(1.0, FINE, "v_y"))[0].missing[0])
+
+
+def rows(count, protocol="settled", name="omega_c", set="mine"):
+    return tuple(made.measured(protocol, name, P.omega_0, FINE, P, set, n=k) for k in range(count))
+
+
+GONE = {
+    "one number kept": lambda m: m.conditions["n"] == 0,
+    "every second": lambda m: m.conditions["n"] % 2,
+    "one number": lambda m: m.conditions["n"] != 1,
+    "one set": lambda m: m.set == "mine",
+    "one bearing": lambda m: m.quantity == "omega_c",
+    "another claim's": lambda m: m.quantity != "v_y",
+}
+
+
+@pytest.mark.parametrize("gone", GONE)
+def test_what_was_measured_must_be_there(gone):
+    """Numbers that are gone without a reason leave a claim undecided, whoever measured."""
+    both = made.claim(
+        "it",
+        Bearing("settled", "omega_c", lambda m: m.parameters.omega_0),
+        Bearing("settled", "wall_spin", lambda m: m.parameters.omega_0),
+    )
+    whole = Records(
+        rows(4) + rows(4, set="other") + rows(2, name="wall_spin") + rows(2, name="v_y")
+    )
+    kept = tuple(m for m in whole.measurements if GONE[gone](m))
+    less = replace(whole, measurements=kept)
+    expected = Outcome.CONFIRMED if gone == "another claim's" else Outcome.INCONCLUSIVE
+    (verdict,) = judge([both], less)
+    assert verdict.outcome is expected
+    bearing = [m for m in whole.measurements if m.quantity != "v_y"]
+    assert verdict.left_out == sum(not GONE[gone](m) for m in bearing)
+    steps = dict.fromkeys((1, 2, 3), less)
+    for engine, own in ("mujoco-plain", steps), ("mujoco-defaults", {2: less}):
+        said = full_verdict(both, {"mujoco": {1: whole}, engine: own}).witnesses[1]
+        assert said.outcome is expected, engine
+        assert ("is lost" in said.reason) == (expected is Outcome.INCONCLUSIVE)
+
+
+def test_a_set_of_which_a_protocol_says_nothing_leaves_its_claims_undecided():
+    silent = Counter([Planned("settled", "other", "")])
+    for of, expected in ("settled", Outcome.INCONCLUSIVE), ("lift", Outcome.CONFIRMED):
+        about = made.claim("it", Bearing(of, "omega_c", lambda m: m.parameters.omega_0))
+        whole = Records(rows(2, of))
+        assert outcome(about, replace(whole, planned=whole.planned + silent)) is expected
 
 
 def test_most_numbers_must_be_fine_enough_to_tell():

@@ -8,7 +8,7 @@ import pytest
 
 from compare import validation
 from compare.claim import Bearing, Outcome, Verdict
-from compare.kit import programme
+from compare.kit import programme, record
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
 from compare.kit.programme import UNDAMPED, Job, Protocol
@@ -124,6 +124,35 @@ def test_stored_measurements_are_judged_again(tmp_path, counted):
             validation.judge_stored(tmp_path)
 
 
+@pytest.mark.parametrize("what", ["engine", "protocol", "plan", "old"])
+def test_measurements_belong_to_who_measured_them(what, tmp_path, counted, capsys):
+    """A file in the place of another engine's, protocol's or plan's, or one of a program that
+    didn't write down whose it is, is refused in one line."""
+    run(tmp_path)
+    (mine,) = tmp_path.glob("measurements/*/round.h5")
+    apart = tmp_path / "others"
+    if what == "engine":
+        run(apart, engine=EVENT)
+    elif what == "plan":
+        run(apart, SETS | {"mine": SETS["mine"].replace(mu=0.3)})
+    if what == "old":
+        other = tmp_path / "old.h5"
+        record.save(record.load(mine), other, {"protocol": mine.stem, "engine": "mujoco"})
+    else:
+        name = "after" if what == "protocol" else mine.stem
+        (other,) = (tmp_path if name == "after" else apart).glob(f"measurements/*/{name}.h5")
+    mine.write_bytes(other.read_bytes())
+    said = f"{mine.name}.*(it holds measurements of|it doesn't say).*remove it, and 'dualball"
+    for again in (run, validation.judge_stored):
+        with pytest.raises(StorageError, match=said):
+            again(tmp_path)
+    code, _, errors = carried_out(capsys, f"judge {tmp_path} --workers 0")
+    assert code == 2
+    assert len(errors.splitlines()) == 1
+    mine.unlink()
+    assert run(tmp_path)[0].outcome is Outcome.CONFIRMED
+
+
 def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
     """Each as soon as its protocols have measured, while others measure."""
     seen, first = [], threading.Event()
@@ -159,6 +188,17 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab):
         assert [m.set for m in missing] == ["air"] * waits
         assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
     assert seen == ["steel-in-water", "air", "steel-in-water"]
+
+
+def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, lab):
+    named = {name: Parameters.named("reference") for name in ("one", "other", "third")}
+
+    def measure(lab, sets, before):
+        yield from going_round(lab, {"one": named["one"]}, before)
+        yield Missing("round", "other", "it has a reason", 0)
+
+    found = programme.carry_out(Job(Protocol("round", measure), lab, tmp_path, named), Records())
+    assert found.lost == {("round", "third", ""): 1}
 
 
 def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
