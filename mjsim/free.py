@@ -16,11 +16,12 @@ import mujoco
 import numpy as np
 
 from mjsim import recorder, scene
-from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball
 from mjsim.coulomb import Coulomb
-from mjsim.coulomb import compiled as kernels
+from mjsim.coulomb.compiling import entry
+from mjsim.coulomb.engine import mj_step, models
+from mjsim.coulomb.step import start_anew
 from mjsim.world_axes import against, driven, joint_velocities, slip, spun, unwrapped
 from model import Parameters, State
 from model.arrays import Array
@@ -87,7 +88,10 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
     qvel[6], qvel[7], qvel[8] = -inwards, onwards, -up
     applied[6], applied[8] = body.heavy / ahead * inwards, body.heavy / ahead * up
     body.at[2], qpos[7], qpos[8], qpos[9] = qpos[2], 0.0, 0.0, 0.0
-    kernels.step_of(body.served[0], body.served[1], body.served[2], duration, anew)
+    models(body.served[0], 1)[0].opt.timestep = duration
+    if anew:
+        start_anew(body.served[2])
+    mj_step(body.served[0], body.served[1])
     for i in range(len(body.sensors)):
         seen[i] = body.sensors[i]
     # the engine has them of a wall that is ahead
@@ -95,7 +99,7 @@ def step(body: Body, duration: float, anew: bool, omega_0: float, theta: float, 
     return theta
 
 
-@loop
+@entry
 def steps(body: Body, duration: float, fluid: Array, theta: float, rows: Array) -> float:
     """Take a `step` for each omega_0, noted in rows (steps, `COLUMNS`) as those of a ball on
     joints."""
@@ -132,7 +136,7 @@ def average(means: Any, sensors: Any, count: int) -> None:
             means[i] = sensors[i]
 
 
-@loop
+@entry
 def through(
     body: Body, whole: float, longest: float, fall: float, reach: float, omega_0: float, theta: float,
     rates: tuple[float, float], seen: Any,
@@ -253,19 +257,20 @@ class FreeBall:
 
     def advance(self, fluid: Array, rows: Array) -> None:
         """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
-        self.theta = steps(self.body, self._timestep, fluid, self.theta, rows)
+        with self.law.acting(self.data):
+            self.theta = steps(self.body, self._timestep, fluid, self.theta, rows)
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next, for `restore`."""
         kept = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
         mujoco.mj_getState(self.model, self.data, kept, _INTEGRATION)
-        return {"integration": kept, "azimuth": np.array(self.theta)} | self.law.state()
+        return {"integration": kept, "azimuth": np.array(self.theta)} | self.law.state(self.data)
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from what `state` returned."""
         mujoco.mj_setState(self.model, self.data, state["integration"], _INTEGRATION)
         self.theta = float(state["azimuth"])
-        self.law.restore(state)
+        self.law.restore(state, self.data)
 
 
 class Fine:
@@ -311,7 +316,8 @@ class Fine:
             (rates[1], rates[2]),
             seen,
         )
-        place, velocity, before, duration, since = through(*given)
+        with ball.law.acting(ball.data):
+            place, velocity, before, duration, since = through(*given)
         v = np.array(velocity)
         first, last = recorder.forces(seen[1:3], np.array([place[0] - v[0] * since, place[0]]))
         (A_x, A_y, A_z), (B_x, B_y, B_z) = last

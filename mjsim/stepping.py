@@ -20,10 +20,10 @@ import mujoco
 import numpy as np
 
 from mjsim import recorder
-from mjsim.compiled import loop
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, Velocity, corrections, lands, near_axis
-from mjsim.coulomb import compiled as kernels
+from mjsim.coulomb.compiling import entry
+from mjsim.coulomb.engine import mj_step
 from mjsim.free import Fine
 from mjsim.recorder import COORDINATES, HUGE, NORMALS, NSENSOR, SENSORS
 from model import Parameters, State
@@ -141,7 +141,7 @@ def velocity_of(v: Any) -> Velocity:
     return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
 
 
-@loop
+@entry
 def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
     """Take a step for each omega_0 from number `done` on, up to one with a landing: the number of
     that.
@@ -159,7 +159,7 @@ def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
         for i in range(6):
             body.last[i] = body.qvel[i]
         body.marks[_DUE] = body.marks[_HELD] = 0
-        kernels.mj_step(body.served[0], body.served[1])
+        mj_step(body.served[0], body.served[1])
         for i in range(NSENSOR):
             row[SENSORS + i] = body.sensors[i]
         row[SENSORS + _NORMAL_A] += body.adhesion[0]

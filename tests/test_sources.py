@@ -32,7 +32,6 @@ EXCEPTIONS = {
     *("analytic/simulation/solvers.py:_explicit_steps", "analytic/simulation/stepping.py:solve"),
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
     *("mjsim/corrections.py:corrections", "mjsim/free.py:through"),
-    *(f"mjsim/coulomb/compiled.py:{name}" for name in ("_would_hold", "_put_points_back")),
     "mjsim/world_axes.py:driven",
     # what an exact case is made of
     "compare/bench/closed_forms.py:closed_form",

@@ -1,5 +1,5 @@
 """Coulomb's law of friction, in any MuJoCo simulation."""
 
-from .doors import Coulomb
+from .coulomb import Coulomb
 
 __all__ = ["Coulomb"]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from mjsim import Coulomb
-from mjsim.coulomb.law import Law
+from mjsim.coulomb.parameters import Law
 
 G = 9.81
 BOX = '<geom type="box" size=".05 .05 .05" mass="1"/>'
@@ -21,7 +21,6 @@ FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
 CYLINDER = '<geom type="cylinder" size=".05 .05" mass="1"/>'
 BALL = '<geom type="sphere" size=".05" mass="1"/>'
 SCENES = Path(__file__).parents[2] / "docs" / "friction"
-CONES = pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 WAYS = pytest.mark.parametrize("rigid", [False, True], ids=["soft", "rigid"])
 
 
@@ -59,7 +58,6 @@ def creep(model, rigid=False):
     return np.abs(data.xpos - place).max()
 
 
-@CONES
 @WAYS
 @pytest.mark.parametrize(
     ("option", "more"),
@@ -74,20 +72,19 @@ def creep(model, rigid=False):
         ("", {"condim": 6, "friction": ".005 .02", "geom": BALL}),
     ],
 )
-def test_nothing_creeps(cone, rigid, option, more):
+def test_nothing_creeps(rigid, option, more):
     """Nothing moves inside the cone, nor a ball inside that of rolling friction, .02 m of a radius
     of .05 m.
 
     What is left is the solver's: with its default tolerance, 1e-8, about 1e-12 m/s, with implicit
     integrators 1e-10."""
-    model, _ = scene(np.radians(10), cone=cone, option=f'tolerance="1e-14" {option}', **more)
+    model, _ = scene(np.radians(10), option=f'tolerance="1e-14" {option}', **more)
     assert creep(model, rigid) < (1e-7 if "PGS" in option else 1e-12)
 
 
-@CONES
 @WAYS
-def test_breaks_away_at_the_limit(cone, rigid):
-    model, data = scene(cone=cone)
+def test_breaks_away_at_the_limit(rigid):
+    model, data = scene()
     law = Coulomb(model, rigid=rigid)
     for share in [*np.linspace(0, 0.95, 500), *np.linspace(0.95, 1.05, 1000)]:
         data.qfrc_applied[0] = share * 0.6 * G
@@ -97,18 +94,17 @@ def test_breaks_away_at_the_limit(cone, rigid):
     assert share == pytest.approx(1, abs=5e-3)
 
 
-@CONES
 @WAYS
 @pytest.mark.parametrize("geom", [BOX, CYLINDER, BALL], ids=["box", "cylinder", "ball"])
 @pytest.mark.parametrize("step", [4e-3, 2e-3, 1e-3])
-def test_what_slides_keeps_its_contacts(cone, rigid, geom, step):
+def test_what_slides_keeps_its_contacts(rigid, geom, step):
     """Down a slope with g (sin - mu cos), to 1e-9, and never without contact; where it begins, it
     settles for 2 s."""
     slope, mu = (
         np.radians(20),
         0.05 if geom == BALL else 0.25,
     )  # a ball slides as long as mu < 2/7 tan
-    model, data = scene(slope, mu, cone, geom=geom, option=f'timestep="{step}" tolerance="1e-12"')
+    model, data = scene(slope, mu, geom=geom, option=f'timestep="{step}" tolerance="1e-12"')
     law, speeds, loads = Coulomb(model, rigid=rigid), [], []
     law.step(data, round(2 / step))
     for _ in range(round(0.5 / step)):
@@ -124,12 +120,11 @@ def test_what_slides_keeps_its_contacts(cone, rigid, geom, step):
     assert min(loads) > 0
 
 
-@CONES
 @WAYS
 @pytest.mark.parametrize("step", [4e-3, 1e-3])
 @pytest.mark.parametrize(("mu", "speed"), [(0.2, 2), (0.4, 2), (1.2, 2), (1.2, 5)])
-def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(cone, rigid, step, mu, speed):
-    model, data = scene(mu=mu, cone=cone, geom=FLAT, option=f'timestep="{step}" tolerance="1e-12"')
+def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(rigid, step, mu, speed):
+    model, data = scene(mu=mu, geom=FLAT, option=f'timestep="{step}" tolerance="1e-12"')
     law, heights = Coulomb(model, rigid=rigid), []
     law.step(data, round(1 / step))
     data.qvel[0], begin = speed, data.qpos[0]
@@ -142,19 +137,18 @@ def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(cone, rigid, step
     )
 
 
-@CONES
-def test_servo_takes_the_depth_away(cone):
+def test_servo_takes_the_depth_away():
     """A ball that rolls down has the lever r, so that it gains 5/7 g sin(slope): 1 % less without
     servo."""
     slope, ball = np.radians(5), '<geom size=".05" mass=".03" margin="2e-3"/>'
-    model, data = scene(slope, cone=cone, geom=ball, option='tolerance="1e-12"')
+    model, data = scene(slope, geom=ball, option='tolerance="1e-12"')
     law = Coulomb(model, servo=0.1)
     law.step(data, 500)
     speed = data.qvel[0]
     law.step(data, 500)
     assert abs(data.contact.dist[0]) < 1e-9
     assert data.qvel[0] - speed == pytest.approx(5 / 7 * G * np.sin(slope), rel=1e-4)
-    model, data = scene(geom=BOX.replace("mass", 'euler="10 20 0" margin="2e-3" mass'), cone=cone)
+    model, data = scene(geom=BOX.replace("mass", 'euler="10 20 0" margin="2e-3" mass'))
     data.qpos[2], free = 0.2, np.sqrt(2 * (0.2 - 0.075) / G)
     law = Coulomb(model, servo=0.1)
     law.step(data, int(free / model.opt.timestep) - 12)
@@ -163,12 +157,11 @@ def test_servo_takes_the_depth_away(cone):
     assert np.abs(data.contact.dist).max() < 1e-9
 
 
-@CONES
 @WAYS
-def test_every_door_leads_to_the_same_bits(cone, rigid):
+def test_every_door_leads_to_the_same_bits(rigid):
     """`step`, its halves; `mj_step`, of two simulations in turn, and its halves in either order
     under the callback."""
-    model, data = scene(0.3, mu=0.25, cone=cone, boxes=2)
+    model, data = scene(0.3, mu=0.25, boxes=2)
     Coulomb(model, rigid=rigid).step(data, 100)
     halves, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
     for _ in range(100):
@@ -191,13 +184,14 @@ def test_every_door_leads_to_the_same_bits(cone, rigid):
 
 def test_runge_kutta_has_the_callback():
     model, data = scene(np.radians(15), option='integrator="RK4" tolerance="1e-14"')
-    with Coulomb(model).installed():
-        mujoco.mj_step(model, data, 2500)
-        place = data.qpos.copy()
+    law = Coulomb(model)
+    law.step(data, 2500)
+    place = data.qpos.copy()
+    with law.installed():
         mujoco.mj_step(model, data, 500)
     assert data.qpos == pytest.approx(place, abs=1e-12)
-    with pytest.raises(ValueError, match=r"integrator = RK4 .*installed\(\)"):
-        Coulomb(model).step(data)
+    with pytest.raises(ValueError, match="integrator = RK4 has four stages"):
+        law.step1(data)
 
 
 def test_forward_under_the_callback_changes_nothing():
@@ -215,8 +209,8 @@ def test_forward_under_the_callback_changes_nothing():
 
 
 def test_other_models_and_other_callbacks():
-    """What isn't installed is MuJoCo's own, to the bit; somebody else's callback is refused, and
-    always restored."""
+    """What isn't installed is MuJoCo's own, to the bit; what a
+    program raises is raised."""
     model, data = scene(np.radians(15))
     plain, copied = mujoco.MjData(model), scene(np.radians(15))
     mujoco.mj_step(model, plain, 100)
@@ -227,23 +221,35 @@ def test_other_models_and_other_callbacks():
         law.step(data, 100)  # the callback serves it
         with Coulomb(copied[0]).installed():
             mujoco.mj_step(*copied)
-        assert mujoco.get_mjcb_control() is not None
     assert (copied[1].qpos[:3] != plain.qpos[:3]).any()
     other = mujoco.MjData(model)
     Coulomb(model).step(other, 100)
     assert (data.qpos == other.qpos).all()
     with pytest.raises(RuntimeError, match="mine"), Coulomb(model).installed():
         raise RuntimeError("mine")
-    assert mujoco.get_mjcb_control() is None
-    mujoco.set_mjcb_control(lambda model, data: None)
+
+
+def test_a_callback_of_somebody_else_is_called_first_and_comes_back():
+    """And what it raises is raised, as MuJoCo alone does; the step is then begun anew."""
+    model, data = scene(np.radians(15))
+    law, calls = Coulomb(model), []
+
+    def pushes(model, data):
+        calls.append(data.time)
+        if len(calls) == 20:
+            raise KeyError("mine")
+
+    mujoco.set_mjcb_control(pushes)
     try:
-        with (
-            pytest.raises(ValueError, match=r"mjcb_control is taken by .*lambda"),
-            Coulomb(model).installed(),
-        ):
-            pass
+        law.step(data, 10)
+        with pytest.raises(KeyError, match="mine"), law.installed():
+            mujoco.mj_step(model, data, 20)
+        mujoco.mj_step(model, data, 5)
+        assert mujoco.get_mjcb_control() is pushes
     finally:
         mujoco.set_mjcb_control(None)
+    assert len(calls) == 25
+    assert data.time == pytest.approx(24 * model.opt.timestep)
 
 
 @pytest.mark.parametrize(
@@ -268,25 +274,28 @@ def test_what_is_refused():
     model, data = scene()
     law = Coulomb(model)
     with pytest.raises(ValueError, match="another MjModel"):
-        law.step(scene()[1])
+        law.step(scene(boxes=2)[1])
     with pytest.raises(ValueError, match="model is a MjData"):
         Coulomb(data)
     with pytest.raises(ValueError, match="not a state"):
         law.restore({"contacts": [], "joints": [], "time": [0, 0]})
-    for wrong in (
-        {"contacts": np.zeros((1, 3))},
-        {"contacts": 0.0},
-        {"spins": np.zeros((1, 6))},
-        {"time": [0, 0, 0]},
+    law.step(data, 9)
+    state, far, cut = law.state(), law.state(), law.state()
+    far["contacts"]["geoms"][0] = 0, 2
+    cut["contacts"]["gap"][0] = math.nan
+    for wrong, words in (
+        ({"contacts": np.zeros((1, 3))}, "contacts of type float64"),
+        ({"spins": np.zeros((1, 6))}, "spins of shape"),
+        ({"time": np.zeros(3)}, "time of shape"),
+        (far, "contacts of geoms 0 to 2, and there are 0 to 1"),
+        (cut, "contacts must be finite"),
     ):
-        with pytest.raises(
-            ValueError, match=f"not a state of Coulomb: {next(iter(wrong))} of shape"
-        ):
-            law.restore(law.state() | wrong)
+        with pytest.raises(ValueError, match=words):
+            law.restore(state | wrong)
     off = scene(option="/><option")[0]
     off.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
-    with pytest.raises(ValueError, match="actuation is disabled"), Coulomb(off).installed():
-        pass
+    with pytest.raises(ValueError, match="actuation is disabled"):
+        Coulomb(off)
     model.geom_friction[1, 0] = math.inf
     with pytest.raises(ValueError, match=r"geom_friction\[1\] = \[inf"):
         Coulomb(model)
@@ -309,20 +318,30 @@ def test_a_state_that_mujoco_resets_is_forgotten(array, value, tmp_path, monkeyp
     assert (data.qpos == fresh.qpos).all()
 
 
-@CONES
 @pytest.mark.parametrize(
     ("given", "solref"),
     [({"condim": 1}, (0.02, 1)), ({}, (-1000, 0)), ({"geom": BOX, "height": 9}, (0.02, 1))],
 )
-def test_contacts_without_friction_or_damping_or_none_at_all_are_the_engines_own(
-    cone, given, solref
-):
-    model, data = scene(cone=cone, slope=0.1, **{"geom": BALL} | given)
+def test_contacts_without_friction_or_damping_or_none_at_all_are_the_engines_own(given, solref):
+    model, data = scene(slope=0.1, **{"geom": BALL} | given)
     model.geom_solref[:] = solref
     plain = mujoco.MjData(model)
     Coulomb(model).step(data, 400)
     mujoco.mj_step(model, plain, 400)
     assert data.qpos == pytest.approx(plain.qpos, rel=1e-12)
+
+
+def test_a_pyramid_becomes_a_cone_while_the_law_acts():
+    model, data = scene(np.radians(10))
+    pyramid, other = scene(np.radians(10), cone="pyramidal")
+    Coulomb(model).step(data, 200)
+    law = Coulomb(pyramid)
+    law.step(other, 100)
+    assert pyramid.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+    with law.installed():
+        mujoco.mj_step(pyramid, other, 100)
+    assert pyramid.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+    assert (data.qpos == other.qpos).all()
 
 
 @pytest.mark.parametrize("name", [path.name for path in SCENES.glob("*.xml")])

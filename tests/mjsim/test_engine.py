@@ -1,7 +1,6 @@
 """The engine has the motions of exact forms, the same alone, in batches, on threads, compiled or
 not."""
 
-import ctypes
 import math
 
 import mujoco
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, scene, stepping
+from mjsim import ContactSettings, scene
 from model import Case, Flow, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
 from model.trajectory import columns
@@ -157,27 +156,3 @@ STARTS = [
     [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3],
 ]
 """A landing, slip at both contacts, and a landing on the wall."""
-
-
-@pytest.mark.parametrize("changes", [{}, {"servo": 0.0}, {"memory": False, "order": 1}])
-def test_compiled_gives_the_same_run(
-    monkeypatch: pytest.MonkeyPatch, changes: dict[str, object]
-) -> None:
-    """For all laws of drag in one batch; not to the bit everywhere: numpy and numba may round a
-    cosine in two ways."""
-    pytest.importorskip("numba")
-    settings, flow = ContactSettings.at(1e-3, **changes), Flow.ramp(12.0, 25.0, 0.2)
-
-    def runs() -> list[np.ndarray]:
-        together = mjsim.simulate_many(SETS, STARTS, 0.3, flow, settings, sample_interval=2e-3)
-        alone = [
-            mjsim.simulate(p, x0, 0.3, flow, settings) for p, x0 in zip(SETS, STARTS, strict=True)
-        ]
-        return [run.x for run in (*together, *alone)]
-
-    fast = runs()
-    monkeypatch.setattr(stepping, "up_to_landing", stepping.up_to_landing.__wrapped__)
-    monkeypatch.setattr(stepping.kernels, "mj_step", stepping.kernels._engine.mj_step)
-    stepping.kernels._engine.mj_step.argtypes = [ctypes.c_void_p] * 2
-    for x, exact in zip(fast, runs(), strict=True):
-        np.testing.assert_allclose(x, exact, rtol=0, atol=1e-9)

@@ -7,9 +7,8 @@ import pytest
 import analytic
 import mjsim
 from compare.kit.engines import COULOMB
-from mjsim import free
 from mjsim.contact_settings import FORESEEN
-from mjsim.coulomb.law import Law
+from mjsim.coulomb.parameters import Law
 from model import Case, Parameters, State
 
 P = Parameters.named("reference")
@@ -77,16 +76,6 @@ def test_what_rolls_on_the_wall_and_slides_on_the_floor_goes_on_in_short_steps(s
 
 def test_what_a_step_foresees_of_slip_is_the_number_of_the_law() -> None:
     assert pytest.approx(FORESEEN) == Law.share / 5
-
-
-def test_compiled_steps_are_those_in_python(monkeypatch) -> None:
-    p = P.replace(omega_0=25.0, fluid_torque=0.3, drag="schiller-naumann", nu_f=1e-5)
-    x, settings = State(y=0.002, omega_c=9.0, slip_x=20.0), rigid(1e-3)
-    fast = mjsim.simulate(p, x, 0.3, settings=settings)
-    monkeypatch.setattr(free, "steps", free.steps.__wrapped__)
-    assert mjsim.simulate(p, x, 0.3, settings=settings).x == pytest.approx(
-        fast.x, rel=1e-7, abs=1e-9
-    )
 
 
 def test_a_ball_of_a_moment_of_inertia_just_beyond_the_least() -> None:

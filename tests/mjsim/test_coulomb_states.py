@@ -1,20 +1,15 @@
 """Coulomb's law does the same compiled and as it stands, in scenes of all kinds, and goes on from a
 state."""
 
-import contextlib
-import importlib.util
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
 import pytest
 
-from mjsim.coulomb import Coulomb, compiled, doors
+from mjsim import Coulomb
 
 G = 9.81
-BOTH = "elliptic", "pyramidal"
-LAWS = [{}, {"servo": 0.1}, {"rigid": True}, {"rigid": True, "restitution": 0.5}]
 BALL, BOX = '<geom size=".05" mass="1"/>', '<geom type="box" size=".05 .05 .05" mass="1"/>'
 PILE = "".join(
     f'<body pos="{0.03 * np.sin(3 * i)} {0.03 * np.cos(5 * i)} {0.08 + 0.13 * i}" euler="{20 * i} '
@@ -63,82 +58,22 @@ SCENES = {
 }
 
 
-def scene(name, cone, option="", margin=0.002):
+def scene(name, margin=0.002):
     """A model on a slope, by gravity."""
     bodies, friction = SCENES[name]
     return mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="{cone}" tolerance="1e-14" gravity="{0.15 * G} 0 {-G}" {option}/>'
+        f'<mujoco><option cone="elliptic" tolerance="1e-14" gravity="{0.15 * G} 0 {-G}"/>'
         f'<default><geom friction="{friction}"/></default>'
         f'<worldbody><geom type="plane" size="9 9 1" '
         f'margin="{margin}"/>{bodies}</worldbody></mujoco>'
     )
 
 
-@pytest.fixture(scope="module")
-def plain():
-    """The loops once more, where there is no numba."""
-    if not compiled.COMPILES:
-        pytest.skip("nothing is compiled here")
-    spec = importlib.util.spec_from_file_location("mjsim.coulomb.as_it_stands", compiled.__file__)
-    module = importlib.util.module_from_spec(spec)
-    with pytest.MonkeyPatch.context() as without:
-        without.setitem(sys.modules, "numba", None)
-        spec.loader.exec_module(module)
-    assert not module.COMPILES
-    return module
-
-
-def run(monkeypatch, form, model, law, steps, installed):
-    """Positions and velocities after each step, and what is remembered at the end."""
-    monkeypatch.setattr(doors, "compiled", form)
-    data, path, coulomb = mujoco.MjData(model), [], Coulomb(model, **law)
-    data.qvel[0] = 0.5
-    with coulomb.installed() if installed else contextlib.nullcontext():
-        for _ in range(steps):
-            mujoco.mj_step(model, data) if installed else coulomb.step(data)
-            path.append(np.append(data.qpos, data.qvel))
-        return np.array(path), coulomb.state()
-
-
-@pytest.mark.parametrize(
-    ("name", "law", "cone", "option", "installed"),
-    [
-        *(
-            (name, LAWS[k], BOTH[(i + k + k // 2) % 2], "", False)
-            for i, name in enumerate(SCENES)
-            for k in range(4)
-        ),
-        *(
-            (name, {}, "elliptic", 'integrator="Euler"', True)
-            for name in ("pile, condim 6", "dry joints")
-        ),
-        *(
-            (name, {}, "pyramidal", 'integrator="RK4"', True)
-            for name in ("pile, condim 6", "dry joints")
-        ),
-        *(("sphere, condim 6", {"rigid": True}, cone, 'solver="PGS"', False) for cone in BOTH),
-    ],
-)
-def test_steps_agree(monkeypatch, plain, name, law, cone, option, installed):
-    """Each scene under each law, with either cone in turn; callbacks; the solver that holds
-    softness in its matrix."""
-    assert name != "sparse" or mujoco.mj_isSparse(scene(name, cone))
-    (one, mine), (other, its) = (
-        run(monkeypatch, form, scene(name, cone, option), law, 20 if installed else 40, installed)
-        for form in (compiled, plain)
-    )
-    np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-8)
-    for kept, ours in zip(its.values(), mine.values(), strict=True):
-        np.testing.assert_allclose(kept, ours, rtol=1e-3, atol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("law", "cone"), [({}, "elliptic"), ({"rigid": True}, "pyramidal")], ids=str
-)
+@pytest.mark.parametrize("law", [{}, {"rigid": True}], ids=str)
 @pytest.mark.parametrize("name", ["pile, condim 6", "dry joints", "sparse"])
-def test_restored_to_the_bit(name, law, cone):
+def test_restored_to_the_bit(name, law):
     """Others that go on from a state or a copy, each in a thread of its own."""
-    model = scene(name, cone)
+    model = scene(name)
     data, coulomb = mujoco.MjData(model), Coulomb(model, **law)
     coulomb.step(data, 60)
     others = [(Coulomb(model, **law), mujoco.MjData(model)) for _ in range(3)]
@@ -162,7 +97,7 @@ def test_restored_to_the_bit(name, law, cone):
 def test_other_time_forgets_once():
     """After a state was asked for, a jump in time costs the memory of that step, not of the next
     one, too."""
-    model = scene("pile", "elliptic")
+    model = scene("pile")
     ends = []
     for ask in (False, True):
         data, coulomb = mujoco.MjData(model), Coulomb(model)
@@ -175,10 +110,9 @@ def test_other_time_forgets_once():
     assert np.array_equal(*ends)
 
 
-@pytest.mark.parametrize("cone", BOTH)
-def test_a_point_that_the_collider_drops_is_put_back(cone):
+def test_a_point_that_the_collider_drops_is_put_back():
     """A corner of a box at rest, with the force it had."""
-    model = scene("box", cone, margin=0.0)
+    model = scene("box", margin=0.0)
     data, coulomb = mujoco.MjData(model), Coulomb(model)
     coulomb.step(data, 200)
     mujoco.mj_step1(model, data)

@@ -1,0 +1,144 @@
+"""Compiled functions: numba with a cache on disk that is never stale, and C functions by address."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import inspect
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import mujoco
+import numba
+import numpy.typing as npt
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.types.functions import ExternalFunction
+from numba.experimental.function_type import _get_wrapper_address
+from numba.extending import intrinsic, register_jitable
+
+_OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
+
+
+def kernel(function: Any) -> Any:
+    """A decorator: compile a function that other compiled ones call.
+
+    It is compiled once for arguments of the same types, whatever constants it is called with.
+    """
+    options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    dispatcher = numba.njit(**options)(function)
+    template = dispatcher.get_call_template
+    dispatcher.get_call_template = lambda given, named: template(
+        tuple(map(types.unliteral, given)), named
+    )
+    return dispatcher
+
+
+def entry(function: Any) -> Any:
+    """A decorator: compile a function that Python calls, at its first call, and keep it on disk.
+
+    So are the plain functions of its package that it calls, which must be known above it. Numba
+    compiles it again when its own file has changed; that its name holds the digest of all sources
+    makes it do so, too, when what it calls has changed. One process compiles at a time.
+    """
+    for each in _called(function):
+        _register(each)
+    folders = {Path(__file__).parent, Path(function.__code__.co_filename).parent}
+    function.__qualname__ += f"_{_digest(frozenset(folders))}"
+    try:
+        dispatcher = numba.njit(cache=True, **_OPTIONS)(function)
+    except RuntimeError:  # no place for a cache
+        dispatcher = numba.njit(**_OPTIONS)(function)
+
+    @functools.wraps(function)
+    def call(*given: Any) -> Any:
+        if not dispatcher.overloads:
+            with _alone(dispatcher):
+                dispatcher.compile(tuple(map(numba.typeof, given)))
+        return dispatcher(*given)
+
+    call.dispatcher = dispatcher  # type: ignore[attr-defined]
+    return call
+
+
+_register = functools.cache(register_jitable)
+
+
+def _called(function: Any) -> set[Any]:
+    """The plain functions of its package that a function calls, and those that they call."""
+    package = function.__module__.rpartition(".")[0]
+    names = map(function.__globals__.get, function.__code__.co_names)
+    own = {
+        each
+        for each in names
+        if inspect.isfunction(each) and each.__module__.startswith(f"{package}.")
+    }
+    return own.union(*map(_called, own))
+
+
+@functools.cache
+def _digest(folders: frozenset[Path]) -> str:
+    """What compiled code depends on: sources, and where MuJoCo keeps its fields."""
+    files = sorted(path for folder in folders for path in folder.glob("*.py"))
+    text = b"".join(path.read_bytes() for path in files) + mujoco.__version__.encode()
+    return hashlib.sha256(text).hexdigest()[:16]
+
+
+def c_address(call: Any) -> int:
+    """The address of an entry of addresses, for C to call it."""
+    dispatcher = call.dispatcher
+    signature = (types.int64,) * call.__wrapped__.__code__.co_argcount
+    with _alone(dispatcher):
+        dispatcher.compile(signature)
+    return int(_get_wrapper_address(dispatcher, dispatcher.nopython_signatures[0]))
+
+
+@contextlib.contextmanager
+def _alone(function: Any) -> Iterator[None]:
+    """Within this no other process compiles: those that wait take what this one keeps on disk."""
+    with contextlib.ExitStack() as stack:
+        # no such locks here, or no place for a cache
+        with contextlib.suppress(ImportError, OSError, TypeError):
+            import fcntl
+
+            file = stack.enter_context((Path(function.stats.cache_path) / "compiling").open("w"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def c_function(name: str, address: int, returns: Any, *arguments: Any) -> Any:
+    """A C function for compiled code to call; the linker knows its address by the name."""
+    llvmlite.binding.add_symbol(name, address)
+    return ExternalFunction(name, returns(*arguments))
+
+
+def address_of(name: str, array: npt.NDArray[Any]) -> Any:
+    """A compiled function that returns an array's address, also in code another process compiled."""
+    llvmlite.binding.add_symbol(name, array.ctypes.data)
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def address(context: Any) -> Any:
+        def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
+            known, integer = builder.module.globals, ir.IntType(64)
+            found = known.get(name) or cgutils.add_global_variable(builder.module, integer, name)
+            return builder.ptrtoint(found, integer)
+
+        return types.int64(), code
+
+    return address
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def call(context: Any, function: Any, m: Any, d: Any) -> Any:
+    """Call a C function of two addresses, which returns one, by its own."""
+
+    def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
+        integer = ir.IntType(64)
+        kind = ir.FunctionType(integer, [integer, integer]).as_pointer()
+        return builder.call(builder.inttoptr(args[0], kind), args[1:])
+
+    return types.int64(types.int64, types.int64, types.int64), code

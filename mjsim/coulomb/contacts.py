@@ -1,0 +1,492 @@
+"""The contacts of a step: found, matched with those of the step before, mended.
+
+A contact is the one of the step before that is nearest to it on both bodies. It inherits the state,
+the load and the friction, which turns with both bodies. Colliders drop points of flat faces that
+still overlap, and find them again; such points are put back.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .compiling import kernel
+from .engine import (
+    MJ_CONTACT,
+    integers,
+    mj_addContact,
+    mj_fwdVelocity,
+    mj_island,
+    mj_isSparse,
+    mj_makeConstraint,
+    mj_projectConstraint,
+    reals,
+    words,
+)
+from .engine import contacts_of as engine_contacts
+from .memory import (
+    FORCE,
+    MOMENT,
+    NEW,
+    STICKS,
+    contacts_at,
+    contacts_of,
+    dry_of,
+    make_room,
+    pairs_at,
+    poses_at,
+    rows_of,
+)
+from .parameters import CORNER, FLUSH, STILL, UNMOVED
+
+SIZE = MJ_CONTACT.itemsize
+
+
+@kernel
+def smaller_radius(model: Any, contact: Any) -> float:
+    """The smaller radius of the two geoms in contact, m; planes have none."""
+    radius = reals(model.geom_rbound, model.ngeom)
+    one, other = radius[contact.geoms[0]], radius[contact.geoms[1]]
+    return float(min(one, other) or max(one, other))
+
+
+# -- nothing has moved -----------------------------------------------------------------------------
+
+
+@kernel
+def store_poses(model: Any, data: Any, memory: Any) -> None:
+    """Store where geoms and contacts are, on which axes and Jacobians depend."""
+    xpos, xmat = reals(data.geom_xpos, 3 * model.ngeom), reals(data.geom_xmat, 9 * model.ngeom)
+    kept_xpos, kept_xmat = reals(memory.xpos_at, len(xpos)), reals(memory.xmat_at, len(xmat))
+    for i in range(len(xpos)):
+        kept_xpos[i] = xpos[i]
+    for i in range(len(xmat)):
+        kept_xmat[i] = xmat[i]
+    found, poses = engine_contacts(data.contact, data.ncon), poses_at(memory.pose_at, data.ncon)
+    for i in range(data.ncon):
+        contact, pose = found[i], poses[i]
+        pose.geoms[0], pose.geoms[1] = contact.geom[0], contact.geom[1]
+        pose.dim, pose.address = contact.dim, contact.efc_address
+        for j in range(3):
+            pose.pos[j], pose.mu[j] = contact.pos[j], contact.friction[j]
+            pose.normal[j], pose.tangent[j] = contact.frame[j], contact.frame[3 + j]
+
+
+@kernel
+def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
+    """Whether geoms and contacts are where they were when their poses were stored."""
+    if memory.ncon != data.ncon or memory.nefc != data.nefc or memory.dry != data.nf:
+        return False
+    xpos, xmat = reals(data.geom_xpos, 3 * model.ngeom), reals(data.geom_xmat, 9 * model.ngeom)
+    kept_xpos, kept_xmat = reals(memory.xpos_at, len(xpos)), reals(memory.xmat_at, len(xmat))
+    for i in range(len(xpos)):
+        if not abs(xpos[i] - kept_xpos[i]) < STILL:
+            return False
+    for i in range(len(xmat)):
+        if not abs(xmat[i] - kept_xmat[i]) < STILL:
+            return False
+    found, poses = engine_contacts(data.contact, data.ncon), poses_at(memory.pose_at, data.ncon)
+    for i in range(data.ncon):
+        contact, pose = found[i], poses[i]
+        if pose.geoms[0] != contact.geom[0] or pose.geoms[1] != contact.geom[1]:
+            return False
+        if pose.dim != contact.dim or pose.address != contact.efc_address:
+            return False
+        for j in range(3):
+            if not (
+                FLUSH * abs(contact.pos[j] - pose.pos[j]) < STILL
+                and abs(contact.friction[j] - pose.mu[j]) < STILL
+                and abs(contact.frame[j] - pose.normal[j]) < STILL
+                and abs(contact.frame[3 + j] - pose.tangent[j]) < STILL
+            ):
+                return False
+    contacts = contacts_of(memory)
+    for i in range(memory.contacts):
+        given = found[contacts[i].index]
+        contacts[i].gap, contacts[i].margin = given.dist, given.includemargin
+    return True
+
+
+# -- found -----------------------------------------------------------------------------------------
+
+
+@kernel
+def find(model: Any, data: Any, memory: Any) -> None:
+    """Find the contacts of a step, their places on both bodies, and their constraint rows.
+
+    Those of flexes, and those that soft contacts leave without friction, are MuJoCo's own.
+    """
+    nonzeros = jacobian_length(model, data, memory)
+    if (
+        data.ncon > memory.room_contacts
+        or data.nefc > memory.room_rows
+        or nonzeros > memory.room_jacobian
+    ):
+        make_room(memory.address, data.ncon, data.nefc, nonzeros)
+    store_poses(model, data, memory)
+    found = engine_contacts(data.contact, data.ncon)
+    contacts = contacts_at(memory.contact_at, data.ncon)
+    xpos = reals(data.geom_xpos, (model.ngeom, 3))
+    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
+    damping = reals(data.efc_KBIP, (data.nefc, 4))
+    count, row = 0, 0
+    for i in range(data.ncon):
+        given, address = found[i], found[i].efc_address
+        if address < 0 or given.geom[0] < 0 or given.geom[1] < 0:
+            continue
+        if not memory.law.rigid and (given.dim == 1 or damping[address + 1, 1] <= 0):
+            continue
+        contact = contacts[count]
+        forget(contact)
+        contact.index, contact.address, contact.row, contact.dim = i, address, row, given.dim
+        contact.gap, contact.margin, contact.cone = given.dist, given.includemargin, given.mu
+        contact.speed[0] = math.inf
+        for j in range(5):
+            contact.mu[j] = given.friction[j]
+        for j in range(9):
+            contact.frame[j // 3, j % 3] = given.frame[j]
+        for side in range(2):
+            g = given.geom[side]
+            contact.geoms[side] = g
+            x, y, z = (
+                given.pos[0] - xpos[g, 0],
+                given.pos[1] - xpos[g, 1],
+                given.pos[2] - xpos[g, 2],
+            )
+            for axis in range(3):
+                u, v, w = xmat[g, 0, axis], xmat[g, 1, axis], xmat[g, 2, axis]
+                contact.place[side, axis] = u * x + v * y + w * z
+                for of in range(3):
+                    frame = contact.frame[of]
+                    contact.axes[side, axis, of] = u * frame[0] + v * frame[1] + w * frame[2]
+        for axis in range(3):
+            contact.normal[axis] = contact.axes[0, axis, 0]
+        count, row = count + 1, row + given.dim
+    memory.contacts, memory.rows, memory.dry = count, row, data.nf
+    memory.ncon, memory.nefc = data.ncon, data.nefc
+
+
+@kernel
+def forget(contact: Any) -> None:
+    """Make it a new contact, of which nothing is known."""
+    contact.state, contact.lift, contact.load, contact.load_before = NEW, 0.0, 0.0, 0.0
+    contact.predicted, contact.found, contact.extrapolated = 0.0, 0.0, 0.0
+    contact.bias, contact.error = 0.0, 0.0
+    for axis in range(3):
+        contact.speed[axis] = 0.0
+        for kind in range(2):
+            contact.carried[axis, kind] = 0.0
+            contact.friction[0, axis, kind] = contact.friction[1, axis, kind] = 0.0
+
+
+@kernel
+def jacobian_length(model: Any, data: Any, memory: Any) -> int:
+    """How many numbers the Jacobian of all rows has in mjData."""
+    if not mj_isSparse(memory.model):
+        return int(data.nefc * model.nv)
+    last, lengths = data.nefc - 1, integers(data.efc_J_rownnz, data.nefc)
+    return int(integers(data.efc_J_rowadr, data.nefc)[last] + lengths[last]) if last >= 0 else 0
+
+
+@kernel
+def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
+    """Copy the Jacobians of all rows: MuJoCo's own are gone when the next step asks for forces."""
+    contacts, rows, sparse = contacts_of(memory), rows_of(memory), mj_isSparse(memory.model)
+    for i in range(memory.contacts):
+        for r in range(contacts[i].dim):
+            rows[contacts[i].row + r].address = contacts[i].address + r
+    limit = reals(data.efc_frictionloss, data.nefc)
+    for i in range(memory.dry):
+        dry = rows[memory.rows + i]
+        dry.address, dry.limit = data.ne + i, limit[data.ne + i]
+    lengths, begins = integers(data.efc_J_rownnz, data.nefc), integers(data.efc_J_rowadr, data.nefc)
+    size = jacobian_length(model, data, memory)
+    given, columns = reals(data.efc_J, size), integers(data.efc_J_colind, size)
+    jacobian, column = reals(memory.jacobian_at, size), integers(memory.column_at, size)
+    total = 0
+    for r in range(len(rows)):
+        row = rows[r]
+        row.first, row.length = total, lengths[row.address] if sparse else model.nv
+        source = begins[row.address] if sparse else row.address * model.nv
+        for n in range(row.length):
+            jacobian[total + n] = given[source + n]
+            column[total + n] = columns[source + n] if sparse else n
+        total += row.length
+
+
+# -- matched ---------------------------------------------------------------------------------------
+
+
+@kernel
+def square_apart(one: Any, other: Any) -> float:
+    """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms."""
+    if one.geoms[0] != other.geoms[0] or one.geoms[1] != other.geoms[1]:
+        return math.inf
+    square = 0.0
+    for side in range(2):
+        for axis in range(3):
+            square += (one.place[side, axis] - other.place[side, axis]) ** 2
+    return square
+
+
+@kernel
+def sort_pairs(model: Any, memory: Any) -> None:
+    """Sort the contacts by their pairs of geoms; those of one pair keep their order.
+
+    They nearly are: MuJoCo goes through bodies and geoms in their order.
+    """
+    contacts, pairs = contacts_of(memory), pairs_at(memory.pair_at, memory.contacts)
+    for i in range(memory.contacts):
+        key, place = pair_of(model, contacts[i]), i
+        while place > 0 and pairs[place - 1].geoms > key:
+            pairs[place].geoms = pairs[place - 1].geoms
+            pairs[place].contact = pairs[place - 1].contact
+            place -= 1
+        pairs[place].geoms, pairs[place].contact = key, i
+
+
+@kernel
+def pair_of(model: Any, contact: Any) -> int:
+    """The pair of geoms of a contact, as one number."""
+    one, other = int(contact.geoms[0]), int(contact.geoms[1])
+    return int(min(one, other) * model.ngeom + max(one, other))
+
+
+@kernel
+def nearest(model: Any, memory: Any, old: Any) -> int:
+    """The contact of this step nearest to one before; -1 if none is of its geoms."""
+    contacts, pairs = contacts_of(memory), pairs_at(memory.pair_at, memory.contacts)
+    key, low, high = pair_of(model, old), 0, len(pairs)
+    while low < high:
+        middle = (low + high) // 2
+        if pairs[middle].geoms < key:
+            low = middle + 1
+        else:
+            high = middle
+    best, least = -1, math.inf
+    while low < len(pairs) and pairs[low].geoms == key:
+        square = square_apart(contacts[pairs[low].contact], old)
+        if square < least:
+            best, least = pairs[low].contact, square
+        low += 1
+    return int(best)
+
+
+@kernel
+def match(model: Any, data: Any, memory: Any) -> float:
+    """Let contacts inherit from those before; how far one has moved, if some are gone, m."""
+    contacts, before = contacts_of(memory), contacts_at(memory.before_at, memory.contacts_before)
+    sort_pairs(model, memory)
+    farthest, some_gone = 0.0, False
+    for i in range(len(before)):
+        old = before[i]
+        k = i if i < len(contacts) and square_apart(contacts[i], old) < UNMOVED**2 else -1
+        old.moved = 0.0
+        if k < 0:
+            k = nearest(model, memory, old)
+            old.moved = square_apart(contacts[k], old) if k >= 0 else math.inf
+        if k >= 0:
+            farthest = max(farthest, old.moved)
+            some_gone = some_gone or contacts[k].state != NEW
+            inherit(model, data, memory, contacts[k], old)
+    remember_forces(memory)
+    return math.sqrt(farthest / 2) if some_gone else 0.0
+
+
+@kernel
+def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
+    """Take over what a contact before remembers; of several their loads and friction add up."""
+    alone = contact.state == NEW
+    contact.bias = old.bias if alone else 0.0
+    fixed = alone and is_fixed(model, data, memory, old)
+    for axis in range(3):  # one that wanders over its bodies, or is made of several, has no speed
+        contact.speed[axis] = old.speed[axis] if fixed else math.inf
+    contact.state = max(contact.state, old.state)
+    contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
+    contact.load_before = max(contact.load_before, old.load_before)
+    contact.load += old.load
+    for side in range(2):
+        for axis in range(3):
+            for of in range(3):
+                half = contact.axes[side, axis, of] / 2
+                for kind in range(2):
+                    contact.carried[of, kind] += half * old.friction[side, axis, kind]
+
+
+@kernel
+def is_fixed(model: Any, data: Any, memory: Any, old: Any) -> bool:
+    """Whether a contact has moved on its bodies by no more than it creeps, and they don't roll."""
+    bodies, spins = integers(model.geom_bodyid, model.ngeom), reals(data.cvel, (model.nbody, 6))
+    creep, turning = 0.0, 0.0
+    for axis in range(3 if old.state == STICKS else 0):
+        creep += old.speed[axis] ** 2
+    for side in range(2):
+        spin = spins[bodies[old.geoms[side]]]
+        turning = max(turning, spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
+    rolled = memory.law.fixed * math.sqrt(turning) * smaller_radius(model, old)
+    return bool(old.moved <= 2 * (model.opt.timestep * (rolled + math.sqrt(creep))) ** 2)
+
+
+@kernel
+def remember_forces(memory: Any) -> None:
+    """Give the rows of contacts and of dry friction the forces that are remembered."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        rows[contact.row].remembered = contact.load
+        for t in range(contact.dim - 1):
+            rows[contact.row + 1 + t].remembered = contact.carried[axis_of(t), kind_of(t)]
+    known, dry = memory.dry_before == memory.dry, dry_of(memory, memory.dry)
+    for i in range(memory.dry):
+        rows[memory.rows + i].remembered = dry[i] if known else 0.0
+
+
+@kernel
+def axis_of(t: int) -> int:
+    """Axis of a kind of friction: sliding along 1 and 2, spin about 0, rolling about 1 and 2."""
+    return t + 1 if t < 2 else t - 2
+
+
+@kernel
+def kind_of(t: int) -> int:
+    """Whether a kind of friction is a force or a moment."""
+    return FORCE if t < 2 else MOMENT
+
+
+# -- mended ----------------------------------------------------------------------------------------
+
+
+@kernel
+def put_points_back(model: Any, data: Any, memory: Any) -> bool:
+    """Put back corners of flat contacts that the collider has dropped while they overlap.
+
+    Returns whether there were any: the constraint rows are then made anew.
+    """
+    before, added = contacts_at(memory.before_at, memory.contacts_before), 0
+    radius = reals(model.geom_rbound, model.ngeom)
+    for i in range(len(before)):
+        old = before[i]
+        near = memory.law.near * max(radius[old.geoms[0]], radius[old.geoms[1]])
+        if not 1.99 * near**2 < old.moved < math.inf:
+            continue
+        place_lost_point(model, data, old)
+        if old.gap >= 0 or old.moved >= (near / 10) ** 2 or not is_lost(data, memory, old, near):
+            continue
+        complete_frame(old.frame)
+        if widest_angle(data, old) > CORNER:
+            add_point(data, memory, old)
+            added += 1
+    if added:
+        mj_makeConstraint(memory.model, memory.data)
+        mj_island(memory.model, memory.data)
+        mj_projectConstraint(memory.model, memory.data)
+        mj_fwdVelocity(memory.model, memory.data)
+    return added > 0
+
+
+@kernel
+def place_lost_point(model: Any, data: Any, old: Any) -> None:
+    """Where a contact before would be now: its normal, its place, and the gap that has opened."""
+    xpos = reals(data.geom_xpos, (model.ngeom, 3))
+    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
+    normal, along, opened = old.frame[0], old.frame[1], 0.0
+    for j in range(3):
+        normal[j], old.pos[j], along[j] = 0.0, 0.0, 0.0
+        for axis in range(3):
+            normal[j] += xmat[old.geoms[0], j, axis] * old.normal[axis]
+        for side in range(2):
+            place = xpos[old.geoms[side], j]
+            for axis in range(3):
+                place += xmat[old.geoms[side], j, axis] * old.place[side, axis]
+            old.pos[j] += place / 2
+            along[j] += place if side else -place
+        opened += normal[j] * along[j]
+    old.gap += opened
+    old.moved = 0.0  # along the surface, square, m2
+    for j in range(3):
+        old.moved += (along[j] - opened * normal[j]) ** 2
+
+
+@kernel
+def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
+    """Whether the collider now has fewer points of this pair of geoms, and none near this one."""
+    before = contacts_at(memory.before_at, memory.contacts_before)
+    found = engine_contacts(data.contact, data.ncon)
+    had, left = 0, 0
+    for i in range(len(before)):
+        had += same_geoms(before[i].geoms, old.geoms)
+    for i in range(data.ncon):
+        if same_geoms(found[i].geom, old.geoms):
+            left, old.index = left + 1, i
+            square = 0.0
+            for j in range(3):
+                square += (found[i].pos[j] - old.pos[j]) ** 2
+            if square <= near**2:
+                return False
+    # a heightfield has one point at a time, by turns
+    return bool(0 < left < had + memory.law.rigid)
+
+
+@kernel
+def same_geoms(one: Any, other: Any) -> bool:
+    """Whether two contacts are of the same geoms."""
+    return bool(one[0] == other[0] and one[1] == other[1])
+
+
+@kernel
+def complete_frame(frame: Any) -> None:
+    """Give a normal two tangents."""
+    normal, across, along, thin = frame[0], frame[1], frame[2], 0
+    for j in range(1, 3):  # the axis that is farthest from the normal
+        thin = j if abs(normal[j]) < abs(normal[thin]) else thin
+    for j in range(3):
+        one, two = (j + 1) % 3, (j + 2) % 3
+        across[j] = normal[one] * (two == thin) - normal[two] * (one == thin)
+    length = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+    for j in range(3):
+        across[j] /= length
+    for j in range(3):
+        one, two = (j + 1) % 3, (j + 2) % 3
+        along[j] = normal[one] * across[two] - normal[two] * across[one]
+
+
+@kernel
+def widest_angle(data: Any, old: Any) -> float:
+    """The widest angle without other points of the patch that a lost point sees, rad."""
+    found, widest = engine_contacts(data.contact, data.ncon), 0.0
+    for i in range(data.ncon):
+        if same_geoms(found[i].geom, old.geoms):
+            angle, gap = angle_to(found[i].pos, old), 2 * math.pi
+            for k in range(data.ncon):
+                if k != i and same_geoms(found[k].geom, old.geoms):
+                    gap = min(gap, (angle_to(found[k].pos, old) - angle) % (2 * math.pi))
+            widest = max(widest, gap)
+    return widest
+
+
+@kernel
+def angle_to(pos: Any, old: Any) -> float:
+    """Direction in which a place is seen from a lost point, in its tangents, rad."""
+    x, y = 0.0, 0.0
+    for j in range(3):
+        x += old.frame[1, j] * (pos[j] - old.pos[j])
+        y += old.frame[2, j] * (pos[j] - old.pos[j])
+    return math.atan2(y, x)
+
+
+@kernel
+def add_point(data: Any, memory: Any, old: Any) -> None:
+    """Add a lost point to mjData, else as the last of its pair of geoms there is."""
+    template, copy = (
+        words(data.contact + SIZE * old.index, SIZE // 8),
+        words(memory.point_at, SIZE // 8),
+    )
+    for n in range(SIZE // 8):
+        copy[n] = template[n]
+    point = engine_contacts(memory.point_at, 1)[0]
+    point.dist = old.gap
+    for j in range(3):
+        point.pos[j] = old.pos[j]
+        for axis in range(3):
+            point.frame[3 * axis + j] = old.frame[axis, j]
+    mj_addContact(memory.model, memory.data, memory.point_at)

@@ -1,0 +1,411 @@
+"""Coulomb's law of friction in a MuJoCo simulation."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import weakref
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from .callback import CALLBACK
+from .memory import Simulation, check_state
+from .parameters import Law
+from .step import settle
+
+_RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
+_INTEGRATORS = {
+    *(_RK4, _EULER, int(mujoco.mjtIntegrator.mjINT_IMPLICIT)),
+    int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
+}
+_ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+_NO_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+
+
+class Coulomb:
+    """Coulomb's law of friction in a MuJoCo simulation: what sticks does not creep, what slides does
+    not lift.
+
+    Parameters
+    ----------
+    model : any `mujoco.MjModel`, of MuJoCo 3.3 or later; condim 1, 3, 4 and 6. Coulomb's law has no
+        pyramid: the cone is elliptic while the law acts, and then again what it was
+    rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say.
+        True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
+        within one step. Geoms get a `margin` in which contacts are seen ahead, but bear nothing: at
+        least the way of a step at the speed of a fall through the scene, or a fifth of their radius.
+        Dampers become inertia, of the same effect, which contacts know: the integrator is Euler's
+        from then on. Margins are for steps up to the model's as it is now, dampers for that one
+    restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
+    servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It
+        needs geoms with a `margin`, more than bodies sink in, of which an open contact then takes no
+        notice; and it must be slower than the contact, best five times the time constant of `solref`
+    share : share of gravity to which a step must know beforehand how contacts slip, and what rigid
+        ones bear; if it doesn't, it is solved again
+
+    Each `MjData` has a memory of its own. It takes part in the state of the simulation, so save and
+    restore both. Contacts of flexes are left as they are; so is all in a soft simulation in which
+    nothing touches. A copy, also by pickle, has the memory of the only `MjData` that there was.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range, or the model asks for what the law cannot serve.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        *,
+        rigid: bool = False,
+        restitution: float = 0.0,
+        servo: float | None = None,
+        share: float = Law.share,
+    ) -> None:
+        if not isinstance(model, mujoco.MjModel):
+            raise ValueError(f"model is a {type(model).__name__}; a mujoco.MjModel is needed")
+        if not isinstance(rigid, (bool, np.bool_)):
+            raise ValueError(f"rigid = {rigid!r} must be True or False")
+        _check_number("restitution", restitution, "", 0.0, 1.0)
+        if restitution and not rigid:
+            raise ValueError(
+                f"restitution = {restitution} needs rigid=True: solref says how soft contacts bounce"
+            )
+        if servo is not None:
+            _check_number("servo", servo, " s", float(model.opt.timestep), math.inf)
+            if rigid:
+                raise ValueError("servo is for soft contacts: rigid ones have no depth")
+        _check_number("share", share, "", 1e-9, 1.0)
+        law = Law(bool(rigid), float(restitution), float(servo or 0.0), float(share))
+        self._begin(model, law, float(model.opt.timestep), damped=False)
+        self._check()
+        _check_friction(model)
+        if rigid:
+            _see_ahead(model)
+            self._damped = _damp_at_the_end(model)
+
+    def _begin(self, model: Any, law: Law, step: float, damped: bool) -> None:
+        """Set what belongs to the model; nothing is remembered."""
+        self.model, self._law, self._step, self._damped = model, law, step, damped
+        self._simulations: dict[int, Simulation] = {}
+        self._restored: Mapping[str, npt.NDArray[Any]] | None = None
+        weakref.finalize(self, _remove_all, self._simulations)
+
+    def __reduce__(self) -> Any:
+        alone = len(self._simulations) == 1
+        state = self.state() if alone else self._restored
+        return _copy, (self.model, self._law, self._step, self._damped, state)
+
+    def _check(self) -> None:
+        """Raise `ValueError` if the model has an option or a part the law can't be applied with."""
+        model, option, rigid = self.model, self.model.opt, self._law.rigid
+        kind, h = option.integrator, option.timestep
+        if kind not in _INTEGRATORS or (rigid and kind == _RK4):
+            name = mujoco.mjtIntegrator(kind).name.removeprefix("mjINT_")
+            own = "computes reference accelerations of its own"
+            why = "is of another order than blows" if kind == _RK4 else own
+            raise ValueError(
+                f"integrator = {name} {why}; Coulomb's law needs Euler, implicit or implicitfast"
+            )
+        if rigid and (h > self._step or (self._damped and h != self._step)):
+            raise ValueError(
+                f"timestep = {h:g} s was {self._step:g} s when Coulomb(…, rigid=True) was made"
+            )
+        if option.noslip_iterations:
+            raise ValueError(
+                f"noslip_iterations = {option.noslip_iterations} must be 0: "
+                "Coulomb's law is in its place"
+            )
+        if option.disableflags & _NO_ACTUATION:
+            raise ValueError(
+                "the model's flag actuation is disabled, and with it the callback by which the law "
+                "acts: disable actuators by their groups instead (option actuatorgroupdisable)"
+            )
+        if rigid and model.nflex:
+            raise ValueError(
+                f"the model has {model.nflex} flexes; rigid contacts are for bodies alone"
+            )
+
+    # -- what is remembered ------------------------------------------------------------------------
+
+    def _simulation(self, data: Any) -> Simulation:
+        """The memory of the simulation of these data."""
+        if not isinstance(data, mujoco.MjData):
+            raise ValueError(f"data is a {type(data).__name__}; a mujoco.MjData is needed")
+        address = data._address
+        simulation = self._simulations.get(address)
+        if simulation is None or simulation.data() is not data:
+            if data.signature != self.model.signature:
+                raise ValueError("data belong to another MjModel than this Coulomb")
+            if simulation is None or simulation.data() is not None:
+                simulation = self._adopt(address)
+            simulation.data = weakref.ref(data)
+            weakref.finalize(data, _remove, self._simulations, address)
+        CALLBACK.know(address, simulation)
+        return simulation
+
+    def _adopt(self, address: int) -> Simulation:
+        """A memory for the data at an address, which go on from a restored state if there is one."""
+        simulation = self._simulations[address] = Simulation(self.model, self._law)
+        if self._restored is not None:
+            simulation.restore(self._restored)
+            self._restored = None
+        if CALLBACK.installed(self.model._address):
+            simulation.active[0] = 1
+        return simulation
+
+    def addresses(self, data: Any) -> tuple[int, int, int]:
+        """Addresses of model, data and memory, for compiled loops that call `mj_step` in `acting`."""
+        return self.model._address, data._address, self._simulation(data).address
+
+    def reset(self) -> None:
+        """Forget all, as after `mj_resetData`; a jump of `data.time` does so, too."""
+        self._restored = None
+        for simulation in self._simulations.values():
+            simulation.reset()
+
+    def state(self, data: Any = None) -> dict[str, npt.NDArray[Any]]:
+        """A copy of the memory, for `restore`: structured and other arrays by name.
+
+        Contacts with their fields (`memory.REMEMBERED`), friction of joints, N or N m, spins of free
+        bodies (m, 6), N m s, time and time step, s. `data`: of which simulation, if there are
+        several or MuJoCo has stepped it itself.
+
+        Raises
+        ------
+        ValueError
+            If it isn't clear whose memory is asked for, or its data are gone.
+        """
+        if data is not None:
+            simulation = self._simulation(data)
+        elif len(self._simulations) > 1:
+            raise ValueError("several MjData have been under this law: say of which, state(data)")
+        elif self._simulations:
+            (simulation,) = self._simulations.values()
+        else:
+            simulation = Simulation(self.model, self._law)
+            if self._restored is not None:
+                simulation.restore(self._restored)
+        if simulation.knows and simulation.unsettled:
+            of = simulation.data()
+            if of is None:
+                raise ValueError(
+                    "the data whose last forces are asked for are unknown: state(data)"
+                )
+            settle(self.model._address, of._address, simulation.address)
+        return simulation.state()
+
+    def restore(self, state: Mapping[str, npt.NDArray[Any]], data: Any = None) -> None:
+        """Go on from a `state`: these data, or those that step next.
+
+        Raises
+        ------
+        ValueError
+            If it isn't one of this model.
+        """
+        check_state(state, self.model, self._law)
+        if data is not None:
+            self._simulation(data).restore(state)
+            return
+        _remove_all(self._simulations)
+        self._restored = {name: np.array(values) for name, values in state.items()}
+
+    # -- steps -------------------------------------------------------------------------------------
+
+    def step(self, data: Any, nstep: int = 1) -> None:
+        """Advance by `nstep` steps, as `mujoco.mj_step` does.
+
+        Raises
+        ------
+        ValueError
+            If the data belong to another model, an option was changed to one that is refused, or
+            `nstep` isn't a whole number.
+        """
+        if isinstance(nstep, bool) or not isinstance(nstep, (int, np.integer)) or nstep < 0:
+            raise ValueError(f"nstep = {nstep!r} must be a whole number, at least 0")
+        simulation, cone, active = self._enter(data)  # `acting` in fewer microseconds
+        try:
+            mujoco.mj_step(self.model, data, nstep)
+        except BaseException:
+            simulation.reset()
+            raise
+        finally:
+            self._leave(simulation, cone, active)
+
+    def forward(self, data: Any) -> None:
+        """Compute forces, accelerations and sensors under the law, as `mujoco.mj_forward` does."""
+        with self.acting(data):
+            mujoco.mj_forward(self.model, data)
+
+    def step1(self, data: Any) -> None:
+        """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
+        self._check_halves(data)
+        mujoco.mj_step1(self.model, data)
+
+    def step2(self, data: Any) -> None:
+        """Second half of a step, as `mujoco.mj_step2`."""
+        self._check_halves(data)
+        if CALLBACK.installed(self.model._address):
+            mujoco.mj_step2(self.model, data)
+            return
+        with self.acting(data):
+            mujoco.mj_forwardSkip(self.model, data, mujoco.mjtStage.mjSTAGE_VEL, 0)
+        mujoco.mj_checkAcc(self.model, data)
+        euler = self.model.opt.integrator == _EULER
+        (mujoco.mj_Euler if euler else mujoco.mj_implicit)(self.model, data)
+
+    def _check_halves(self, data: Any) -> None:
+        self._simulation(data)
+        self._check()
+        if self.model.opt.integrator == _RK4:
+            raise ValueError("integrator = RK4 has four stages in a step: use step()")
+
+    @contextlib.contextmanager
+    def acting(self, data: Any) -> Iterator[None]:
+        """Within this MuJoCo's own functions, called with these data, obey the law."""
+        simulation, cone, active = self._enter(data)
+        try:
+            yield
+        except BaseException:
+            simulation.reset()  # the step was left in its middle
+            raise
+        finally:
+            self._leave(simulation, cone, active)
+
+    def _enter(self, data: Any) -> tuple[Simulation, int, int]:
+        """Let the law act; return whose memory it has, and the cone and whether it acted before."""
+        simulation, option = self._simulation(data), self.model.opt
+        self._check()
+        cone, active = option.cone, simulation.active[0]
+        CALLBACK.set()
+        option.cone, simulation.active[0] = _ELLIPTIC, 1
+        return simulation, cone, active
+
+    def _leave(self, simulation: Simulation, cone: int, active: int) -> None:
+        CALLBACK.unset()
+        self.model.opt.cone, simulation.active[0] = cone, active
+
+    @contextlib.contextmanager
+    def installed(self) -> Iterator[Coulomb]:
+        """Within this, `mujoco.mj_step`, `mj_forward` and `mj_step1` with `mj_step2` obey the law for
+        this model.
+
+        That is for programs that step by themselves. Other models are left alone. Several may be
+        installed at once.
+
+        Raises
+        ------
+        ValueError
+            If the model is installed already, or asks for what the law cannot serve.
+        """
+        model, address, option = self.model, self.model._address, self.model.opt
+        self._check()
+        if CALLBACK.installed(address):
+            raise ValueError("this model is under installed() already")
+        cone, option.cone = option.cone, _ELLIPTIC
+        CALLBACK.install(address, self._adopt)
+        for simulation in self._simulations.values():
+            simulation.active[0] = 1
+        CALLBACK.set()
+        try:
+            yield self
+        finally:
+            CALLBACK.unset()
+            CALLBACK.install(address, None)
+            model.opt.cone = cone
+            for simulation in self._simulations.values():
+                simulation.active[0] = 0
+
+
+def _copy(
+    model: Any, law: Law, step: float, damped: bool, state: Mapping[str, npt.NDArray[Any]] | None
+) -> Coulomb:
+    """A copy of a `Coulomb`, whose model is as it needs it."""
+    coulomb = Coulomb.__new__(Coulomb)
+    coulomb._begin(model, law, step, damped)
+    coulomb._restored = state
+    return coulomb
+
+
+def _remove(simulations: dict[int, Simulation], address: int) -> None:
+    """Forget the simulation of data that are gone."""
+    simulations.pop(address, None)
+    CALLBACK.remove(address)
+
+
+def _remove_all(simulations: dict[int, Simulation]) -> None:
+    """Forget all simulations."""
+    for address in list(simulations):
+        _remove(simulations, address)
+
+
+def _check_number(name: str, value: float, unit: str, least: float, most: float) -> None:
+    """Raise `ValueError`, with name, value, unit and range, unless a number is in the range."""
+    number = isinstance(value, (int, float, np.integer, np.floating)) and value is not True
+    if not number or isinstance(value, bool) or not least <= value <= most:
+        allowed = f"from {least:g} to {most:g}" if most < math.inf else f"at least {least:g}"
+        raise ValueError(f"{name} = {value!r}{unit if number else ''} must be {allowed}{unit}")
+
+
+def _check_friction(model: Any) -> None:
+    """Raise `ValueError` if a coefficient of friction is not a number."""
+    for field in ("geom_friction", "pair_friction"):
+        friction = getattr(model, field)
+        if not np.isfinite(friction).all():
+            number = int(np.argwhere(~np.isfinite(friction))[0, 0])
+            raise ValueError(f"{field}[{number}] = {friction[number].tolist()} must be finite")
+
+
+def _see_ahead(model: Any) -> None:
+    """Widen contact margins to what a body that fell through the scene moves in a step, at most a
+    fifth of its radius.
+
+    Colliders take a body that is smaller than the margin for one that overlaps.
+    """
+    ahead = model.opt.timestep * math.sqrt(
+        2 * np.linalg.norm(model.opt.gravity) * model.stat.extent
+    )
+    most = model.geom_rbound / 5
+    np.maximum(model.geom_margin, np.minimum(ahead, most), out=model.geom_margin)
+    pairs = [model.pair_geom1, model.pair_geom2]
+    np.maximum(
+        model.pair_margin,
+        np.minimum(ahead, most[np.array(pairs)].max(axis=0)),
+        out=model.pair_margin,
+    )
+
+
+def _damp_at_the_end(model: Any) -> bool:
+    """Replace dampers at the speed after a step by inertia, h times their damping; the integrator
+    becomes Euler's.
+
+    Returns whether there are any.
+
+    That is what MuJoCo's integrators do, but only after contacts have been solved for, so that
+    velocities are not those which contacts asked for. Of implicit integrators the dampers of
+    joints, tendons and servos on them are kept."""
+    option, euler, h = model.opt, mujoco.mjtIntegrator.mjINT_EULER, model.opt.timestep
+    implicit, joints = option.integrator != euler, np.zeros(model.nv)
+    tendons = h * implicit * model.tendon_damping
+    if implicit or not option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
+        joints += h * model.dof_damping
+    option.integrator = euler
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    servos = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    for k in np.flatnonzero(servos & implicit).tolist():
+        servo = -h * model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
+        kind, target = mujoco.mjtTrn(model.actuator_trntype[k]), model.actuator_trnid[k, 0]
+        if kind == mujoco.mjtTrn.mjTRN_TENDON:
+            tendons[target] += servo
+        elif kind == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[target] >= int(
+            mujoco.mjtJoint.mjJNT_SLIDE
+        ):
+            joints[model.jnt_dofadr[target]] += servo
+    model.dof_armature += joints
+    if hasattr(model, "tendon_armature"):  # MuJoCo 3.3.0 has none
+        model.tendon_armature += tendons
+    return bool(joints.any() or tendons.any())

@@ -1,0 +1,205 @@
+"""MuJoCo's memory by MuJoCo's names, and its functions, for compiled code.
+
+`mujoco.introspect` says what `mjModel`, `mjData` and `mjContact` are made of; numpy's structured
+types of them lie over the engine's own memory, so that nothing is copied. Compiled code is handed
+addresses: an array would cost five microseconds, as much as a step of a small scene.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numba
+import numpy as np
+from mujoco.introspect import ast_nodes, structs
+from numba import types
+from numba.extending import intrinsic
+
+from .compiling import c_function
+
+# -- structures ------------------------------------------------------------------------------------
+
+_SCALARS = {
+    **{"int": np.int32, "mjtNum": np.float64, "float": np.float32, "unsigned char": np.uint8},
+    **{"mjtByte": np.uint8, "mjtBool": np.bool_},
+    **dict.fromkeys(("mjtSize", "size_t", "uintptr_t", "uint64_t"), np.int64),
+}
+_OLD = {"efc_diagA": "efc_diagApprox", "M": "qM"}
+"""Names that MuJoCo 3.3 has for the same."""
+
+
+def structure(name: str) -> np.dtype[Any]:
+    """One of MuJoCo's structures, aligned as C aligns it; pointers are integers."""
+
+    def kind(declared: Any) -> Any:
+        if isinstance(declared, ast_nodes.PointerType):
+            return np.int64
+        if isinstance(declared, ast_nodes.ArrayType):
+            return kind(declared.inner_type), tuple(declared.extents)
+        if isinstance(declared, ast_nodes.ValueType):
+            return _SCALARS.get(declared.name) or structure(declared.name)
+        return fields(declared.fields)
+
+    def fields(declared: Any) -> np.dtype[Any]:
+        named: Any = [(field.name, kind(field.type)) for field in declared]
+        return np.dtype(named, align=True)
+
+    whole: Any = structs.STRUCTS[name]
+    return fields(whole.fields)
+
+
+def _only(whole: np.dtype[Any], *names: str, **parts: np.dtype[Any]) -> np.dtype[Any]:
+    """A structure with some of its fields, at their places; `parts` of structures within it."""
+    assert whole.fields is not None
+    places, formats, offsets = dict(whole.fields), [], []
+    for name in (*names, *parts):
+        known = name if name in places else _OLD.get(name, name)
+        if known not in places:
+            version = mujoco.__version__
+            raise ImportError(f"Coulomb's law doesn't know MuJoCo {version}, which has no {name}")
+        formats.append(parts.get(name, places[known][0]))
+        offsets.append(places[known][1])
+    layout = {"names": [*names, *parts], "formats": formats, "offsets": offsets}
+    kind: Any = {**layout, "itemsize": whole.itemsize}
+    return np.dtype(kind)
+
+
+_data = structure("mjData")
+ISLANDS = "iefc_R" in (_data.names or ())
+"""Whether rows have copies by islands: MuJoCo 3.3.0 has none."""
+
+MJ_CONTACT = _only(
+    structure("mjContact"),
+    *("dist", "pos", "frame", "includemargin", "friction", "mu", "dim", "geom", "efc_address"),
+)
+MJ_WARNING = _only(structure("mjWarningStat"), "number")
+MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver")
+MJ_MODEL = _only(
+    structure("mjModel"),
+    *("nv", "nbody", "ngeom", "geom_rbound", "geom_bodyid"),
+    opt=MJ_OPTION,
+)
+MJ_DATA = _only(
+    _data,
+    *(
+        "time",
+        "ncon",
+        "nefc",
+        "ne",
+        "nf",
+        "nisland",
+        "warning",
+        "contact",
+        "geom_xpos",
+        "geom_xmat",
+    ),
+    *("qvel", "qacc", "qacc_warmstart", "qfrc_bias", "xpos", "xmat", "crb", "cvel", "subtree_com"),
+    *("efc_J", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind", "efc_KBIP", "efc_R", "efc_D"),
+    *("efc_diagA", "efc_vel", "efc_aref", "efc_frictionloss"),
+    *(("map_efc2iefc", "iefc_R", "iefc_D") if ISLANDS else ()),
+)
+WARNINGS = tuple(
+    int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{what}")) for what in ("QPOS", "QVEL", "QACC")
+)
+"""Those after which MuJoCo has reset a simulation."""
+
+
+# -- addresses in compiled code --------------------------------------------------------------------
+
+
+def _pointer(item: Any) -> Any:
+    """A compiled function: an address as a pointer to items of a numba type."""
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def pointer(context: Any, address: Any) -> Any:
+        def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
+            return builder.inttoptr(args[0], context.get_value_type(call.return_type))
+
+        return types.CPointer(item)(types.int64), code
+
+    return pointer
+
+
+def array_at(item: Any) -> Any:
+    """A compiled function: the array of a shape at an address, of a structured or numba type."""
+    pointer = _pointer(numba.from_dtype(item) if isinstance(item, np.dtype) else item)
+
+    @numba.njit(no_cpython_wrapper=True)  # type: ignore[untyped-decorator]
+    def array(address: int, shape: Any) -> Any:
+        return numba.carray(pointer(address), shape)
+
+    return array
+
+
+models, datas, contacts_of = array_at(MJ_MODEL), array_at(MJ_DATA), array_at(MJ_CONTACT)
+reals, integers = array_at(types.float64), array_at(types.int32)
+words = array_at(types.int64)
+
+
+# -- functions -------------------------------------------------------------------------------------
+
+
+def _library() -> Any:
+    folder = Path(mujoco.__file__).parent
+    names = [path for path in folder.iterdir() if path.name.startswith("libmujoco.")]
+    return ctypes.CDLL(str(min([*names, *folder.glob("mujoco.dll")])))
+
+
+LIBRARY = _library()
+
+
+def _function(name: str, returns: Any = types.void, arguments: int = 2) -> Any:
+    address = ctypes.cast(getattr(LIBRARY, name), ctypes.c_void_p).value
+    return c_function(name, address or 0, returns, *[types.intp] * arguments)
+
+
+mj_step = _function("mj_step")
+mj_fwdActuation, mj_fwdAcceleration = _function("mj_fwdActuation"), _function("mj_fwdAcceleration")
+mj_fwdConstraint, mj_fwdVelocity = _function("mj_fwdConstraint"), _function("mj_fwdVelocity")
+mj_makeConstraint, mj_island = _function("mj_makeConstraint"), _function("mj_island")
+mj_projectConstraint = _function("mj_projectConstraint")
+mj_isSparse = _function("mj_isSparse", types.int32, 1)
+mj_addContact = _function("mj_addContact", types.int32, 3)
+
+
+# -- does it lie in memory as it is said? ----------------------------------------------------------
+
+
+def _view(item: Any, address: int, count: int = 1) -> Any:
+    """Items of a structured type at an address, as numpy shows them."""
+    return np.frombuffer((ctypes.c_char * (count * item.itemsize)).from_address(address), item)
+
+
+def _check() -> None:
+    """Raise `ImportError` unless a small model lies in memory as `mujoco.introspect` says."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/><worldbody>'
+        '<geom type="plane" size="1 1 1"/><body pos="0 0 .09"><freejoint/>'
+        '<geom size=".1" condim="4" friction=".7 .03 .01"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    data.time = 3.0
+    mujoco.mj_forward(model, data)
+    m, d = _view(MJ_MODEL, model._address)[0], _view(MJ_DATA, data._address)[0]
+    if (d["time"], d["ncon"], d["nefc"], m["nv"], m["ngeom"]) == (3.0, 1, data.nefc, 6, 2):
+        c, option = _view(MJ_CONTACT, int(d["contact"]))[0], m["opt"]
+        rows = _view(np.dtype(np.float64), int(d["efc_aref"]), data.nefc)
+        places = _view(np.dtype(np.float64), int(d["geom_xpos"]), 6)
+        if (
+            (option["timestep"], option["gravity"][2]) == (0.0078125, -7.0)
+            and (option["cone"], option["solver"]) == (model.opt.cone, model.opt.solver)
+            and (c["dist"], c["dim"], c["efc_address"]) == (data.contact.dist[0], 4, 0)
+            and (c["geom"].tolist(), c["mu"]) == ([0, 1], data.contact.mu[0])
+            and np.array_equal(c["friction"], data.contact.friction[0])
+            and np.array_equal(rows, data.efc_aref)
+            and np.array_equal(places, data.geom_xpos.ravel())
+        ):
+            return
+    version = mujoco.__version__
+    raise ImportError(f"MuJoCo {version} doesn't lie in memory as its mujoco.introspect says")
+
+
+_check()

@@ -1,0 +1,179 @@
+"""Coulomb's law: De Saxcé's shift, forces on the friction cone, and how contacts will slip.
+
+MuJoCo's law is convex: slip would lift a contact. De Saxcé's bipotential (1992; Acary and Brogliato,
+Numerical Methods for Nonsmooth Dynamical Systems, 2008, 2.3) gives Coulomb's law by the same cone if
+the coefficient of friction times the slip is taken off the normal row's reference. The shift of
+a step is predicted from the step before; where that is in doubt the step is solved for it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .compiling import kernel
+from .contacts import axis_of, kind_of
+from .engine import reals
+from .memory import NEW, OPEN, SLIDES, STICKS, contacts_of, dry_of, rows_of
+from .rows import multiply
+
+# -- forces ----------------------------------------------------------------------------------------
+
+
+@kernel
+def project(rows: Any, contact: Any) -> int:
+    """Set a contact's forces: -residual / R, projected onto its cone; return its state.
+
+    This is what MuJoCo's solver has (computation chapter, elliptic cone).
+    """
+    normal, square = rows[contact.row], 0.0
+    if contact.dim == 1:
+        normal.force = max(-normal.residual / normal.R, 0.0)
+        return STICKS if normal.force > 0 else OPEN
+    along = contact.cone * normal.residual
+    for t in range(contact.dim - 1):
+        square += (contact.mu[t] * rows[contact.row + 1 + t].residual) ** 2
+    across = math.sqrt(square)
+    if along >= contact.cone * across:
+        for r in range(contact.row, contact.row + contact.dim):
+            rows[r].force = 0.0
+        return OPEN
+    if contact.cone * along + across <= 0:
+        for r in range(contact.row, contact.row + contact.dim):
+            rows[r].force = -rows[r].residual / rows[r].R
+        return STICKS
+    normal.force = (contact.cone * across - along) / (
+        normal.R * contact.cone * (1 + contact.cone * contact.cone)
+    )
+    for t in range(contact.dim - 1):
+        row = rows[contact.row + 1 + t]
+        row.force = -normal.force / across * contact.mu[t] ** 2 * row.residual
+    return SLIDES
+
+
+@kernel
+def find_forces(model: Any, data: Any, memory: Any) -> float:
+    """Find forces, states and slip from the accelerations; how wrong a prediction was, m s-2."""
+    contacts, rows, worst = contacts_of(memory), rows_of(memory), 0.0
+    multiply(model, data, memory)
+    for r in range(len(rows)):
+        rows[r].residual -= rows[r].reference + rows[r].R * rows[r].held
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        normal = rows[contact.row]
+        normal.residual += contact.predicted
+        state = project(rows, contact)
+        slip = shift(rows, contact) if state != STICKS else 0.0
+        contact.error = abs(slip - contact.predicted)
+        if state == OPEN:  # its slip matters if without it the contact would have closed
+            approach = normal.residual + normal.R * normal.held - contact.predicted
+            contact.error = contact.error if approach < 0 else 0.0
+        if memory.law.rigid:
+            for r in range(contact.row, contact.row + contact.dim):
+                off = abs(rows[r].R * (rows[r].force - rows[r].remembered))
+                contact.error = max(contact.error, off)
+        contact.state, contact.found = state, slip
+        extrapolated = memory.law.rigid and state == SLIDES and contact.extrapolated >= 0
+        missed = (contact.bias + slip - contact.extrapolated) / 2
+        contact.bias = missed if extrapolated else 0.0
+        worst = max(worst, contact.error)
+    for r in range(memory.rows, len(rows)):
+        dry = rows[r]
+        dry.force = min(max(-dry.residual / dry.R, -dry.limit), dry.limit)
+    return worst
+
+
+@kernel
+def store_forces(memory: Any, found: bool) -> None:
+    """Store what contacts bear, in the axes of their bodies: forces found, or remembered before."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        row = rows[contact.row]
+        contact.load = row.force if found else row.remembered
+        for side in range(2):
+            for axis in range(3):
+                contact.friction[side, axis, 0] = contact.friction[side, axis, 1] = 0.0
+        for t in range(contact.dim - 1):
+            row = rows[contact.row + 1 + t]
+            force = row.force if found else row.remembered
+            for side in range(2):
+                for axis in range(3):
+                    along = contact.axes[side, axis, axis_of(t)]
+                    contact.friction[side, axis, kind_of(t)] += along * force
+    dry = dry_of(memory, memory.dry)
+    for i in range(memory.dry):
+        row = rows[memory.rows + i]
+        dry[i] = row.force if found else row.remembered
+
+
+# -- slip ------------------------------------------------------------------------------------------
+
+
+@kernel
+def shift(rows: Any, contact: Any) -> float:
+    """De Saxcé's shift: the coefficients of friction times the slip of a contact, m s-2."""
+    square = 0.0
+    for t in range(contact.dim - 1):
+        row = rows[contact.row + 1 + t]
+        square += (contact.mu[t] * (row.residual + row.R * row.force)) ** 2
+    return math.sqrt(square)
+
+
+@kernel
+def subtract_references(memory: Any) -> None:
+    """Take the reference accelerations of contacts off their residuals."""
+    rows = rows_of(memory)
+    for r in range(memory.rows):
+        rows[r].residual -= rows[r].reference
+        rows[r].force = 0.0
+
+
+@kernel
+def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> bool:
+    """Predict slip, as if accelerations stayed those of the last step; whether that is in doubt."""
+    contacts, rows, doubt = contacts_of(memory), rows_of(memory), False
+    rigid, estimate = memory.law.rigid, reals(data.efc_diagA, data.nefc)
+    subtract_references(memory)
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        slip, normal = shift(rows, contact), rows[contact.row].residual
+        contact.predicted, contact.extrapolated = slip, -1.0
+        if contact.state == NEW or contact.state == OPEN:
+            doubt |= normal < 0 and (rigid or slip > enough)
+            continue
+        if contact.state == STICKS or power(rows, contact) >= 0:  # it stops
+            contact.predicted = 0.0
+            doubt |= slip > enough and not would_hold(rows, contact, estimate)
+        else:
+            contact.extrapolated = slip
+            contact.predicted = max(slip + contact.bias, 0.0)
+            doubt |= contact.error > enough
+        # the force of a rigid contact will change by a weight
+        changes = abs(normal) > gravity or (contact.predicted == 0 and slip > gravity)
+        doubt |= rigid and changes
+    return doubt
+
+
+@kernel
+def power(rows: Any, contact: Any) -> float:
+    """Friction that is remembered times what it is asked to give way to; negative while it slides."""
+    total = 0.0
+    for r in range(contact.row + 1, contact.row + contact.dim):
+        total += rows[r].remembered * rows[r].residual
+    return total
+
+
+@kernel
+def would_hold(rows: Any, contact: Any, estimate: Any) -> bool:
+    """Whether a contact would stick: the forces for it, from it alone, are within the cone."""
+    load, square = 0.0, 0.0
+    for k in range(contact.dim):
+        row = rows[contact.row + k]
+        lacks = row.residual + row.R * (row.remembered - row.held)
+        force = row.remembered - lacks / (estimate[row.address] + row.R)
+        if k == 0:
+            load = force
+        else:
+            square += (force / contact.mu[k - 1]) ** 2
+    return bool(load > 0 and square <= load**2)

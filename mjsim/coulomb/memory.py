@@ -1,0 +1,308 @@
+"""What a simulation remembers from one step to the next, field by field.
+
+Compiled code reads and writes it through the address of its `MEMORY`, which has the addresses of
+the arrays; those belong to a `Simulation`, which makes larger ones when it is asked to.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import weakref
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import types
+
+from .compiling import c_function, kernel
+from .engine import MJ_CONTACT, array_at, reals
+from .parameters import LAW, Law
+
+NEW, OPEN, STICKS, SLIDES = range(4)
+"""State of a contact."""
+FORCE, MOMENT = range(2)
+"""Kind of friction: along an axis, of sliding; about it, of spin and rolling."""
+
+_f8, _i4, _i8 = np.float64, np.int32, np.int64
+
+CONTACT = np.dtype(
+    [
+        ("geoms", _i4, 2),
+        ("state", _i4),
+        # where it is: on each body in the axes of its geom, m; the normal in those of the first
+        ("place", _f8, (2, 3)),
+        ("normal", _f8, 3),
+        ("gap", _f8),  # m; negative where bodies overlap
+        ("load", _f8),  # normal force, N
+        ("load_before", _f8),  # that of a rigid contact in the step before, N
+        # friction in the axes of both geoms: geom, axis, force (N) or moment (N m)
+        ("friction", _f8, (2, 3, 2)),
+        ("speed", _f8, 3),  # of slip, by the last Jacobian and present velocities, m s-1
+        ("lift", _f8),  # distance that a servo holds, m
+        # De Saxcé's shift, the coefficient of friction times the slip, m s-2: as it was predicted;
+        # as it was found; of what slides as extrapolated, -1 if it wasn't; what is added to that,
+        # the mean of what was added before and of what that missed; by how much all was wrong
+        *(("predicted", _f8), ("found", _f8), ("extrapolated", _f8), ("bias", _f8), ("error", _f8)),
+        # -- of one step alone --
+        ("index", _i4),  # its number in mjData
+        ("address", _i4),  # its first constraint row there, and here
+        ("row", _i4),
+        ("dim", _i4),  # how many rows it has
+        ("margin", _f8),  # gap below which it is a contact, m
+        ("pos", _f8, 3),  # between both bodies, in world axes, m
+        ("frame", _f8, (3, 3)),  # normal and two tangents, in world axes
+        ("axes", _f8, (2, 3, 3)),  # the same in axes of both geoms: geom, its axis, axis of frame
+        ("carried", _f8, (3, 2)),  # friction remembered along the frame: axis, force or moment
+        ("mu", _f8, 5),  # coefficients of friction: two of sliding, of spin, two of rolling, m
+        ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
+        ("moved", _f8),  # square of how far it has moved on its bodies, m2
+    ],
+    align=True,
+)
+"""A contact; friction turns with its bodies, and is the mean of what both remember."""
+
+_names: Any = CONTACT.names
+REMEMBERED = _names[: _names.index("index")]
+"""What the state of a simulation has of it."""
+REMEMBERED_CONTACT = np.dtype([(name, CONTACT[name]) for name in REMEMBERED])
+
+ROW = np.dtype(
+    [
+        ("address", _i4),  # its number in mjData
+        ("first", _i4),  # where its Jacobian begins, and how long that is
+        ("length", _i4),
+        ("R", _f8),  # regularisation: acceleration per force, kg-1
+        ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
+        ("remembered", _f8),  # force of the step before, N
+        ("held", _f8),  # the part of it that it keeps without giving way, N
+        ("residual", _f8),  # J qacc less the reference, m s-2
+        ("force", _f8),  # as found, N
+        ("limit", _f8),  # the most that a dry joint bears, N or N m
+    ],
+    align=True,
+)
+"""A constraint row of a contact, or of dry friction in a joint or tendon."""
+
+POSE = np.dtype(
+    [("geoms", _i4, 2), ("dim", _i4), ("address", _i4)]
+    + [(name, _f8, 3) for name in ("pos", "normal", "tangent", "mu")],
+    align=True,
+)
+"""Where a contact of mjData was when the Jacobians were copied."""
+
+PAIR = np.dtype([("geoms", _i8), ("contact", _i8)])
+"""A contact by its pair of geoms, one number for both."""
+
+FREE_BODY = np.dtype(
+    [
+        ("body", _i8),
+        ("dof", _i8),
+        # angular momentum that other moments than gyroscopic ones gave it in the last step, in
+        # world axes, and the one it would have without them now, in its own, N m s
+        ("pushed", _f8, 3),
+        ("coasting", _f8, 3),
+    ],
+    align=True,
+)
+"""A body that nothing joins to others."""
+
+MEMORY = np.dtype(
+    [
+        ("law", LAW),
+        *((name, _i8) for name in ("address", "model", "data")),  # of this, mjModel and mjData
+        *((name, _f8) for name in ("time", "timestep", "called")),  # of the last step, call; s
+        ("least", _f8),  # distance by which contacts move at least where points are put back, m
+        # counts: contacts now and before; rows of contacts; of dry friction, now and before; bodies
+        *((name, _i8) for name in ("contacts", "contacts_before", "rows", "dry", "dry_before")),
+        ("free_bodies", _i8),
+        # contacts and rows of mjData when they were found; -1 after a state was restored
+        *(("ncon", _i8), ("nefc", _i8)),
+        ("resets", _i8),  # by MuJoCo, of bad states; -1: not known
+        ("pending", _i8),  # whether forces are still to be found
+        ("stored", _i8),  # whether contacts have their forces in the axes of bodies
+        ("solves", _i8),  # solutions so far
+        ("active", _i8),  # whether the law applies
+        *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
+        *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
+        *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
+    ],
+    align=True,
+)
+"""All that a simulation remembers; arrays by their addresses."""
+
+memories, contacts_at, rows_at = array_at(MEMORY), array_at(CONTACT), array_at(ROW)
+poses_at, pairs_at, bodies_at = array_at(POSE), array_at(PAIR), array_at(FREE_BODY)
+
+
+@kernel
+def contacts_of(memory: Any) -> Any:
+    """The contacts of this step."""
+    return contacts_at(memory.contact_at, memory.contacts)
+
+
+@kernel
+def rows_of(memory: Any) -> Any:
+    """Their rows, then those of dry friction."""
+    return rows_at(memory.row_at, memory.rows + memory.dry)
+
+
+@kernel
+def dry_of(memory: Any, count: int) -> Any:
+    """Forces of dry friction that are remembered, N or N m."""
+    return reals(memory.dry_at, count)
+
+
+# -- the arrays, which Python owns -----------------------------------------------------------------
+
+
+def free_bodies(model: Any) -> npt.NDArray[np.void]:
+    """Bodies that nothing joins to others, as items of `FREE_BODY`."""
+    last = model.jnt_dofadr[model.jnt_type == 0] + 5
+    last = last[~np.isin(last, model.dof_parentid)]
+    bodies = np.zeros(len(last), FREE_BODY)
+    bodies["body"], bodies["dof"] = model.dof_bodyid[last], last - 5
+    return bodies
+
+
+class Simulation:
+    """The memory of one simulation, and its arrays."""
+
+    def __init__(self, model: Any, law: Law) -> None:
+        self.record: Any = np.zeros(1, MEMORY)
+        self.address = int(self.record.ctypes.data)
+        self._arrays: dict[str, npt.NDArray[Any]] = {}
+        record, radius = self.record, model.geom_rbound
+        record["law"], record["address"] = law.record(), self.address
+        record["model"] = model._address
+        record["least"] = law.near * radius.min(where=radius > 0, initial=1e9)
+        self.bodies = self._own("body", free_bodies(model) if law.rigid else np.zeros(0, FREE_BODY))
+        record["free_bodies"] = len(self.bodies)
+        self._own("point", np.zeros(MJ_CONTACT.itemsize // 8, np.int64))
+        self._own("xpos", np.zeros((model.ngeom, 3)))
+        self._own("xmat", np.zeros((model.ngeom, 9)))
+        self.make_room(16, 64, 64 * min(model.nv, 16))
+        self.active = record["active"]
+        self.data: Callable[[], Any] = lambda: None
+        self.reset()
+        _SIMULATIONS[self.address] = self
+
+    def _own(self, name: str, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Keep an array, and tell its address."""
+        self._arrays[name] = array
+        self.record[f"{name}_at"] = array.ctypes.data
+        return array
+
+    def make_room(self, contacts: int, rows: int, jacobian: int) -> None:
+        """Make the arrays at least so long; what they hold stays."""
+        wanted = {"contacts": contacts, "rows": rows, "jacobian": jacobian}
+        kinds: dict[str, dict[str, Any]] = {
+            "contacts": {"contact": CONTACT, "before": CONTACT, "pose": POSE, "pair": PAIR},
+            "rows": {"row": ROW, "dry": np.float64},
+            "jacobian": {"jacobian": np.float64, "column": np.int32},
+        }
+        for room, count in wanted.items():
+            if self.record[f"room_{room}"][0] >= count:
+                continue
+            count += count // 2
+            self.record[f"room_{room}"] = count
+            old = {name: self._array(name) for name in kinds[room]}
+            for name, kind in kinds[room].items():
+                longer = self._own(name, np.zeros(count, kind))
+                longer[: len(old[name])] = old[name]
+
+    def _array(self, name: str) -> npt.NDArray[Any]:
+        """The array whose address the record has: steps exchange contacts and those before."""
+        address = int(self.record[f"{name}_at"][0])
+        found = [each for each in self._arrays.values() if each.ctypes.data == address]
+        return found[0] if found else np.zeros(0)
+
+    def reset(self) -> None:
+        """Forget all, as at the start."""
+        self.record["time"], self.record["pending"], self.record["stored"] = math.nan, 0, 0
+
+    @property
+    def knows(self) -> bool:
+        """Whether there is anything to remember."""
+        return not math.isnan(self.record["time"][0])
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether forces of the last step are still to be found or stored."""
+        return bool(self.record["pending"][0] or not self.record["stored"][0])
+
+    def state(self) -> dict[str, npt.NDArray[Any]]:
+        """Copies of all that is remembered; forces are stored in the axes of bodies."""
+        record = self.record[0]
+        contacts = self._array("contact")[: record["contacts"] if self.knows else 0]
+        dry = self._array("dry")[: record["dry"] if self.knows else 0]
+        spins = np.hstack((self.bodies["pushed"], self.bodies["coasting"]))
+        return {
+            "contacts": contacts[list(REMEMBERED)].astype(REMEMBERED_CONTACT),
+            "joints": dry.copy(),
+            "spins": spins if self.knows else np.zeros_like(spins),
+            "time": np.array([record["time"], record["timestep"]]),
+        }
+
+    def restore(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Go on from what `state` returned."""
+        contacts, joints = state["contacts"], state["joints"]
+        self.make_room(len(contacts), len(joints), 0)
+        for name in REMEMBERED:
+            self._array("contact")[name][: len(contacts)] = contacts[name]
+        self._array("dry")[: len(joints)] = joints
+        self.bodies["pushed"], self.bodies["coasting"] = np.hsplit(state["spins"], 2)
+        record = self.record
+        record["contacts"], record["dry"] = len(contacts), len(joints)
+        record["time"], record["timestep"] = state["time"]
+        record["called"] = state["time"][0]
+        record["pending"], record["stored"], record["ncon"], record["resets"] = 0, 1, -1, -1
+
+
+def check_state(state: Mapping[str, npt.NDArray[Any]], model: Any, law: Law) -> None:
+    """Raise `ValueError` unless it is a state of a simulation of this model."""
+    kinds = {"contacts": REMEMBERED_CONTACT, "joints": _f8, "spins": _f8, "time": _f8}
+    free = len(free_bodies(model)) if law.rigid else 0
+    shapes = {"contacts": (None,), "joints": (None,), "spins": (free, 6), "time": (2,)}
+    for name, kind in kinds.items():
+        try:
+            values: Any = np.asarray(state[name])
+        except (KeyError, TypeError, IndexError) as error:
+            raise ValueError(f"not a state of Coulomb: it has no {name}") from error
+        if values.dtype != kind:
+            raise ValueError(f"not a state of Coulomb: {name} of type {values.dtype}")
+        shape = shapes[name]
+        if (
+            len(shape) != values.ndim
+            or shape[0] not in (None, len(values))
+            or (values.shape[1:] != shape[1:])
+        ):
+            raise ValueError(f"not a state of Coulomb: {name} of shape {values.shape}")
+        fields = values.dtype.names or ()
+        for each in [values[field] for field in fields if field != "speed"] or [values]:
+            if name != "time" and not np.isfinite(each).all():
+                raise ValueError(f"not a state of Coulomb: {name} must be finite")
+    geoms = state["contacts"]["geoms"]
+    if geoms.size and not 0 <= geoms.min() <= geoms.max() < model.ngeom:
+        raise ValueError(
+            f"not a state of this model: contacts of geoms {geoms.min()} to {geoms.max()}, "
+            f"and there are 0 to {model.ngeom - 1}"
+        )
+
+
+_SIMULATIONS: weakref.WeakValueDictionary[int, Simulation] = weakref.WeakValueDictionary()
+"""By the addresses of their records."""
+
+
+@ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4)  # type: ignore[untyped-decorator]
+def _make_room(memory: int, contacts: int, rows: int, jacobian: int) -> None:
+    _SIMULATIONS[memory].make_room(contacts, rows, jacobian)
+
+
+make_room = c_function(
+    "coulomb_make_room",
+    ctypes.cast(_make_room, ctypes.c_void_p).value or 0,
+    types.void,
+    *[types.int64] * 4,
+)

@@ -1,0 +1,79 @@
+"""The numbers of the law, one record that Python and compiled code share."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Law:
+    """What a `Coulomb` is asked for, and the numbers that docs/friction.md decided by a table each."""
+
+    rigid: bool = False
+    restitution: float = 0.0
+    servo: float = 0.0
+    """Time in which contacts lose their depth, s; 0: never."""
+    share: float = 5e-2
+    """Share of gravity to which the slip of contacts, and what rigid ones bear, must be predicted."""
+    most: int = 20
+    """Solutions that a step may take for that."""
+    softness: float = 1e-3
+    """R of a rigid contact, in units of the inverse mass that the engine estimates."""
+    push: float = 0.1
+    """Share of its depth that a rigid contact loses in a step."""
+    depth: float = 1e-5
+    """Depth that it keeps at `USUAL_STEP`, in units of the smaller radius; it falls with the square
+    of the step. Without any, colliders drop points of what rests."""
+    calm: float = 1e-5
+    """Acceleration below which the solver starts from none, m s-2 or rad s-2."""
+    near: float = 0.01
+    """Share of the larger radius up to which two points of contact count as one."""
+    fixed: float = 0.1
+    """Share of what their turning moves the smaller radius up to which a contact that moves on its
+    bodies, but for its creep, is fixed on them; what rolls isn't."""
+    fast: float = 3.0
+    """Slip of a rigid contact, in units of its change in a step, above which it slides on: friction
+    opposes its slip in the middle of the step, else that at the end, which may be none."""
+
+    def record(self) -> np.void:
+        """The same as an item of `LAW`."""
+        values: Any = np.zeros((), LAW)
+        values[()] = dataclasses.astuple(self)
+        return values[()]  # type: ignore[no-any-return]
+
+
+_KINDS = {"bool": np.bool_, "int": np.int64, "float": np.float64}
+LAW = np.dtype(
+    [(each.name, _KINDS[str(each.type)]) for each in dataclasses.fields(Law)], align=True
+)
+
+UNMOVED = 1e-6
+"""Distance below which a contact is the one of the same number in the last step, m."""
+STILL = 1e-9
+"""Most that contacts and bodies may move, m or rad, for their Jacobians to stay as they are."""
+FLUSH = 1e-3
+"""Part of how far points of contact move that counts there: those of flush faces shift by µm."""
+APART = 1e9
+"""Approach that a contact allows which is open, m s-2."""
+USUAL_STEP = 2e-3
+"""MuJoCo's own time step, s."""
+ITERATIONS = 20
+"""Iterations of the implicit midpoint rule; each takes the angle of half a step, rad, from the
+error, as a factor."""
+CORNER = 1.05 * math.pi
+"""Angle without other points of its patch that a corner of the patch sees at least."""
+EXACT = 1e-6
+"""Part of what is asked for to which a prediction is as good as exact."""
+FALLING = 0.1
+"""Part to which the error must fall from one solution of rigid contacts to the next to go on."""
+OVER = 0.75
+"""Part of a time step after which the next one has begun: stages of Runge and Kutta are in one."""
+NEXT = 1.5
+"""Time steps up to which a step is the next one."""
+BOUNCES = 2.0
+"""Speed of approach that bounces at least, in units of what gravity adds in a step."""

@@ -1,0 +1,278 @@
+"""Rigid contacts: Moreau and Jean's time stepping in MuJoCo's rows, and bodies that turn freely.
+
+A closed contact asks for the velocity at the end of the step: none, or Newton's share of that
+before a blow (Moreau 1988; Jean 1999, Comput. Methods Appl. Mech. Eng. 177). One that is open may
+close its gap. Friction of what slides on opposes its slip in the middle of the step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .compiling import kernel
+from .contacts import smaller_radius
+from .engine import ISLANDS, integers, mj_projectConstraint, reals
+from .friction import shift
+from .memory import SLIDES, bodies_at, contacts_of, rows_of
+from .parameters import APART, BOUNCES, ITERATIONS, USUAL_STEP
+
+PGS = 0
+"""MuJoCo's solver that has the regularisation in its matrix."""
+
+
+# -- contacts --------------------------------------------------------------------------------------
+
+
+@kernel
+def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
+    """Make contacts stiff, and let them ask for velocities at the end of the step."""
+    contacts, rows, law, h = contacts_of(memory), rows_of(memory), memory.law, model.opt.timestep
+    estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
+    R, D, reference = (
+        reals(data.efc_R, data.nefc),
+        reals(data.efc_D, data.nefc),
+        reals(data.efc_aref, data.nefc),
+    )
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        normal, first = rows[contact.row], contact.address
+        lasting = min(normal.remembered, contact.load_before)  # not the force of a blow
+        contact.load_before = normal.remembered
+        fastest = max(h * gravity, h * estimate[first] * lasting)
+        goal = velocity_to_ask_for(model, memory, contact, fastest)
+        if law.restitution > 0:
+            fall = h * max(-normal.residual, 0.0)
+            goal = max(
+                goal, rebound(law.restitution, contact.gap, velocity[first], fall, h, gravity)
+            )
+        factor = law.softness * estimate[first] / R[first]
+        for r in range(first, first + contact.dim):
+            R[r] *= factor
+            D[r] = 1 / R[r]
+            reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
+    if ISLANDS and data.nisland > 0:
+        copy_to_islands(data, memory)
+    if model.opt.solver == PGS:
+        mj_projectConstraint(memory.model, memory.data)
+
+
+@kernel
+def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -> float:
+    """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1."""
+    h, law = model.opt.timestep, memory.law
+    if contact.gap > 0:
+        return float(-contact.gap / h)
+    kept = law.depth * (h / USUAL_STEP) ** 2 * smaller_radius(model, contact)
+    return float(min(law.push * max(-contact.gap - kept, 0.0) / h, fastest))
+
+
+@kernel
+def rebound(
+    restitution: float, gap: float, speed: float, fall: float, h: float, gravity: float
+) -> float:
+    """Speed after a blow that keeps Newton's share of the energy with which a fall ends, m s-1.
+
+    `fall` is what the step adds to the speed. Euler's method keeps v²/2 + gz - hgv/2 in flight.
+    """
+    if gap + h * (speed - fall) >= 0 or speed >= -BOUNCES * h * gravity:
+        return -math.inf
+    above = max(gap, 0.0)
+    energy = speed * (speed - fall) / 2 + fall / h * above
+    square = fall**2 / 4 + 2 * (restitution**2 * energy - fall / h * above)
+    return math.sqrt(max(square, 0.0)) - fall / 2
+
+
+@kernel
+def copy_to_islands(data: Any, memory: Any) -> None:
+    """Give the copies that MuJoCo's islands have of the rows the same regularisation."""
+    R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
+    island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)
+    place, contacts = integers(data.map_efc2iefc, data.nefc), contacts_of(memory)
+    for i in range(memory.contacts):
+        for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
+            island_R[place[r]], island_D[place[r]] = R[r], D[r]
+
+
+@kernel
+def take_depth_away(model: Any, data: Any, memory: Any) -> None:
+    """Move the distance that a soft contact holds, until under its load it has no depth."""
+    contacts, spring = contacts_of(memory), reals(data.efc_KBIP, (data.nefc, 4))
+    reference = reals(data.efc_aref, data.nefc)
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        lift = contact.lift - model.opt.timestep / memory.law.servo * contact.gap
+        contact.lift = min(max(lift, 0.0), contact.margin)
+        stiffness = spring[contact.address, 0] * spring[contact.address, 2]
+        closed = contact.lift > 0 or contact.gap <= 0
+        push = stiffness * (contact.margin - contact.lift) if closed else APART
+        reference[contact.address] -= push
+
+
+@kernel
+def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
+    """Let friction of what slides fast oppose its slip at mid step; whether there is any.
+
+    That is of second order; where slip may end within the step, it must oppose that at the end.
+    """
+    contacts, rows, h, some = contacts_of(memory), rows_of(memory), model.opt.timestep, False
+    velocity = reals(data.efc_vel, data.nefc)
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        if contact.state != SLIDES or contact.predicted == 0:
+            continue
+        speed, change = 0.0, 0.0
+        for t in range(contact.dim - 1):
+            row = rows[contact.row + 1 + t]
+            speed += (contact.mu[t] * velocity[row.address]) ** 2
+            change += (contact.mu[t] * (row.residual + row.reference)) ** 2
+        if speed <= (memory.law.fast * h) ** 2 * change:
+            continue
+        for t in range(contact.dim - 1):
+            row = rows[contact.row + 1 + t]
+            more = velocity[row.address] / h
+            row.reference -= more
+            row.residual += more
+        contact.extrapolated = shift(rows, contact)
+        contact.predicted = max(contact.extrapolated + contact.bias, 0.0)
+        some = True
+    return some
+
+
+# -- vectors ---------------------------------------------------------------------------------------
+
+
+@kernel
+def cross(a: Any, b: Any) -> Any:
+    """The cross product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def dot(a: Any, b: Any) -> float:
+    """The scalar product of two vectors."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@kernel
+def times_vector(x: float, a: Any) -> Any:
+    """The vector x a."""
+    return x * a[0], x * a[1], x * a[2]
+
+
+@kernel
+def plus(a: Any, x: float, b: Any) -> Any:
+    """The vector a + x b."""
+    return a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
+
+
+@kernel
+def applied(matrix: Any, a: Any) -> Any:
+    """A matrix, as a tuple of its rows, times a vector."""
+    return dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a)
+
+
+@kernel
+def vector_at(values: Any, first: int) -> Any:
+    """Three numbers of an array as a vector."""
+    return values[first], values[first + 1], values[first + 2]
+
+
+@kernel
+def rotated(a: Any, turn: Any) -> Any:
+    """A vector turned about an axis, by an angle as long as the axis, rad (Rodrigues)."""
+    square, across = dot(turn, turn) + 1e-300, cross(turn, a)
+    angle = math.sqrt(square)
+    return plus(
+        plus(a, math.sin(angle) / angle, across),
+        (1 - math.cos(angle)) / square,
+        cross(turn, across),
+    )
+
+
+# -- bodies that turn freely -----------------------------------------------------------------------
+
+
+@kernel
+def turn_accelerations(model: Any, data: Any, memory: Any) -> None:
+    """Turn the angular accelerations of the last step along with the bodies, in whose axes they are."""
+    bodies, velocity = bodies_at(memory.body_at, memory.free_bodies), reals(data.qvel, model.nv)
+    for i in range(len(bodies)):
+        first = bodies[i].dof + 3
+        back = times_vector(-model.opt.timestep, vector_at(velocity, first))
+        for of in (reals(data.qacc, model.nv), reals(data.qacc_warmstart, model.nv)):
+            turned = rotated(vector_at(of, first), back)
+            for j in range(3):
+                of[first + j] = turned[j]
+
+
+@kernel
+def add_gyroscopic_moments(model: Any, data: Any, memory: Any, known: bool, over: bool) -> None:
+    """Gyroscopic moments of free bodies by the implicit midpoint rule, with those of the last step.
+
+    A body that turns freely keeps its energy and the size of its angular momentum; and its centre
+    of mass keeps its velocity where it is not the body's origin.
+    """
+    bodies, h, n = bodies_at(memory.body_at, memory.free_bodies), model.opt.timestep, model.nbody
+    bias, inertias = reals(data.qfrc_bias, model.nv), reals(data.crb, (n, 10))
+    velocities, centres = reals(data.cvel, 6 * n), reals(data.subtree_com, 3 * n)
+    origins, axes_of = reals(data.xpos, 3 * n), reals(data.xmat, 9 * n)
+    for i in range(len(bodies)):
+        free = bodies[i]
+        b, of = free.body, inertias[free.body]
+        inertia = (of[0], of[3], of[4]), (of[3], of[1], of[5]), (of[4], of[5], of[2])
+        axes = (
+            vector_at(axes_of, 9 * b),
+            vector_at(axes_of, 9 * b + 3),
+            vector_at(axes_of, 9 * b + 6),
+        )
+        spin = vector_at(velocities, 6 * b)
+        momentum, pushed = applied(inertia, spin), (0.0, 0.0, 0.0)
+        if known and over:
+            gained = plus(momentum, -1.0, applied(axes, vector_at(free.coasting, 0)))
+            pushed = rotated(gained, times_vector(-h, spin))
+        elif known:
+            pushed = vector_at(free.pushed, 0)
+        change, after = turned_freely(inertia, momentum, spin, pushed, h)
+        arm = plus(vector_at(centres, 3 * b), -1.0, vector_at(origins, 3 * b))
+        force, moment = of_the_origin(of[9], arm, spin, after, h)
+        moment = plus(plus(moment, -1 / h, change), -1.0, cross(spin, momentum))
+        coasting = plus(momentum, 1.0, change)
+        for j in range(3):
+            column = axes[0][j], axes[1][j], axes[2][j]
+            bias[free.dof + j] += force[j]
+            for k in range(3):
+                bias[free.dof + 3 + j] += column[k] * moment[k]
+            free.pushed[j], free.coasting[j] = pushed[j], dot(column, coasting)
+
+
+@kernel
+def turned_freely(inertia: Any, momentum: Any, spin: Any, pushed: Any, h: float) -> Any:
+    """Change of angular momentum in a step, without what pushes, in axes of the body, N m s.
+
+    Implicit midpoint: with the turn of half a step, t = h/2 middle, the momentum L + p/2 + c
+    there obeys c = (p/2 + L_half x t - t² L + (t L_half) t) / (1 + t²). Also the spin after it.
+    """
+    x, y, z = inertia
+    volume, inverse = dot(x, cross(y, z)), (cross(y, z), cross(z, x), cross(x, y))
+    half, middle, change = plus(momentum, 0.5, pushed), spin, pushed
+    for _ in range(ITERATIONS):
+        turn = times_vector(h / 2, middle)
+        square = dot(turn, turn)
+        change = plus(plus(cross(half, turn), 0.5, pushed), -square, momentum)
+        change = times_vector(1 / (1 + square), plus(change, dot(turn, half), turn))
+        last, middle = middle, plus(spin, 1 / volume, applied(inverse, change))
+        moved = plus(middle, -1.0, last)
+        if dot(moved, moved) <= 1e-32 * dot(middle, middle):  # soon of a body that is round
+            break
+    change = plus(change, 1.0, plus(change, -1.0, pushed))
+    return change, plus(middle, 1.0, plus(middle, -1.0, spin))
+
+
+@kernel
+def of_the_origin(mass: float, arm: Any, spin: Any, after: Any, h: float) -> Any:
+    """Force and moment that keep the velocity of a centre of mass which is off the origin, N, N m."""
+    across = cross(after, arm)
+    swung = plus(rotated(across, times_vector(h, after)), -1.0, across)
+    force = plus(times_vector(mass / h, swung), -mass, cross(spin, cross(spin, arm)))
+    return force, cross(arm, force)

@@ -1,0 +1,96 @@
+"""Constraint rows: their Jacobians times a vector, and what is left of what they ask for."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .compiling import kernel
+from .engine import integers, reals
+from .memory import STICKS, contacts_of, rows_of
+
+
+@kernel
+def times(model: Any, memory: Any, row: Any, vector: Any) -> float:
+    """A row of the Jacobian times a vector of all degrees of freedom."""
+    jacobian = reals(memory.jacobian_at + 8 * row.first, row.length)
+    column, total = integers(memory.column_at + 4 * row.first, row.length), 0.0
+    for n in range(row.length):
+        total += jacobian[n] * vector[column[n]]
+    return total
+
+
+@kernel
+def multiply(model: Any, data: Any, memory: Any) -> None:
+    """Set the residuals of all rows to their Jacobian times the accelerations."""
+    rows, accelerations, moves = rows_of(memory), reals(data.qacc, model.nv), False
+    for i in range(model.nv):
+        moves |= accelerations[i] != 0
+    for r in range(len(rows)):
+        rows[r].residual = times(model, memory, rows[r], accelerations) if moves else 0.0
+
+
+@kernel
+def set_up(data: Any, memory: Any) -> None:
+    """Read regularisation and reference acceleration of all rows; of soft contacts, friction is held."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
+    for r in range(len(rows)):
+        row = rows[r]
+        row.R, row.reference, row.held = R[row.address], reference[row.address], row.remembered
+    if not memory.law.rigid:
+        for i in range(memory.contacts):
+            rows[contacts[i].row].held = 0.0
+
+
+@kernel
+def write_references(data: Any, memory: Any) -> None:
+    """Tell MuJoCo reference accelerations that hold what is remembered, less De Saxcé's shift."""
+    contacts, rows, reference = (
+        contacts_of(memory),
+        rows_of(memory),
+        reals(data.efc_aref, data.nefc),
+    )
+    for r in range(len(rows)):
+        row = rows[r]
+        reference[row.address] = row.reference + row.R * row.held
+    for i in range(memory.contacts):
+        reference[contacts[i].address] -= contacts[i].predicted
+
+
+@kernel
+def store_speeds(model: Any, data: Any, memory: Any) -> None:
+    """Store how contacts slip, by the Jacobians of the last step and the velocities now."""
+    contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        for j in range(3):
+            contact.speed[j] = 0.0
+        for t in range(2 if contact.dim > 1 else 0):
+            speed = times(model, memory, rows[contact.row + 1 + t], velocity)
+            for j in range(3):
+                contact.speed[j] += speed * contact.frame[1 + t, j]
+
+
+@kernel
+def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
+    """Let contacts that stick turn along with their bodies: rows leave out that Jacobians change.
+
+    What is added is -dJ/dt v; of rigid contacts, which lose the velocity that the turning shows,
+    half of it.
+    """
+    contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
+    reference = reals(data.efc_aref, data.nefc)
+    share = (0.5 if memory.law.rigid else 1.0) / elapsed
+    for i in range(memory.contacts):
+        contact = contacts[i]
+        if contact.speed[0] == math.inf or contact.dim == 1:
+            continue
+        if not memory.law.rigid and contact.state != STICKS:
+            continue
+        for t in range(2):
+            before = 0.0
+            for j in range(3):
+                before += contact.frame[1 + t, j] * contact.speed[j]
+            change = times(model, memory, rows[contact.row + 1 + t], velocity) - before
+            reference[contact.address + 1 + t] -= change * share

@@ -1,0 +1,258 @@
+"""The law of a step, between MuJoCo's velocities and its solver; and the callback that applies it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .compiling import address_of, call, entry, kernel
+from .contacts import copy_jacobians, find, match, nothing_moved, put_points_back
+from .engine import (
+    WARNINGS,
+    array_at,
+    datas,
+    mj_fwdAcceleration,
+    mj_fwdActuation,
+    mj_fwdConstraint,
+    models,
+    reals,
+    words,
+)
+from .friction import find_forces, predict_slip, store_forces, subtract_references
+from .memory import contacts_of, memories, rows_of
+from .parameters import EXACT, FALLING, NEXT, OVER
+from .rigid import (
+    add_gyroscopic_moments,
+    oppose_slip_at_mid_step,
+    stiffen,
+    take_depth_away,
+    turn_accelerations,
+)
+from .rows import add_turning, multiply, set_up, store_speeds, write_references
+
+
+@kernel
+def law_of_a_step(m: int, d: int, at: int) -> None:
+    """Apply Coulomb's law: velocities are known, and MuJoCo hasn't found the forces yet."""
+    model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
+    memory.model, memory.data = m, d
+    known, over, since = begin(model, data, memory)
+    if data.ncon == 0 and not memory.law.rigid:  # nothing touches: all is MuJoCo's own
+        forget(memory)
+        return
+    still = known and nothing_moved(model, data, memory)
+    if still:
+        keep_forces(memory, over)
+    else:
+        hand_on(model, data, memory, known, over)
+        find(model, data, memory)
+        if match(model, data, memory) > memory.least and put_points_back(model, data, memory):
+            find(model, data, memory)
+            match(model, data, memory)
+        copy_jacobians(model, data, memory)
+    if memory.free_bodies:
+        add_gyroscopic_moments(model, data, memory, known, over)
+    memory.pending = memory.contacts + memory.dry > 0
+    if not memory.pending:
+        return
+    gravity = size_of_gravity(model)
+    enough = memory.law.share * gravity
+    multiply(model, data, memory)
+    if memory.law.rigid:
+        stiffen(model, data, memory, gravity)
+    elif memory.law.servo:
+        take_depth_away(model, data, memory)
+    if since > 0 and known and not still:
+        add_turning(model, data, memory, since)
+    set_up(data, memory)
+    if predict_slip(model, data, memory, enough, gravity) or not known:
+        solve(model, data, memory, enough)
+    elif memory.law.rigid:
+        oppose_slip_at_mid_step(model, data, memory)
+    write_references(data, memory)
+
+
+@kernel
+def begin(model: Any, data: Any, memory: Any) -> Any:
+    """Whether the last step is known; whether it is over; the time since the last call, s.
+
+    Stages of Runge and Kutta, and `mj_forward`, are calls within a step. A jump of time, or a reset
+    by MuJoCo, ends what is known.
+    """
+    warnings, resets = data.warning, 0
+    for i in range(len(WARNINGS)):
+        resets += warnings[WARNINGS[i]].number
+    elapsed, since = data.time - memory.time, data.time - memory.called
+    known = 0 <= elapsed <= NEXT * memory.timestep and memory.resets in (resets, -1)
+    over = elapsed > OVER * memory.timestep
+    if known and over:
+        conclude(model, data, memory)
+    if over or not known:
+        memory.time, memory.timestep, memory.resets = data.time, model.opt.timestep, resets
+    memory.called = data.time
+    start, last = reals(data.qacc_warmstart, model.nv), reals(data.qacc, model.nv)
+    touched = memory.law.rigid or data.ncon > 0
+    for i in range(model.nv if touched else 0):
+        if memory.ncon < 0 or not known:  # of states that are set MuJoCo keeps but that
+            last[i] = start[i]
+        if abs(start[i]) < memory.law.calm:
+            start[i] = 0.0
+    if known and over:
+        turn_accelerations(model, data, memory)
+    return known, over, since
+
+
+@kernel
+def forget(memory: Any) -> None:
+    """Forget all contacts."""
+    memory.contacts, memory.rows, memory.dry, memory.ncon = 0, 0, 0, 0
+    memory.pending, memory.stored = 0, 0
+
+
+@kernel
+def conclude(model: Any, data: Any, memory: Any) -> None:
+    """Find the contact forces with which a step has ended, if that wasn't done."""
+    if memory.pending:
+        memory.pending = 0
+        find_forces(model, data, memory)
+
+
+@kernel
+def keep_forces(memory: Any, over: bool) -> None:
+    """What the rows of this step remember, if nothing has moved: of a step that is over its forces."""
+    rows = rows_of(memory)
+    for r in range(len(rows) if over else 0):
+        rows[r].remembered = rows[r].force
+
+
+@kernel
+def hand_on(model: Any, data: Any, memory: Any, known: bool, over: bool) -> None:
+    """Make the contacts of the last step, with what they bore, those before."""
+    if known and not memory.stored:
+        store(model, data, memory, over)
+    memory.stored = 0
+    memory.contacts_before, memory.dry_before = 0, 0
+    if known:
+        memory.contact_at, memory.before_at = memory.before_at, memory.contact_at
+        memory.contacts_before, memory.dry_before = memory.contacts, memory.dry
+
+
+@kernel
+def store(model: Any, data: Any, memory: Any, over: bool) -> None:
+    """Store forces in the axes of bodies, and how contacts slip."""
+    store_forces(memory, over)
+    store_speeds(model, data, memory)
+
+
+@kernel
+def size_of_gravity(model: Any) -> float:
+    """The size of gravity, m s-2; the earth's if there is none."""
+    g = model.opt.gravity
+    size = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
+    return size if size > 0 else 9.81
+
+
+@kernel
+def solve(model: Any, data: Any, memory: Any, enough: float) -> None:
+    """Let MuJoCo solve for accelerations until contacts slip as predicted, to `enough`, m s-2."""
+    contacts, rows, rigid = contacts_of(memory), rows_of(memory), memory.law.rigid
+    start, last, slides = reals(data.qacc_warmstart, model.nv), math.inf, memory.law.rigid
+    mj_fwdActuation(memory.model, memory.data)
+    mj_fwdAcceleration(memory.model, memory.data)
+    for _ in range(memory.law.most):
+        for i in range(memory.contacts):  # what a blow does says nothing of the next step
+            contacts[i].extrapolated = -1.0
+        write_references(data, memory)
+        mj_fwdConstraint(memory.model, memory.data)
+        memory.solves += 1
+        qacc = reals(data.qacc, model.nv)
+        for i in range(model.nv):
+            start[i] = qacc[i]
+        worst = find_forces(model, data, memory)
+        for i in range(memory.contacts):  # what was found is predicted next
+            contacts[i].predicted = contacts[i].found
+        for r in range(memory.rows if rigid else 0):
+            rows[r].held = rows[r].remembered = rows[r].force
+        good = worst <= enough and (not rigid or worst > FALLING * last)
+        if good or worst <= EXACT * enough:
+            if not slides:
+                break
+            multiply(model, data, memory)
+            subtract_references(memory)
+            if not oppose_slip_at_mid_step(model, data, memory):
+                break
+            slides, worst = False, math.inf
+        last = worst
+
+
+# -- MuJoCo's control callback ---------------------------------------------------------------------
+
+TABLE = np.dtype(
+    [
+        ("previous", np.int64),  # the callback that was there before, by its address
+        ("ask", np.int64),  # the function of Python that is told of simulations unknown here
+        ("models", np.int64),  # how many models are installed
+        ("model_at", np.int64),
+        ("simulations", np.int64),  # how many simulations are known, by the address of their mjData
+        ("data_at", np.int64),
+        ("memory_at", np.int64),
+    ],
+    align=True,
+)
+"""What the callback looks up. It is never changed, but for `previous`: another one takes its place."""
+
+table = np.zeros(1, np.int64)
+"""The address of the `TABLE` in force."""
+_table, _tables = address_of("coulomb_table", table), array_at(TABLE)
+
+
+@kernel
+def memory_of(m: int, d: int) -> int:
+    """Address of the memory of a simulation; 0 if it is not under the law."""
+    known = _tables(words(_table(), 1)[0], 1)[0]
+    datas, low, high = words(known.data_at, known.simulations), 0, known.simulations
+    while low < high:
+        middle = (low + high) // 2
+        if datas[middle] < d:
+            low = middle + 1
+        else:
+            high = middle
+    if low < known.simulations and datas[low] == d:
+        found = words(known.memory_at, known.simulations)[low]
+        if memories(found, 1)[0].model == m:
+            return int(found)
+    installed = words(known.model_at, known.models)
+    for i in range(known.models):
+        if installed[i] == m:
+            return int(call(known.ask, m, d))
+    return 0
+
+
+@entry
+def serve(m: int, d: int) -> None:
+    """The callback: apply the law to simulations under it, after what another callback does."""
+    previous = _tables(words(_table(), 1)[0], 1)[0].previous
+    if previous:
+        call(previous, m, d)
+    memory = memory_of(m, d)
+    if memory and memories(memory, 1)[0].active:
+        law_of_a_step(m, d, memory)
+
+
+@entry
+def settle(m: int, d: int, at: int) -> None:
+    """Find the forces of the last step, and store them as a state has them."""
+    model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
+    conclude(model, data, memory)
+    if not memory.stored:  # what goes on from here does as what is restored
+        store(model, data, memory, True)
+        memory.stored, memory.ncon = 1, -1
+
+
+@kernel
+def start_anew(at: int) -> None:
+    """Let the next step remember nothing."""
+    memory = memories(at, 1)[0]
+    memory.time, memory.pending, memory.stored = math.nan, 0, 0
