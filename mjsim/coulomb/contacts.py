@@ -25,6 +25,11 @@ from .engine import (
 )
 from .engine import contacts_of as engine_contacts
 from .memory import (
+    CONTACT_ROW,
+    DRY,
+    EQUALITY,
+    IDLE,
+    ONE_SIDED,
     FORCE,
     MOMENT,
     NEW,
@@ -75,7 +80,7 @@ def store_poses(model: Any, data: Any, memory: Any) -> None:
 @kernel
 def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
     """Whether geoms and contacts are where they were when their poses were stored."""
-    if memory.ncon != data.ncon or memory.nefc != data.nefc or memory.dry != data.nf:
+    if memory.ncon != data.ncon or memory.rows != data.nefc or memory.dry != data.nf:
         return False
     xpos, xmat = reals(data.geom_xpos, 3 * model.ngeom), reals(data.geom_xmat, 9 * model.ngeom)
     kept_xpos, kept_xmat = reals(memory.xpos_at, len(xpos)), reals(memory.xmat_at, len(xmat))
@@ -129,7 +134,7 @@ def find(model: Any, data: Any, memory: Any) -> None:
     xpos = reals(data.geom_xpos, (model.ngeom, 3))
     xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
     damping = reals(data.efc_KBIP, (data.nefc, 4))
-    count, row = 0, 0
+    count = 0
     for i in range(data.ncon):
         given, address = found[i], found[i].efc_address
         if address < 0 or given.geom[0] < 0 or given.geom[1] < 0:
@@ -138,7 +143,7 @@ def find(model: Any, data: Any, memory: Any) -> None:
             continue
         contact = contacts[count]
         forget(contact)
-        contact.index, contact.address, contact.row, contact.dim = i, address, row, given.dim
+        contact.index, contact.address, contact.dim = i, address, given.dim
         contact.gap, contact.margin, contact.cone = given.dist, given.includemargin, given.mu
         contact.speed[0] = math.inf
         for j in range(5):
@@ -161,9 +166,9 @@ def find(model: Any, data: Any, memory: Any) -> None:
                     contact.axes[side, axis, of] = u * frame[0] + v * frame[1] + w * frame[2]
         for axis in range(3):
             contact.normal[axis] = contact.axes[0, axis, 0]
-        count, row = count + 1, row + given.dim
-    memory.contacts, memory.rows, memory.dry = count, row, data.nf
-    memory.ncon, memory.nefc = data.ncon, data.nefc
+        count += 1
+    memory.contacts, memory.rows, memory.ncon = count, data.nefc, data.ncon
+    memory.first_dry, memory.dry = data.ne, data.nf
 
 
 @kernel
@@ -191,27 +196,32 @@ def jacobian_length(model: Any, data: Any, memory: Any) -> int:
 @kernel
 def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
     """Copy the Jacobians of all rows: MuJoCo's own are gone when the next step asks for forces."""
-    contacts, rows, sparse = contacts_of(memory), rows_of(memory), mj_isSparse(memory.model)
-    for i in range(memory.contacts):
-        for r in range(contacts[i].dim):
-            rows[contacts[i].row + r].address = contacts[i].address + r
-    limit = reals(data.efc_frictionloss, data.nefc)
-    for i in range(memory.dry):
-        dry = rows[memory.rows + i]
-        dry.address, dry.limit = data.ne + i, limit[data.ne + i]
+    rows, sparse, limit = (
+        rows_of(memory),
+        mj_isSparse(memory.model),
+        reals(data.efc_frictionloss, data.nefc),
+    )
     lengths, begins = integers(data.efc_J_rownnz, data.nefc), integers(data.efc_J_rowadr, data.nefc)
     size = jacobian_length(model, data, memory)
     given, columns = reals(data.efc_J, size), integers(data.efc_J_colind, size)
     jacobian, column = reals(memory.jacobian_at, size), integers(memory.column_at, size)
-    total = 0
+    for n in range(size):
+        jacobian[n], column[n] = given[n], columns[n] if sparse else n % model.nv
     for r in range(len(rows)):
         row = rows[r]
-        row.first, row.length = total, lengths[row.address] if sparse else model.nv
-        source = begins[row.address] if sparse else row.address * model.nv
-        for n in range(row.length):
-            jacobian[total + n] = given[source + n]
-            column[total + n] = columns[source + n] if sparse else n
-        total += row.length
+        row.first = begins[r] if sparse else r * model.nv
+        row.length, row.limit = lengths[r] if sparse else model.nv, limit[r]
+        row.kind, row.remembered = ONE_SIDED if r >= data.ne + data.nf else EQUALITY, 0.0
+        if data.ne <= r < data.ne + data.nf:
+            row.kind = DRY
+    found = engine_contacts(data.contact, data.ncon)
+    for i in range(data.ncon):
+        for r in range(found[i].efc_address + 1, found[i].efc_address + found[i].dim):
+            rows[r].kind = IDLE
+    contacts = contacts_of(memory)
+    for i in range(memory.contacts):
+        for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
+            rows[r].kind = CONTACT_ROW
 
 
 # -- matched ---------------------------------------------------------------------------------------
@@ -289,7 +299,6 @@ def match(model: Any, data: Any, memory: Any) -> float:
             farthest = max(farthest, old.moved)
             some_gone = some_gone or contacts[k].state != NEW
             inherit(model, data, memory, contacts[k], old)
-    remember_forces(memory)
     return math.sqrt(farthest / 2) if some_gone else 0.0
 
 
@@ -333,12 +342,12 @@ def remember_forces(memory: Any) -> None:
     contacts, rows = contacts_of(memory), rows_of(memory)
     for i in range(memory.contacts):
         contact = contacts[i]
-        rows[contact.row].remembered = contact.load
+        rows[contact.address].remembered = contact.load
         for t in range(contact.dim - 1):
-            rows[contact.row + 1 + t].remembered = contact.carried[axis_of(t), kind_of(t)]
+            rows[contact.address + 1 + t].remembered = contact.carried[axis_of(t), kind_of(t)]
     known, dry = memory.dry_before == memory.dry, dry_of(memory, memory.dry)
     for i in range(memory.dry):
-        rows[memory.rows + i].remembered = dry[i] if known else 0.0
+        rows[memory.first_dry + i].remembered = dry[i] if known else 0.0
 
 
 @kernel

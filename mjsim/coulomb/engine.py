@@ -27,8 +27,6 @@ _SCALARS = {
     **{"mjtByte": np.uint8, "mjtBool": np.bool_},
     **dict.fromkeys(("mjtSize", "size_t", "uintptr_t", "uint64_t"), np.int64),
 }
-_OLD = {"efc_diagA": "efc_diagApprox", "M": "qM"}
-"""Names that MuJoCo 3.3 has for the same."""
 
 
 def structure(name: str) -> np.dtype[Any]:
@@ -56,20 +54,15 @@ def _only(whole: np.dtype[Any], *names: str, **parts: np.dtype[Any]) -> np.dtype
     assert whole.fields is not None
     places, formats, offsets = dict(whole.fields), [], []
     for name in (*names, *parts):
-        known = name if name in places else _OLD.get(name, name)
-        if known not in places:
+        if name not in places:
             version = mujoco.__version__
             raise ImportError(f"Coulomb's law doesn't know MuJoCo {version}, which has no {name}")
-        formats.append(parts.get(name, places[known][0]))
-        offsets.append(places[known][1])
+        formats.append(parts.get(name, places[name][0]))
+        offsets.append(places[name][1])
     layout = {"names": [*names, *parts], "formats": formats, "offsets": offsets}
     kind: Any = {**layout, "itemsize": whole.itemsize}
     return np.dtype(kind)
 
-
-_data = structure("mjData")
-ISLANDS = "iefc_R" in (_data.names or ())
-"""Whether rows have copies by islands: MuJoCo 3.3.0 has none."""
 
 MJ_CONTACT = _only(
     structure("mjContact"),
@@ -80,10 +73,11 @@ MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver"
 MJ_MODEL = _only(
     structure("mjModel"),
     *("nv", "nbody", "ngeom", "geom_rbound", "geom_bodyid"),
+    *("dof_parentid", "M_rownnz", "M_rowadr", "M_colind"),
     opt=MJ_OPTION,
 )
 MJ_DATA = _only(
-    _data,
+    structure("mjData"),
     *(
         "time",
         "ncon",
@@ -99,7 +93,7 @@ MJ_DATA = _only(
     *("qvel", "qacc", "qacc_warmstart", "qfrc_bias", "xpos", "xmat", "crb", "cvel", "subtree_com"),
     *("efc_J", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind", "efc_KBIP", "efc_R", "efc_D"),
     *("efc_diagA", "efc_vel", "efc_aref", "efc_frictionloss"),
-    *(("map_efc2iefc", "iefc_R", "iefc_D") if ISLANDS else ()),
+    *("efc_type", "map_efc2iefc", "iefc_R", "iefc_D", "M", "qfrc_smooth", "qacc_smooth"),
 )
 WARNINGS = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{what}")) for what in ("QPOS", "QVEL", "QACC")

@@ -26,27 +26,27 @@ def project(rows: Any, contact: Any) -> int:
 
     This is what MuJoCo's solver has (computation chapter, elliptic cone).
     """
-    normal, square = rows[contact.row], 0.0
+    normal, square = rows[contact.address], 0.0
     if contact.dim == 1:
         normal.force = max(-normal.residual / normal.R, 0.0)
         return STICKS if normal.force > 0 else OPEN
     along = contact.cone * normal.residual
     for t in range(contact.dim - 1):
-        square += (contact.mu[t] * rows[contact.row + 1 + t].residual) ** 2
+        square += (contact.mu[t] * rows[contact.address + 1 + t].residual) ** 2
     across = math.sqrt(square)
     if along >= contact.cone * across:
-        for r in range(contact.row, contact.row + contact.dim):
+        for r in range(contact.address, contact.address + contact.dim):
             rows[r].force = 0.0
         return OPEN
     if contact.cone * along + across <= 0:
-        for r in range(contact.row, contact.row + contact.dim):
+        for r in range(contact.address, contact.address + contact.dim):
             rows[r].force = -rows[r].residual / rows[r].R
         return STICKS
     normal.force = (contact.cone * across - along) / (
         normal.R * contact.cone * (1 + contact.cone * contact.cone)
     )
     for t in range(contact.dim - 1):
-        row = rows[contact.row + 1 + t]
+        row = rows[contact.address + 1 + t]
         row.force = -normal.force / across * contact.mu[t] ** 2 * row.residual
     return SLIDES
 
@@ -60,7 +60,7 @@ def find_forces(model: Any, data: Any, memory: Any) -> float:
         rows[r].residual -= rows[r].reference + rows[r].R * rows[r].held
     for i in range(memory.contacts):
         contact = contacts[i]
-        normal = rows[contact.row]
+        normal = rows[contact.address]
         normal.residual += contact.predicted
         state = project(rows, contact)
         slip = shift(rows, contact) if state != STICKS else 0.0
@@ -69,7 +69,7 @@ def find_forces(model: Any, data: Any, memory: Any) -> float:
             approach = normal.residual + normal.R * normal.held - contact.predicted
             contact.error = contact.error if approach < 0 else 0.0
         if memory.law.rigid:
-            for r in range(contact.row, contact.row + contact.dim):
+            for r in range(contact.address, contact.address + contact.dim):
                 off = abs(rows[r].R * (rows[r].force - rows[r].remembered))
                 contact.error = max(contact.error, off)
         contact.state, contact.found = state, slip
@@ -77,7 +77,7 @@ def find_forces(model: Any, data: Any, memory: Any) -> float:
         missed = (contact.bias + slip - contact.extrapolated) / 2
         contact.bias = missed if extrapolated else 0.0
         worst = max(worst, contact.error)
-    for r in range(memory.rows, len(rows)):
+    for r in range(memory.first_dry, memory.first_dry + memory.dry):
         dry = rows[r]
         dry.force = min(max(-dry.residual / dry.R, -dry.limit), dry.limit)
     return worst
@@ -89,13 +89,13 @@ def store_forces(memory: Any, found: bool) -> None:
     contacts, rows = contacts_of(memory), rows_of(memory)
     for i in range(memory.contacts):
         contact = contacts[i]
-        row = rows[contact.row]
+        row = rows[contact.address]
         contact.load = row.force if found else row.remembered
         for side in range(2):
             for axis in range(3):
                 contact.friction[side, axis, 0] = contact.friction[side, axis, 1] = 0.0
         for t in range(contact.dim - 1):
-            row = rows[contact.row + 1 + t]
+            row = rows[contact.address + 1 + t]
             force = row.force if found else row.remembered
             for side in range(2):
                 for axis in range(3):
@@ -103,7 +103,7 @@ def store_forces(memory: Any, found: bool) -> None:
                     contact.friction[side, axis, kind_of(t)] += along * force
     dry = dry_of(memory, memory.dry)
     for i in range(memory.dry):
-        row = rows[memory.rows + i]
+        row = rows[memory.first_dry + i]
         dry[i] = row.force if found else row.remembered
 
 
@@ -115,7 +115,7 @@ def shift(rows: Any, contact: Any) -> float:
     """De Saxcé's shift: the coefficients of friction times the slip of a contact, m s-2."""
     square = 0.0
     for t in range(contact.dim - 1):
-        row = rows[contact.row + 1 + t]
+        row = rows[contact.address + 1 + t]
         square += (contact.mu[t] * (row.residual + row.R * row.force)) ** 2
     return math.sqrt(square)
 
@@ -124,7 +124,7 @@ def shift(rows: Any, contact: Any) -> float:
 def subtract_references(memory: Any) -> None:
     """Take the reference accelerations of contacts off their residuals."""
     rows = rows_of(memory)
-    for r in range(memory.rows):
+    for r in range(len(rows)):
         rows[r].residual -= rows[r].reference
         rows[r].force = 0.0
 
@@ -137,7 +137,7 @@ def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: flo
     subtract_references(memory)
     for i in range(memory.contacts):
         contact = contacts[i]
-        slip, normal = shift(rows, contact), rows[contact.row].residual
+        slip, normal = shift(rows, contact), rows[contact.address].residual
         contact.predicted, contact.extrapolated = slip, -1.0
         if contact.state == NEW or contact.state == OPEN:
             doubt |= normal < 0 and (rigid or slip > enough)
@@ -159,7 +159,7 @@ def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: flo
 def power(rows: Any, contact: Any) -> float:
     """Friction that is remembered times what it is asked to give way to; negative while it slides."""
     total = 0.0
-    for r in range(contact.row + 1, contact.row + contact.dim):
+    for r in range(contact.address + 1, contact.address + contact.dim):
         total += rows[r].remembered * rows[r].residual
     return total
 
@@ -169,9 +169,9 @@ def would_hold(rows: Any, contact: Any, estimate: Any) -> bool:
     """Whether a contact would stick: the forces for it, from it alone, are within the cone."""
     load, square = 0.0, 0.0
     for k in range(contact.dim):
-        row = rows[contact.row + k]
+        row = rows[contact.address + k]
         lacks = row.residual + row.R * (row.remembered - row.held)
-        force = row.remembered - lacks / (estimate[row.address] + row.R)
+        force = row.remembered - lacks / (estimate[contact.address + k] + row.R)
         if k == 0:
             load = force
         else:

@@ -47,8 +47,7 @@ CONTACT = np.dtype(
         *(("predicted", _f8), ("found", _f8), ("extrapolated", _f8), ("bias", _f8), ("error", _f8)),
         # -- of one step alone --
         ("index", _i4),  # its number in mjData
-        ("address", _i4),  # its first constraint row there, and here
-        ("row", _i4),
+        ("address", _i4),  # its first constraint row
         ("dim", _i4),  # how many rows it has
         ("margin", _f8),  # gap below which it is a contact, m
         ("pos", _f8, 3),  # between both bodies, in world axes, m
@@ -68,9 +67,13 @@ REMEMBERED = _names[: _names.index("index")]
 """What the state of a simulation has of it."""
 REMEMBERED_CONTACT = np.dtype([(name, CONTACT[name]) for name in REMEMBERED])
 
+EQUALITY, DRY, ONE_SIDED, CONTACT_ROW, IDLE = range(5)
+"""Kind of a row: both ways; dry friction; limits and MuJoCo's own normals; a contact under the law;
+friction of MuJoCo's own contacts, which a solution leaves out."""
+
 ROW = np.dtype(
     [
-        ("address", _i4),  # its number in mjData
+        ("kind", _i4),
         ("first", _i4),  # where its Jacobian begins, and how long that is
         ("length", _i4),
         ("R", _f8),  # regularisation: acceleration per force, kg-1
@@ -83,7 +86,7 @@ ROW = np.dtype(
     ],
     align=True,
 )
-"""A constraint row of a contact, or of dry friction in a joint or tendon."""
+"""A constraint row, of the same number as in mjData."""
 
 POSE = np.dtype(
     [("geoms", _i4, 2), ("dim", _i4), ("address", _i4)]
@@ -114,15 +117,16 @@ MEMORY = np.dtype(
         *((name, _i8) for name in ("address", "model", "data")),  # of this, mjModel and mjData
         *((name, _f8) for name in ("time", "timestep", "called")),  # of the last step, call; s
         ("least", _f8),  # distance by which contacts move at least where points are put back, m
-        # counts: contacts now and before; rows of contacts; of dry friction, now and before; bodies
+        # counts: contacts now and before; rows; those of dry friction, now and before; bodies
         *((name, _i8) for name in ("contacts", "contacts_before", "rows", "dry", "dry_before")),
+        ("first_dry", _i8),
         ("free_bodies", _i8),
-        # contacts and rows of mjData when they were found; -1 after a state was restored
-        *(("ncon", _i8), ("nefc", _i8)),
+        ("ncon", _i8),  # contacts of mjData when they were found; -1 after a state was restored
         ("resets", _i8),  # by MuJoCo, of bad states; -1: not known
         ("pending", _i8),  # whether forces are still to be found
         ("stored", _i8),  # whether contacts have their forces in the axes of bodies
-        ("solves", _i8),  # solutions so far
+        # steps that were solved; factorisations that took; steps that didn't reach their tolerance
+        *((name, _i8) for name in ("solves", "factorisations", "unsolved")),
         ("active", _i8),  # whether the law applies
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
@@ -144,8 +148,8 @@ def contacts_of(memory: Any) -> Any:
 
 @kernel
 def rows_of(memory: Any) -> Any:
-    """Their rows, then those of dry friction."""
-    return rows_at(memory.row_at, memory.rows + memory.dry)
+    """All constraint rows."""
+    return rows_at(memory.row_at, memory.rows)
 
 
 @kernel

@@ -12,7 +12,7 @@ from typing import Any
 
 from .compiling import kernel
 from .contacts import smaller_radius
-from .engine import ISLANDS, integers, mj_projectConstraint, reals
+from .engine import integers, mj_projectConstraint, reals
 from .friction import shift
 from .memory import SLIDES, bodies_at, contacts_of, rows_of
 from .parameters import APART, BOUNCES, ITERATIONS, USUAL_STEP
@@ -36,7 +36,7 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
     )
     for i in range(memory.contacts):
         contact = contacts[i]
-        normal, first = rows[contact.row], contact.address
+        normal, first = rows[contact.address], contact.address
         lasting = min(normal.remembered, contact.load_before)  # not the force of a blow
         contact.load_before = normal.remembered
         fastest = max(h * gravity, h * estimate[first] * lasting)
@@ -51,7 +51,7 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
             R[r] *= factor
             D[r] = 1 / R[r]
             reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
-    if ISLANDS and data.nisland > 0:
+    if data.nisland > 0:
         copy_to_islands(data, memory)
     if model.opt.solver == PGS:
         mj_projectConstraint(memory.model, memory.data)
@@ -123,14 +123,14 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
             continue
         speed, change = 0.0, 0.0
         for t in range(contact.dim - 1):
-            row = rows[contact.row + 1 + t]
-            speed += (contact.mu[t] * velocity[row.address]) ** 2
+            row = rows[contact.address + 1 + t]
+            speed += (contact.mu[t] * velocity[contact.address + 1 + t]) ** 2
             change += (contact.mu[t] * (row.residual + row.reference)) ** 2
         if speed <= (memory.law.fast * h) ** 2 * change:
             continue
         for t in range(contact.dim - 1):
-            row = rows[contact.row + 1 + t]
-            more = velocity[row.address] / h
+            row = rows[contact.address + 1 + t]
+            more = velocity[contact.address + 1 + t] / h
             row.reference -= more
             row.residual += more
         contact.extrapolated = shift(rows, contact)

@@ -37,10 +37,10 @@ def set_up(data: Any, memory: Any) -> None:
     R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
     for r in range(len(rows)):
         row = rows[r]
-        row.R, row.reference, row.held = R[row.address], reference[row.address], row.remembered
+        row.R, row.reference, row.held = R[r], reference[r], row.remembered
     if not memory.law.rigid:
         for i in range(memory.contacts):
-            rows[contacts[i].row].held = 0.0
+            rows[contacts[i].address].held = 0.0
 
 
 @kernel
@@ -52,8 +52,7 @@ def write_references(data: Any, memory: Any) -> None:
         reals(data.efc_aref, data.nefc),
     )
     for r in range(len(rows)):
-        row = rows[r]
-        reference[row.address] = row.reference + row.R * row.held
+        reference[r] = rows[r].reference + rows[r].R * rows[r].held
     for i in range(memory.contacts):
         reference[contacts[i].address] -= contacts[i].predicted
 
@@ -67,7 +66,7 @@ def store_speeds(model: Any, data: Any, memory: Any) -> None:
         for j in range(3):
             contact.speed[j] = 0.0
         for t in range(2 if contact.dim > 1 else 0):
-            speed = times(model, memory, rows[contact.row + 1 + t], velocity)
+            speed = times(model, memory, rows[contact.address + 1 + t], velocity)
             for j in range(3):
                 contact.speed[j] += speed * contact.frame[1 + t, j]
 
@@ -92,5 +91,5 @@ def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
             before = 0.0
             for j in range(3):
                 before += contact.frame[1 + t, j] * contact.speed[j]
-            change = times(model, memory, rows[contact.row + 1 + t], velocity) - before
+            change = times(model, memory, rows[contact.address + 1 + t], velocity) - before
             reference[contact.address + 1 + t] -= change * share

@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 
 from .compiling import address_of, call, entry, kernel
-from .contacts import copy_jacobians, find, match, nothing_moved, put_points_back
+from .contacts import (
+    copy_jacobians,
+    find,
+    match,
+    nothing_moved,
+    put_points_back,
+    remember_forces,
+)
 from .engine import (
     WARNINGS,
     array_at,
@@ -21,7 +28,7 @@ from .engine import (
     words,
 )
 from .friction import find_forces, predict_slip, store_forces, subtract_references
-from .memory import contacts_of, memories, rows_of
+from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .parameters import EXACT, FALLING, NEXT, OVER
 from .rigid import (
     add_gyroscopic_moments,
@@ -52,6 +59,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
             find(model, data, memory)
             match(model, data, memory)
         copy_jacobians(model, data, memory)
+        remember_forces(memory)
     if memory.free_bodies:
         add_gyroscopic_moments(model, data, memory, known, over)
     memory.pending = memory.contacts + memory.dry > 0
@@ -124,7 +132,8 @@ def keep_forces(memory: Any, over: bool) -> None:
     """What the rows of this step remember, if nothing has moved: of a step that is over its forces."""
     rows = rows_of(memory)
     for r in range(len(rows) if over else 0):
-        rows[r].remembered = rows[r].force
+        if rows[r].kind == DRY or rows[r].kind == CONTACT_ROW:
+            rows[r].remembered = rows[r].force
 
 
 @kernel
@@ -174,6 +183,8 @@ def solve(model: Any, data: Any, memory: Any, enough: float) -> None:
         for i in range(memory.contacts):  # what was found is predicted next
             contacts[i].predicted = contacts[i].found
         for r in range(memory.rows if rigid else 0):
+            if rows[r].kind != CONTACT_ROW:
+                continue
             rows[r].held = rows[r].remembered = rows[r].force
         good = worst <= enough and (not rigid or worst > FALLING * last)
         if good or worst <= EXACT * enough:
