@@ -68,12 +68,14 @@ def validate(
     Raises
     ------
     InputError
-        For an unknown claim, or sets that are no `Parameters`.
+        For an unknown claim, sets that are no `Parameters`, or an engine that can't run here.
     StorageError
         If the directory can't be written or holds results of another version.
     """
     for p in (sets or {}).values():
         check_type("sets", p, Parameters)
+    if engine:
+        engine.check()
     forget()
     output, chosen = (
         Path(output),

@@ -93,7 +93,7 @@ class Run:
         self._state, self._progress = state, progress or (lambda done: None)
         self._timestep = self._settings.timestep
         self._interval, self._count = sampling(t_end, self._timestep, sample_interval)
-        check_timestep(self._timestep, p, self._flow, t_end)
+        check_timestep(self._timestep, p, self._flow, t_end, self._x0)
         check_start(self._x0, p, self._settings)
         self._model, mjcf = scene.build(p, self._settings)
         shown = dataclasses.asdict(self._settings) | {
@@ -190,11 +190,11 @@ def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
     check_place(x, p, settings.touching(p.g))
 
 
-def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> None:
+def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float, x0: State) -> None:
     """`time_scales.check_timestep` with the drag of these engines."""
     ball = Ball.of(p, ContactSettings())
     time_scales.check_timestep(
-        timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m
+        timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m, x0
     )
 
 

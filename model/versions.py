@@ -32,6 +32,11 @@ def version(package: str) -> str:
         return ABSENT
 
 
+def absent(package: str) -> str:
+    """Says that a package isn't installed, and what to do about it."""
+    return f"{package} is {ABSENT}: pip install {package}"
+
+
 @functools.cache
 def current_commit() -> str:
     """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""

@@ -12,7 +12,7 @@ from analytic.mechanics import drag
 from mjsim import ContactSettings, engine
 from mjsim.corrections import Ball
 from mjsim.corrections import resistance as in_mujoco
-from model import Flow, InputError, Parameters
+from model import Flow, InputError, Parameters, State
 from model.drag import LAWS
 from tests.drag_laws import BALL, BY_LAW, resistance
 
@@ -73,5 +73,5 @@ def test_a_step_too_long_for_the_drag_is_refused():
     p = BY_LAW["quadratic"].replace(omega_0=1.0, c=5.0)
     stiff = 2 * float(resistance(p.R * p.omega_0, p))
     with pytest.raises(InputError, match=r"must be <= .* half of 1/\(2 c\(R omega_0\)\)"):
-        engine.check_timestep(0.51 / stiff, p, Flow.steady(1.0), 1.0)
-    engine.check_timestep(0.49 / stiff, p, Flow.steady(1.0), 1.0)
+        engine.check_timestep(0.51 / stiff, p, Flow.steady(1.0), 1.0, State())
+    engine.check_timestep(0.49 / stiff, p, Flow.steady(1.0), 1.0, State())

@@ -112,8 +112,8 @@ def simulate_many(
 
     steady = {p: Flow.steady(p.omega_0) for p in dict.fromkeys(sets)}
     fluids = [flow or steady[p] for p, flow in zip(sets, flows, strict=True)]
-    for p, fluid in dict.fromkeys(zip(sets, fluids, strict=True)):
-        check_duration(p, fluid, t_end)
+    for p, fluid, start in zip(sets, fluids, states, strict=True):
+        check_duration(p, fluid, t_end, start)
     todo = iter(range(count))
 
     def work() -> None:

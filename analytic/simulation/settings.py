@@ -67,13 +67,13 @@ class Settings:
             check_number("timestep", self.timestep, "s", POSITIVE)
 
 
-def check_duration(p: Parameters, flow: Flow, t_end: float) -> None:
+def check_duration(p: Parameters, flow: Flow, t_end: float, x0: State) -> None:
     """Raise `InputError` if a run in a huge flow is too long to be computed.
 
-    That is `MAX_RADIANS`, of the orbit or of waves, where they are more than `HUGE` times as fast
+    That is `MAX_RADIANS`, of an orbit or of waves, where they are more than `HUGE` times as fast
     as sqrt(g/R)."""
-    shortest, name = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
-    if "omega_0" in name or "pi f" in name:
+    shortest, name = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p), x0)
+    if "omega" in name or "pi f" in name:
         meaning = f"with {name} = {shortest:.3g} s, so much shorter than sqrt(R/g), it"
         if shortest * HUGE < math.sqrt(p.R / p.g):
             check_number("t_end", t_end, "s", Range(high=MAX_RADIANS * shortest), meaning)

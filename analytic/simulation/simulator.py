@@ -72,7 +72,7 @@ def simulate(
     flow = Flow.steady(p.omega_0) if flow is None else flow
     x = start_state(x0, p, settings)
     times = sample_times(t_end, sample_interval)
-    check_duration(p, flow, float(times[-1]))
+    check_duration(p, flow, float(times[-1]), x)
     theta_0 = check_number("theta_0", theta_0, "rad")
     start, (first, second, *_) = {"x0": list(x), "theta_0": theta_0}, times.tolist()
     shown = (

@@ -82,10 +82,10 @@ def prepared(
     Raises `InputError` if the time step is too large for the problem.
     """
     t_end = float(times[-1])
-    law = partial(drag.coefficient, p=p)
-    shortest, _ = time_scales.shortest_time(p, flow, t_end, law)
+    problem = p, flow, t_end, partial(drag.coefficient, p=p), x
+    shortest, _ = time_scales.shortest_time(*problem)
     timestep = settings.timestep or min(math.sqrt(p.R / p.g) / 500, shortest / 2)
-    time_scales.check_timestep(timestep, p, flow, t_end, law)
+    time_scales.check_timestep(timestep, *problem)
     knots = np.union1d(times, flow.knots(t_end))
     length = np.diff(knots)
     steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)

@@ -19,7 +19,7 @@ from mjsim.world_axes import against
 from model import InputError
 from model.arrays import Array
 from model.kinematics import tangent
-from model.versions import ABSENT, version
+from model.versions import ABSENT, absent, version
 
 CORNERS = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
 """Why a ball in facets is slow."""
@@ -38,11 +38,7 @@ class Library:
     @property
     def missing(self) -> str:
         """Why the engine can't be used here, and what to do about it; empty if it can."""
-        return (
-            ""
-            if self.version != ABSENT
-            else f"{self.name} is not installed: pip install {self.name}"
-        )
+        return absent(self.name) if self.version == ABSENT else ""
 
     @property
     def version(self) -> str:
@@ -52,10 +48,12 @@ class Library:
     def load(self, member: str) -> Free:
         """A copy of an adapter by its name in the module; `InputError` if the package is missing or
         broken."""
+        if self.missing:
+            raise InputError(self.missing)
         try:
             engine: Free = getattr(importlib.import_module(self.module), member)
         except ImportError as error:
-            raise InputError(self.missing or f"{self.name} can't be imported: {error}") from error
+            raise InputError(f"{self.name} can't be imported: {error}") from error
         return copy.copy(engine)
 
 

@@ -108,13 +108,13 @@ def simulate(
     """
     p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep
     every, count = sampling(t_end, h, task.sample_interval)
-    check_timestep(h, p, flow, t_end)
     if p.fluid_torque:
         raise InputError(
             f"fluid_torque = {p.fluid_torque:g} s-1: {task.engine} leaves it out; mujoco, "
             f"time-stepping don't"
         )
     x = State.one(task.x0)
+    check_timestep(h, p, flow, t_end, x)
     check_place(x, p, p.r / 10)
     total, failure = (count - 1) * every + 1, ""  # of the last sample only forces are needed
     with closing(library.load(member)) as engine:

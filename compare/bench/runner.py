@@ -14,7 +14,8 @@ is not asked for cases that need what version 1 of them had not (`Case.needs`) u
 ``FEATURES`` name that. It may say of itself: ``NAME``, ``PRECISION`` (``f64`` or ``f32``),
 ``DECLARED`` (in words, all that isn't a free body in plain geometry under the engine's own
 settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
-`TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``).
+`TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``),
+``MISSING`` (why it can't be used here).
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from compare.bench.case import TOLERANCE, Case
 from model import InputError
 from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number
-from model.versions import version
+from model.versions import ABSENT, absent, version
 
 LIMIT = 300.0
 """Longest that a run at one step may take, s of real time."""
@@ -127,10 +128,15 @@ def run(
     used, or for a step that is none."""
     for step in steps or ():
         check_number("step", step, "s", POSITIVE)
-    (result,) = run_all([case], engine, steps, limit)
-    if result.engine.missing:
-        raise InputError(result.engine.missing)
-    return result
+    with closing(EngineProcess(engine, limit)) as trial:
+        trial.check()
+        return trial.result(case, steps)
+
+
+def check(engine: Any) -> None:
+    """`InputError` if an engine can't be used here."""
+    with closing(EngineProcess(engine)) as trial:
+        trial.check()
 
 
 def run_all(
@@ -175,6 +181,11 @@ class EngineProcess:
         answer = self._answer(BEGIN)
         name = self._engine if isinstance(self._engine, str) else type(self._engine).__name__
         return answer if isinstance(answer, About) else About(name, missing=f"{name} {answer}")
+
+    def check(self) -> None:
+        """`InputError` if the engine can't be used here."""
+        if self.about.missing:
+            raise InputError(self.about.missing)
 
     def _answer(self, limit: float) -> Any:
         """What the process sends within `limit` s, or in words why it doesn't."""
@@ -249,6 +260,9 @@ def _load(given: Any) -> tuple[Any, About]:
             engine = importlib.import_module(module)
             engine = getattr(engine, member) if member else engine
         except Exception as error:  # whatever a module or a broken package does when it is imported
+            package = _package(given, None).partition(" ")[0]
+            if package and version(package) == ABSENT:
+                return None, About(str(given), missing=absent(package))
             works = f" ({text})" if (text := _version(given, None)) else ""
             raise InputError(f"{type(error).__name__}: {_one_line(error)}{works}") from error
     name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
@@ -265,23 +279,28 @@ def _load(given: Any) -> tuple[Any, About]:
         check_number("TIMESTEPS", step, "s", POSITIVE)
         for step in getattr(engine, "TIMESTEPS", TIME_STEPS)
     )
-    return engine, About(
+    about = About(
         name, precision, declared, note, _version(given, engine), tuple(steps), tuple(features)
     )
+    return engine, replace(about, missing=getattr(engine, "MISSING", ""))
 
 
 def _version(given: Any, engine: Any) -> str:
     """The version of an engine's package, and that with which it is known to work if that is
     another, as text."""
-    _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
-    listed = (
-        (adapters.KNOWN.get(own) or adapters.KNOWN.get(own.partition(":")[0], "")) if ours else ""
-    )
-    package, _, known = getattr(engine, "KNOWN", listed).partition(" ")
+    package, _, known = _package(given, engine).partition(" ")
     here = version(package) if package else ""
     return f"{package} {here}".strip() + (
         f", known to work: {known}" if known and here != known else ""
     )
+
+
+def _package(given: Any, engine: Any) -> str:
+    """The package that an engine comes in, and the version with which it is known to work; or
+    nothing."""
+    _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
+    listed = adapters.KNOWN.get(own.partition(":")[0], "") if ours else ""
+    return str(getattr(engine, "KNOWN", listed))
 
 
 def _one_line(error: Exception) -> str:
@@ -306,6 +325,8 @@ def serve_engine(handle: int) -> None:
         pipe.send(about)
     except (InputError, TypeError) as error:
         pipe.send(f"can't be used: {error}")
+        return
+    if about.missing:
         return
     while True:
         try:

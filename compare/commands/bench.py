@@ -30,6 +30,7 @@ def run_league(args: argparse.Namespace) -> int:
     from compare.bench import (
         league,
         native,
+        runner,
     )  # here and below, because a list of the cases waits for no engine
     from compare.kit import progress
     from compare.kit.pictures import embedded, svg
@@ -46,6 +47,8 @@ def run_league(args: argparse.Namespace) -> int:
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
     if args.settings:
         chosen = {args.settings.stem: native.entry(args.settings)} | chosen
+    for name in args.engine or ():
+        runner.check(chosen[name])
     make_directory(args.output)
     check_ours(args.output / LEAGUE_PAGE, beside=args.output / LEAGUE_JSON)
     with progress.reporter(quiet=args.json or args.quiet) as show:

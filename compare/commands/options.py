@@ -181,11 +181,13 @@ def results(text: str) -> Path:
 
 
 def engine(name: str) -> Any:
-    """An engine by its name, for argparse."""
+    """An engine by its name, for argparse: one that can run here."""
     from compare.kit import engines  # here, because help waits for none of them
 
     try:
-        return engines.engine(name)
+        found = engines.engine(name)
+        found.check()
+        return found
     except InputError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 

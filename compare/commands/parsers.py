@@ -51,7 +51,10 @@ def command(group: str, run: str, example: str) -> Callable[[Callable[[Parser], 
 
 @command("study", "validate.run", "--quick")
 def validate(parser: Parser) -> None:
-    """Hold simulation against theory, claim by claim; the main job."""
+    """Hold simulation against theory, claim by claim; the main job.
+
+    The exit code is 1 if a verdict on the engine on trial isn't the expected one. What the
+    witnesses beside it refute is told, and changes nothing."""
     level = parser.add_mutually_exclusive_group()
     for name, takes in (("quick", "a minute or two"), ("full", "an hour or more")):
         takes = f"{takes} (default: in between)"

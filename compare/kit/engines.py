@@ -88,6 +88,11 @@ class Engine:
         """Why the engine can't run on this machine; empty if it can."""
         return self.needs.missing if self.needs else ""
 
+    def check(self) -> None:
+        """`InputError` if the engine can't run on this machine."""
+        if self.needs:
+            self.needs.load("best")
+
     @cached_property
     def versions(self) -> dict[str, str]:
         """Versions of all packages that determine its results, by name."""

@@ -54,8 +54,8 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     """A simulation for the viewer, with what only serves contact hidden."""
     if settings.rigid:
         raise InputError("the viewer shows no rigid contacts")
-    engine.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
     x = State.one(x0)
+    engine.check_timestep(settings.timestep, p, flow, float(flow.start[-1]), x)
     engine.check_start(x, p, settings)
     model, _ = scene.build(p, settings, shown=True)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)

@@ -191,7 +191,7 @@ def test_a_ball_locked_in_the_corner_does_not_rebound(method):
 
 
 @pytest.mark.parametrize(
-    ("flow", "says"), [(None, "1/omega_0 = 1e-09 s"), (Flow.sine(5, 1, 1e9), "1/(2 pi f) = ")]
+    ("flow", "says"), [(None, "1/(2 omega_0) = 5e-10 s"), (Flow.sine(5, 1, 1e9), "1/(2 pi f) = ")]
 )
 def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
     """It would take hours; the first moments of it don't."""
@@ -278,7 +278,7 @@ def test_no_convergence_keeps_the_samples():
     assert len(kept.time) > 1
     assert np.all(np.isfinite(kept.x))
     # Among many at once it leaves the others alone.
-    many = simulate_many([P, p], x0, 0.2, settings=settings, sample_interval=0.1)
+    many = simulate_many([P.replace(omega_0=5.0), p], x0, 0.2, settings=settings, sample_interval=0.1)
     assert many.failure[0] == ""
     assert "a shorter step" in many.failure[1]
     assert np.all(np.isfinite(many.x[0]))

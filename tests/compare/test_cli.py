@@ -175,7 +175,7 @@ def test_attractors_says_what_is_undecided_and_what_it_did_last(capsys, tmp_path
 
 def test_a_run_that_diverges_is_kept_and_told(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)  # where MuJoCo would leave its MUJOCO_LOG.TXT
-    code, _, said = carried_out(capsys, "simulate --start omega_c=1e9 --time 0.1 -o run.h5")
+    code, _, said = carried_out(capsys, "simulate --start slip_x=1e11 --time 0.1 -o run.h5")
     assert code == 1
     assert re.search(r"diverged by t = .*; its samples so far are kept in run\.failed\.h5", said)
     assert not storage.load("run.failed.h5").complete

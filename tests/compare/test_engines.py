@@ -4,6 +4,7 @@ trajectories in the vessel.
 The same task in, the same trajectory out; what can't be had, ends, hangs or gives no numbers is
 said in a line."""
 
+import re
 import sys
 import warnings
 from concurrent.futures import ProcessPoolExecutor
@@ -23,6 +24,7 @@ from compare.bench.case import TOLERANCE
 from compare.bench.runner import EngineProcess
 from compare.kit.engines import ENGINES
 from compare.kit.tasks import Task, carry_out, store
+from compare.validation import validate
 from docs.studies.states import LANDING, STATES
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, State
@@ -78,9 +80,10 @@ def simulated(*given, **more):
 )
 def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
     """By the same rule, before anything is written, and whether or not the engine is installed."""
-    words = r"timestep = 0\.5 s is out of range: must be <= 0\.0357 s, half of sqrt\(R/g\), the shortest time of"
-    with pytest.raises(InputError, match=words):
-        store(task_of(name, P, State(), 1.0, 0.5), tmp_path / "run.h5")
+    for orbit, least, of in ((0.0, "0.0208", "omega_0"), (100.0, "0.0025", "omega_c")):
+        words = f"must be <= {least} s, half of 1/(2 {of}), the shortest time of the problem"
+        with pytest.raises(InputError, match=re.escape(words)):
+            store(task_of(name, P, State(omega_c=orbit), 1.0, 0.03), tmp_path / "run.h5")
     assert not list(tmp_path.iterdir())
 
 
@@ -192,7 +195,7 @@ def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name, monkeypatch):
         ),
     ],
 )
-def test_what_is_not_installed_says_what_to_do(name, named, says, monkeypatch, capsys):
+def test_what_is_not_installed_says_what_to_do(name, named, says, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("compare.adapters.free.version", lambda package: "not installed")
     if name != "siconos":
         monkeypatch.setitem(sys.modules, f"compare.adapters.{name.partition('-')[0]}", None)
@@ -201,7 +204,12 @@ def test_what_is_not_installed_says_what_to_do(name, named, says, monkeypatch, c
     monkeypatch.setenv("DUALBALL_SICONOS_PYTHON", named)
     assert ENGINES[name].missing == says
     assert "not installed" in ENGINES[name].versions.values()
-    assert refused(capsys, f"simulate --engine {name} --time 0.05") == f"dualball: error: {says}\n"
+    with pytest.raises(InputError, match=says):
+        validate(tmp_path / "results", engine=ENGINES[name])
+    monkeypatch.chdir(tmp_path)
+    for command in ("simulate", "sweep --vary eta=0.1,0.2", "attractors", "validate"):
+        assert says in refused(capsys, f"{command} --engine {name}")
+    assert not [*tmp_path.iterdir()]
 
 
 def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
@@ -209,9 +217,9 @@ def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
     monkeypatch.setattr(
         "compare.validation.validate", lambda output, **given: asked.append(given["engine"]) or []
     )
-    for words in ("--engine drake", ""):
+    for words in ("--engine mujoco-coulomb", ""):
         assert told(capsys, f"validate {words} --workers 0 --json") == "[]"
-    assert asked == [ENGINES["drake"], None]
+    assert asked == [ENGINES["mujoco-coulomb"], None]
 
 
 OWN = "compare.adapters"

@@ -16,6 +16,7 @@ from compare.bench import cases, run
 from compare.bench.case import TIME_STEPS, VERSION, read
 from compare.bench.runner import run_all
 from model import InputError, StorageError
+from model.versions import ABSENT, version
 from tests.commands import refused, told
 from tests.exact_cases import CASES
 
@@ -112,7 +113,7 @@ def test_errors_order_creep_and_cost():
             SimpleNamespace(build=print, step=print),
             "SimpleNamespace has no function state; an engine has build, step",
         ),
-        ("compare.adapters.dart:gone", " (dartpy "),
+        ("compare.adapters.mujoco_free:gone", " has no attribute 'gone' (mujoco "),
         (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
     ],
 )
@@ -120,6 +121,22 @@ def test_engines_that_are_none(engine, says):
     with pytest.raises(InputError) as refused:
         run(CASES["box-stops"], engine)
     assert says in str(refused.value)
+
+
+def test_what_is_not_installed_says_what_to_do(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("DUALBALL_SICONOS_PYTHON", "absent")
+    absent = [
+        ("siconos", "siconos is not installed for absent, which DUALBALL_SICONOS_PYTHON names")
+    ]
+    absent += [
+        (name, f"{package} is not installed: pip install {package}")
+        for name, package in (("newton-xpbd", "newton"), ("mujoco-warp", "mujoco-warp"))
+        if version(package) == ABSENT
+    ]
+    for name, says in absent:
+        said = refused(capsys, f"league --engine mujoco --engine {name} -o {tmp_path / 'lost'}")
+        assert said == f"dualball: error: {says}\n"
+    assert not [*tmp_path.iterdir()]
 
 
 def test_a_league_of_one(tmp_path, capsys):
@@ -130,8 +147,11 @@ def test_a_league_of_one(tmp_path, capsys):
     assert sum(result["passed"] for result in tried) == 14
     assert not any(result["failure"] for result in tried)
     assert "no forces" in (tmp_path / "league.html").read_text("utf-8")
-    said = refused(capsys, f"league --engine no.such -o {tmp_path} --quiet")
-    assert "nothing to compare: no.such can't be used: ModuleNotFoundError: No module" in said
+    lost = tmp_path / "lost"
+    for known in ("", "--engine mujoco-plain "):
+        said = refused(capsys, f"league {known}--engine no.such -o {lost} --quiet")
+        assert "no.such can't be used: ModuleNotFoundError: No module" in said
+    assert not lost.exists()
 
 
 def test_the_set_as_files(tmp_path, capsys):
