@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +34,7 @@ UNITS: dict[str, str] = {
 }
 """Units of what a motion may have, by name: the columns of a trajectory, of its forces each
 component."""
+_COLUMNS = {name: (unit, [*(["t"] * (name == "time"))]) for name, unit in UNITS.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +52,14 @@ class Series:
 
     def __post_init__(self) -> None:
         for name, values in {"time": self.time, **self.values}.items():
-            if values.shape != self.time.shape or values.ndim != 1 or not len(values):
+            if values.ndim != 1:
+                raise InputError(f"{self.name}: {name} must be one column of numbers")
+            if not len(values):
+                raise InputError(f"{self.name} has no samples of {name}")
+            if len(values) != self.time.size:
                 raise InputError(
-                    f"{self.name}: {name} has shape {values.shape}, time {self.time.shape}, not "
-                    f"both (n > 0,)"
+                    f"{self.name} needs {name} at each time, but has {self.time.size} times and "
+                    f"{len(values)} values of {name}"
                 )
             for k in np.flatnonzero(~np.isfinite(values))[:1]:
                 raise InputError(
@@ -98,7 +104,10 @@ def read(source: Source, name: str = "") -> Series:
         return source
     if isinstance(source, str | Path):
         name, path = name or str(source), Path(source)
-        source = _csv(path) if path.suffix.lower() in (".csv", ".txt") else _hdf5(path)
+        if path.suffix.lower() in (".csv", ".txt"):
+            source, _ = table.read(path, _COLUMNS, ["time"], ("time", "omega_c"))
+        else:
+            source = _hdf5(path)
     if isinstance(source, Trajectory):
         run = source
         given: dict[str, npt.ArrayLike] = {
@@ -107,44 +116,37 @@ def read(source: Source, name: str = "") -> Series:
     else:
         given = dict(source) if isinstance(source, Mapping) else {}
     name = name or (run.header.engine if run else "the motion")
-    try:
-        if not isinstance(source, Mapping | Trajectory):
+    if not isinstance(source, Mapping | Trajectory):
+        try:
             given = dict(zip(("time", "omega_c"), source, strict=True))
-        known = {
-            "time" if key == "t" else key: np.asarray(values, float)
-            for key, values in given.items()
-        }
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"{name} must be (time, omega_c), arrays by name, a file or a trajectory: {error}"
-        ) from error
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"{name} must be (time, omega_c), arrays by name, a file or a trajectory"
+            ) from error
+    given = {"time" if key == "t" else key: values for key, values in given.items()}
+    known = {key: _column(name, key, given[key]) for key in given if key in UNITS}
     if "time" not in known or not known.keys() & UNITS.keys() - {"time"}:
         raise InputError(
             f"{name} needs time and, say, omega_c; it has "
             f"{', '.join(given) or 'nothing of the kind'}"
         )
-    return Series(
-        name, known.pop("time"), {key: row for key, row in known.items() if key in UNITS}, run
-    )
+    return Series(name, known.pop("time"), known, run)
 
 
-def _csv(path: Path) -> dict[str, Array]:
-    """The columns of a table of numbers by the names in its head; time and omega_c if it has
-    none."""
+def _column(source: str, name: str, values: Any) -> Array:
+    """The values of a quantity; `InputError` for what is no numbers, or says that it is in another
+    unit."""
+    about = getattr(values, "attrs", {})  # of a data set of HDF5, and of an array of xarray
+    for unit in [about[key] for key in ("units", "unit") if key in about][:1]:
+        said = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
+        try:
+            table.check_unit(name, name, said, UNITS[name])
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from error
     try:
-        rows = [
-            row
-            for line in path.read_text("utf-8-sig").splitlines()
-            if any(row := table.fields(line))
-        ]
-        head = rows.pop(0) if rows and {"time", "t"} & set(rows[0]) else ["time", "omega_c"]
-        return dict(zip(head, np.array(rows, float).reshape(len(rows), len(head)).T, strict=True))
-    except OSError as error:
-        raise StorageError(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(
-            f"{path} is no table of numbers under a head of their names: {error}"
-        ) from error
+        return np.asarray(values, float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{source}: {name} must be a column of numbers") from error
 
 
 def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
@@ -167,7 +169,10 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
                 if len(stored) > SAMPLES:
                     most = f"{SAMPLES:g} are the most that are compared"
                     raise StorageError(f"{name!r} has {len(stored):g} samples, and {most}")
-            return {name: np.asarray(stored[...], float) for name, stored in found.items()}
+            return {
+                name: _column(str(path), "time" if name == "t" else name, stored)
+                for name, stored in found.items()
+            }
     raise ours
 
 

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from model import table
 from model.arrays import Array
-from model.errors import InputError, StorageError
-from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, REACH, Range, check_number, parse_number
+from model.errors import InputError
+from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, REACH, Range, check_number
 
 GAP = 10.0
 """An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't
@@ -138,52 +138,15 @@ class Flow:
         the median interval if None. Raises `StorageError` for a file that can't be read,
         `InputError` that names the line where a field is missing or not a finite number, where
         times don't increase, or after a gap."""
-        try:
-            lines = Path(path).read_text("utf-8-sig").rstrip().splitlines()
-        except OSError as error:
-            raise StorageError(f"cannot read the flow from {path}: {error.strerror}") from error
-        except UnicodeDecodeError as error:
-            raise InputError(f"{path} is not a text file: {error.reason}") from error
-        rows = [
-            (n, table.fields(line))
-            for n, line in enumerate(lines, 1)
-            if not line.lstrip().startswith("#")
-        ]
-        samples, place, width = list[tuple[float, float]](), {"time": 0, "omega_0": 1}, 2
-        if rows and not any(table.is_number(text) for text in rows[0][1]):
-            n, head = rows.pop(0)
-            try:
-                place, width = table.columns(head, _COLUMNS), len(head)
-            except InputError as error:
-                raise InputError(f"{path}, line {n}: {error}") from error
-        for n, texts in rows:
-            try:
-                if len(texts) != width:
-                    needed = (
-                        "two values, time and omega_0"
-                        if width == 2
-                        else f"{width} values, as the head"
-                    )
-                    comma = (
-                        "; with decimal commas, separate them by semicolons"
-                        if len(texts) == 2 * width
-                        else ""
-                    )
-                    raise InputError(f"needs {needed}, but has {len(texts)}{comma}")
-                time, omega_0 = (
-                    parse_number(name, texts[place[name]], unit)
-                    for name, (unit, _) in _COLUMNS.items()
-                )
-                if samples and time <= samples[-1][0]:
-                    raise InputError(
-                        f"times must increase, but {time:g} s comes after {samples[-1][0]:g} s"
-                    )
-                samples.append((time, omega_0))
-            except InputError as error:
-                raise InputError(f"{path}, line {n}: {error}") from error
-        if not samples:
+        found, lines = table.read(path, _COLUMNS, list(_COLUMNS), ("time", "omega_0"))
+        times, values = found["time"], found["omega_0"]
+        if not times:
             raise InputError(f"{path} has no line with a time and a value of omega_0")
-        times, values = zip(*samples, strict=True)
+        for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
+            raise InputError(
+                f"{path}, line {lines[k + 1]}: times must increase, but {times[k + 1]:g} s comes "
+                f"after {times[k]:g} s"
+            )
         if len(times) > 1:
             intervals = np.diff(times)
             usual = float(np.median(intervals))
@@ -193,7 +156,7 @@ class Flow:
                 intervals > check_number("longest_interval", longest_interval, "s", POSITIVE)
             )[:1]:
                 raise InputError(
-                    f"{path}, line {rows[k + 1][0]}: a gap of {intervals[k]:g} s from t = "
+                    f"{path}, line {lines[k + 1]}: a gap of {intervals[k]:g} s from t = "
                     f"{times[k]:g} s on; usual are "
                     f"{usual:g} s, and longest_interval = {longest_interval:g} s"
                 )

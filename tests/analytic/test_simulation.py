@@ -278,7 +278,9 @@ def test_no_convergence_keeps_the_samples():
     assert len(kept.time) > 1
     assert np.all(np.isfinite(kept.x))
     # Among many at once it leaves the others alone.
-    many = simulate_many([P.replace(omega_0=5.0), p], x0, 0.2, settings=settings, sample_interval=0.1)
+    many = simulate_many(
+        [P.replace(omega_0=5.0), p], x0, 0.2, settings=settings, sample_interval=0.1
+    )
     assert many.failure[0] == ""
     assert "a shorter step" in many.failure[1]
     assert np.all(np.isfinite(many.x[0]))

@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import xarray
 
 import analytic
 from compare.testing import assert_settles, assert_tracks, difference, read
@@ -116,15 +117,40 @@ def test_motions_in_files(theory, tmp_path):
         assert_tracks(path, theory, rms=1e-15)
 
 
+@pytest.mark.parametrize("unit", ["rpm", b"rpm", "deg/s", "1/s", "Hz"])
+def test_another_unit_is_refused_wherever_it_is_said(tmp_path, theory, unit):
+    """In a file of HDF5 of another program, and in arrays of xarray; the same in other spelling is
+    taken."""
+    path, said = tmp_path / "foreign.h5", unit if isinstance(unit, str) else unit.decode()
+    for own, name in ((unit, "units"), (unit, "unit"), ("rad/s", "units"), (b"rad s^-1", "units")):
+        with h5py.File(path, "w") as file:
+            file["t"], file["omega_c"] = theory.time, theory.omega_c
+            file["t"].attrs["units"], file["omega_c"].attrs[name] = "seconds", own
+        if own is not unit:
+            assert_tracks(path, theory, rms=1e-15)
+            continue
+        with pytest.raises(InputError, match=f"omega_c must be in rad/s, not in {said}"):
+            read(path)
+    series = xarray.DataArray(theory.omega_c, attrs={"units": said})
+    with pytest.raises(InputError, match=f"omega_c must be in rad/s, not in {said}"):
+        assert_settles(theory.time, series, P, rtol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.csv", "t,omega_c\n0,1\n1,x\n", "a.csv is no table of numbers"),
-        ("a.csv", "t,omega_c\n0,1\n1\n", "a.csv is no table of numbers"),
-        ("a.csv", "t,omega_c\n0,1\n1,nan\n", "omega_c is nan in sample 1, at t = 1 s"),
+        ("a.csv", "t,omega_c\n0,1\n1,x\n", "a.csv, line 3: omega_c = 'x' must be a number in rad"),
+        ("a.csv", "t,omega_c\n0,1\n1\n", "a.csv, line 3: needs two values, time and omega_c, but"),
+        ("a.csv", "t,omega_c\n0,1\n1,nan\n", "a.csv, line 3: omega_c = nan rad s-1 must be finite"),
+        (
+            "a.csv",
+            "t,omega_c (rpm)\n0,1\n",
+            "line 1: 'omega_c .rpm.': omega_c must be in rad/s, not",
+        ),
+        ("a.csv", "t [ms];y\n0;1\n", "line 1: 't .ms.': time must be in s, not in ms"),
         ("a.csv", "t,omega_c\n1,1\n1,1\n", "times must increase, but 1 s comes after 1 s"),
-        ("a.csv", "t,speed\n1,1\n", "needs time and, say, omega_c; it has t, speed"),
-        ("a.csv", "", "shape"),
+        ("a.csv", "t,speed\n1,1\n", "needs time and, say, omega_c; it has time"),
+        ("a.csv", "", "has no samples of time"),
         ("a.h5", "no file of HDF5", "it is not an HDF5 file"),
         ("a.h5", {"schema": "other"}, "checksum"),
         ("a.h5", {}, "needs time and, say, omega_c"),

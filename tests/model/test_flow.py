@@ -117,7 +117,7 @@ def test_a_gap_that_is_accepted(tmp_path):
 
 
 def test_unreadable_measurements(tmp_path):
-    with pytest.raises(StorageError, match=r"cannot read the flow from .*: No such file"):
+    with pytest.raises(StorageError, match=r"cannot read .*: No such file"):
         Flow.from_csv(tmp_path / "flow.csv")
     (tmp_path / "flow.csv").write_bytes(b"\xff\x00\x01")
     with pytest.raises(InputError, match="not a text file"):
