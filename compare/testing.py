@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
-from analytic.mechanics import drag
 from compare.kit.settling import rotation_scale
+from compare.kit.steady import time_constant
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.arrays import Array
 from model.errors import suggestion
@@ -324,10 +324,7 @@ def assert_settles(
     )
     state = min(states, key=lambda s: abs(s.state.omega_c - w.mean()))
     name, exact = state.case.name, state.state.omega_c
-    c = max(p.c, drag.coefficient(abs(p.omega_0 - exact) * p.R, p))
-    slowest = max(
-        (1 + 2 * p.j) / c, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)])
-    )
+    slowest = time_constant(p, state)
     lasts, swing = float(motion.time[-1] - motion.time[0]), float(np.ptp(w))
     scale, off = abs(exact) or rotation_scale(p), np.abs(w - exact)
     needed = (

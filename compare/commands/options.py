@@ -238,6 +238,11 @@ class Help(argparse.HelpFormatter):
         return f"{text} (default {default})"
 
 
+def warn(said: str) -> None:
+    """Say what to mind about what was asked, on standard error."""
+    print(f"dualball: warning: {said}", file=sys.stderr)
+
+
 def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
     """The parameter set that --set or --parameters names, by its name; {} if neither is given."""
     if args.parameters:
@@ -432,10 +437,7 @@ def parameters(args: argparse.Namespace) -> Parameters:
         **given_options(args, [field.name for field in dataclasses.fields(Parameters)], PREFIX)
     )
     if max(p.r, p.R) > _LARGE:
-        print(
-            f"dualball: warning: r = {p.r:g} m, R = {p.R:g} m: were millimetres meant?",
-            file=sys.stderr,
-        )
+        warn(f"r = {p.r:g} m, R = {p.R:g} m: were millimetres meant?")
     return p
 
 

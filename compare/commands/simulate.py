@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from compare.commands import options, running, signals
-from compare.kit import collection, sweep
+from compare.kit import collection, steady, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.view import motions
 from mjsim import ContactSettings
@@ -101,6 +101,13 @@ def run_sweep(args: argparse.Namespace) -> int:
                 other = f"{args.output} holds another sweep ({'; '.join(differ)})"
                 raise InputError(f"{other}: choose another directory with --output")
         write_text(path, json.dumps(asked))
+        longest, slowest = steady.enough([each.parameters for each in tasks])
+        if args.time < longest:
+            options.warn(
+                f"{args.time:g} s may be too short to settle: the slowest of these balls has a "
+                f"time constant of {slowest:.3g} s, and --time {longest:g} brings it to within "
+                f"{100 * steady.DRIFT:g} %"
+            )
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
     if args.json:
@@ -122,4 +129,6 @@ def collect(args: argparse.Namespace) -> int:
     """Gather the runs of a directory into one file."""
     count = collection.collect(args.directory, args.output, args.workers)
     print(f"{count} run{'s' * (count != 1)} gathered into {args.output}")
+    if said := collection.unsettled(collection.describe(args.output)):
+        options.warn(said)
     return 0

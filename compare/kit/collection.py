@@ -22,8 +22,8 @@ import numpy.typing as npt
 from rich.table import Table
 
 import analytic
-from compare.kit import pages
-from compare.kit.statistics import settled_case, steady_mean
+from compare.kit import pages, steady
+from compare.kit.statistics import settled_case
 from compare.kit.workers import processes
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.files import check_writable
@@ -36,8 +36,6 @@ SCHEMA, SCHEMA_VERSION = "dualball-collection", 2
 """The first version knew no grids."""
 MEANS, MEANS_VERSION = "dualball-means", 1
 """What a file of the means of a batch says of itself."""
-FEWEST = 6
-"""Samples of the last quarter of a run below which it has no mean."""
 NAMED = 5
 """Most files that can't be gathered, and most runs of a file, that are named one by one."""
 SHARE = 16
@@ -193,13 +191,9 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
             "duration": float(run.time[-1]) if len(run.time) else 0.0,
             "failure": run.header.failure,
         }
-        length = len(run.time) // 4
-        means = (
-            steady_mean(run.x.T, length)
-            if length >= FEWEST
-            else np.full((2, len(VARIABLES)), math.nan)
-        )
-        for variable, mean, drift in zip(VARIABLES, *np.array(means).tolist(), strict=True):
+        means = steady.last_quarter(run.time, run.x, run.header, len(run.time))
+        means = means or ([math.nan] * len(VARIABLES), [math.nan] * len(VARIABLES))
+        for variable, mean, drift in zip(VARIABLES, *means, strict=True):
             row |= {variable: mean, f"{variable}_uncertainty": drift}
         row |= {
             "case": int(settled_case(run)) if len(run.case) else -1,
@@ -299,6 +293,7 @@ def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
     finite = {
         name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"
     }
+    off = steady.share(of["omega_c"], of["omega_c_uncertainty"], of["omega_0"])
     return {
         "runs": len(of["run"]),
         "names": of["run"].tolist(),
@@ -308,11 +303,23 @@ def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
             for code, count in zip(codes, counts, strict=True)
             if code >= 0
         },
+        "unsettled": int((off > steady.DRIFT).sum()),
+        "drift": float(np.nanmax(off, initial=0.0)),
         "failures": [text for text in of["failure"].tolist() if text],
         "drag": sorted(set(of["drag"].tolist())) if "drag" in of else [],
         "varied": varied_parameters(of),
         "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
     }
+
+
+def unsettled(about: dict[str, Any]) -> str:
+    """Says of what `describe` gives how many runs haven't settled; empty if all have."""
+    if not about["unsettled"]:
+        return ""
+    return (
+        f"{about['unsettled']} of {about['runs']} runs have not settled: their omega_c may change "
+        f"by up to {100 * about['drift']:.2g} % yet"
+    )
 
 
 def table(about: dict[str, Any]) -> Table:
@@ -327,6 +334,7 @@ def table(about: dict[str, Any]) -> Table:
             "{} {:g} … {:g}".format(n, *ranges[n]) for n in about["varied"] if n != "drag"
         ),
         "drag": ", ".join(about["drag"]),
+        "settled": unsettled(about) or "all runs",
         "omega_c": "{:.9g} … {:.9g} rad s-1".format(*ranges.get("omega_c", [np.nan, np.nan])),
     }
     return pages.pairs(rows)

@@ -59,12 +59,13 @@ def taper(length: int) -> Array:
     return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
 
 
-def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
+def steady_mean(values: Array, length: int, slowest: float = 0.0) -> tuple[Array, Array]:
     """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its
     limit; both (k,).
 
     From three windows, each a quarter of its length later than the one before: what is left of an
-    approach by a constant ratio, plus the last change itself."""
+    approach by a constant ratio, plus the last change itself. Of a time constant of `slowest`
+    samples the ratio is known to be no less, however little of the way is seen."""
     weights = taper(length)
     weights /= weights.sum()
     n, shift = values.shape[1], length // 4
@@ -73,6 +74,8 @@ def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
     )
     before, after = np.abs(second - first), np.abs(last - second)
     ratio = np.minimum(np.divide(after, before, out=np.zeros_like(after), where=before > 0), 0.9)
+    if 0 < slowest < math.inf:
+        ratio = np.maximum(ratio, math.exp(-shift / slowest))
     return last, after / (1 - ratio)
 
 

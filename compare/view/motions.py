@@ -7,13 +7,14 @@ Each is first described as data, then shown.
 from __future__ import annotations
 
 import dataclasses
+from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table
 
-from compare.kit import pages
+from compare.kit import pages, steady
 from compare.testing import UNITS, Series, common_times, difference
 from model import Case, Flow, InputError, Parameters, Trajectory, kinematics, storage
 from model.kinematics import VARIABLES
@@ -35,15 +36,20 @@ def describe(path: Path) -> dict[str, Any]:
 
     Raises `StorageError` for a file that isn't a trajectory or isn't whole.
     """
-    samples = 0
+    samples, kept = 0, deque[Trajectory]()
     stretches: list[tuple[Case, float, float]] = []
     for last in storage.parts(path, PART):
         samples += len(last.time)
+        kept.append(last)
+        while sum(len(part.time) for part in kept) - len(kept[0].time) > samples / 2:
+            kept.popleft()
         for case, start, end in last.phases():
             if stretches and stretches[-1][0] is case:
                 start = stretches.pop()[1]
             stretches.append((case, start, end))
     header, events = last.header, last.events
+    time, x = (np.concatenate([getattr(part, name) for part in kept]) for name in ("time", "x"))
+    settled = steady.last_quarter(time, x, header, samples)
     return {
         **{name: getattr(header, name) for name in ("engine", "failure", "commit", "created")},
         "complete": last.complete,
@@ -59,6 +65,12 @@ def describe(path: Path) -> dict[str, Any]:
             for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
         ],
         "last": dict(zip(VARIABLES, last.x[-1], strict=True)) if samples else {},
+        "steady": {
+            name: {"mean": mean, "drift": drift}
+            for name, mean, drift in zip(VARIABLES, *settled, strict=True)
+        }
+        if settled
+        else {},
     }
 
 
@@ -103,8 +115,24 @@ def table(about: dict[str, Any]) -> Table:
         "last state": "\n".join(
             f"{n} = {about['last'][n]:.9g} {pages.readable(u)}" for n, u in last
         ),
+        "steady value": in_words(about),
     }
     return pages.pairs(rows | ({"failure": about["failure"]} if about["failure"] else {}))
+
+
+def in_words(about: dict[str, Any]) -> str:
+    """What `describe` says of the steady omega_c, and whether it is one."""
+    flow = Flow.from_mapping(about["flow"])
+    if not about["steady"]:
+        return "none: too few samples"
+    mean, drift = about["steady"]["omega_c"].values()
+    if not flow.is_steady and np.ptp(flow(np.linspace(0.75, 1, 100) * about["duration"])):
+        return "none: the flow still changes in the last quarter"
+    off = float(steady.share(np.array(mean), np.array(drift), flow(about["duration"])))
+    said = f"omega_c = {mean:.9g} rad/s over the last quarter"
+    if off > steady.DRIFT:
+        return f"not settled: {said}, which may change by {100 * off:.2g} % yet"
+    return said
 
 
 def compared(a: Series, b: Series) -> dict[str, Any]:

@@ -89,7 +89,7 @@ def test_the_law_of_drag_is_kept(tmp_path):
     )
     about = collection.describe(tmp_path / "all.h5")
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
-    assert collection.table(about).row_count == 6
+    assert collection.table(about).row_count == 7
     with reading(tmp_path / "all.h5") as file:
         older = {name: column(dataset(file, name)) for name in file if name != "drag"}
     assert collection.described(older)["varied"] == ["nu_f"]

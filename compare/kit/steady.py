@@ -1,0 +1,76 @@
+"""What a run comes to, and how far it may still be from there: a motion that hasn't settled says so.
+
+A mean over the last quarter is free of swings, and its drift tells how far it has to go, as long as
+some of the way is seen. Of a ball that takes minutes seconds show almost none: no limit is taken to
+be nearer than the time in which the fluid takes the ball along lets it be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+import analytic
+from analytic.mechanics import drag
+from compare.kit.statistics import steady_mean
+from model import Header, Parameters
+from model.arrays import Array
+
+QUARTER = 0.25
+FEWEST = 6
+"""Samples of the last quarter of a run below which it has no mean."""
+DRIFT = 1e-3
+"""Drift, relative to the orbit's angular velocity, from which a run hasn't settled."""
+SETS_ASKED = 64
+"""Most sets of a sweep that are asked for their time constants: some .6 s."""
+
+
+def time_taken_along(p: Parameters, omega_c: float) -> float:
+    """Time constant in s with which the fluid takes along a ball near an orbit: (1 + 2 j)/c, with
+    the c of its lag and no less than Stokes'; inf without drag."""
+    c = max(p.c, drag.coefficient(abs(p.omega_0 - omega_c) * p.R, p))
+    return (1 + 2 * p.j) / c if c else math.inf
+
+
+def time_constant(p: Parameters, state: analytic.StationarySolution) -> float:
+    """Time constant in s with which a ball that starts anywhere comes to a stationary state."""
+    taken = time_taken_along(p, float(state.state.omega_c))
+    return max(taken, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)]))
+
+
+def enough(sets: Sequence[Parameters]) -> tuple[float, float]:
+    """How long a run of the slowest of these sets should last for its last quarter to be within
+    `DRIFT` of the limit, rounded up, and its time constant, both in s; of many sets some are asked."""
+    some = sets[:: math.ceil(len(sets) / SETS_ASKED)]
+    states = ((p, state) for p in some if p.c for state in analytic.stable_solutions(p))
+    slowest = max((time_constant(p, state) for p, state in states), default=0.0)
+    longest = -math.log(DRIFT) * slowest / (1 - QUARTER)
+    unit = 10.0 ** math.floor(math.log10(longest) - 1) if longest else 1.0
+    return unit * math.ceil(longest / unit), slowest
+
+
+def last_quarter(
+    time: Array, x: Array, header: Header, samples: int
+) -> tuple[list[float], list[float]] | None:
+    """Means of each state variable over the last quarter of a run, and how far they may be from
+    their limits; None for fewer than `FEWEST` samples.
+
+    time, x : the last samples, (n,) and (n, 8), at least half of all `samples`
+    """
+    length = int(QUARTER * samples)
+    if length < FEWEST:
+        return None
+    p = header.parameters.replace(omega_0=float(header.flow(time[-1])))
+    interval = float(time[-1] - time[-length]) / (length - 1)
+    slowest = time_taken_along(p, float(x[-length:, 2].mean())) / interval
+    means, drifts = steady_mean(x.T, length, slowest)
+    return means.tolist(), drifts.tolist()
+
+
+def share(omega_c: Array, drift: Array, omega_0: Array) -> Array:
+    """Drifts of the orbit's angular velocity relative to that, or to a hundredth of the fluid's
+    where it is less."""
+    scale = np.maximum(np.abs(omega_c), np.abs(omega_0) / 100)
+    return np.divide(drift, scale, out=np.zeros_like(scale), where=scale > 0)
