@@ -30,7 +30,7 @@ UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 """What a prediction raises where theory knows no such state or motion: that is a deviation, not a
 breakdown."""
 
-ENOUGH = 1 / 2
+ENOUGH = 2 / 3
 """Part of the numbers of each bearing that must be able to tell."""
 SILENT = "its protocol measured nothing, and does not say why"
 

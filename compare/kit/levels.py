@@ -69,7 +69,7 @@ class Effort:
     )
 
     thresholds_width: float = 5e-5  # relative width of the last brackets
-    thresholds_fold: float = 1.2e-3  # and of those about a fold
+    thresholds_fold: float = 6e-4  # and of those about a fold
     thresholds_loose: float = 10.0  # factor on the settling tolerance
     thresholds_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)
 

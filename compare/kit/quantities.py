@@ -89,7 +89,6 @@ _ALL = (
     Quantity("slowest_decay", "slowest −Re λ < 0", "s-1", 2e-2),
     Quantity("frequency", "Im λ", "rad s-1", 2e-2),
     Quantity("response", "answer to a push", "1", 5e-2),
-    Quantity("modes", "number of eigenvalues", "1", 0.0),
     Quantity("gamma", "γ", "rad s-2", 2e-2),
     Quantity("steepest", "β₁", "rad", 2e-2),
     Quantity("filippov_share", "δ", "1", 2e-2),

@@ -9,7 +9,7 @@ import pytest
 import analytic
 from analytic.flowmeter import pulsation, response
 from analytic.flowmeter.characteristic import End
-from model import Case, Parameters
+from model import Case, Flow, Parameters, State
 
 P = Parameters.named("reference")
 ROUGH = Parameters.named("high-wall-friction")
@@ -79,3 +79,45 @@ def test_forces_may_allow_more_on_a_rough_floor():
         ({"omega_0": 0.0}, 0.0),
     ):
         assert pulsation.slip_onset(P.replace(**changes), 1.0) == onset
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "times", "case"),
+    [
+        ("reference", 0.4, 4.0, Case.RS),
+        ("reference", 0.75, 4.0, Case.SS),
+        ("high-wall-friction", 0.6, 3.8, Case.SR),
+    ],
+)
+def test_a_mean_is_off_by_the_spin_about_the_tangent(name, share, times, case):
+    """From the balances of (20): c D = -omega_c' + j r/R (omega_y' - omega_x' - omega_c omega_z).
+
+    In a periodic motion the mean of D is -j r/(c R) that of omega_c omega_z: none where only the
+    floor or only the wall slips, negative where both do. Samples on either side of a change of case
+    are joined by a line: half a sample."""
+    p = Parameters.named(name)
+    t = analytic.thresholds(p)
+    p = p.replace(omega_0=share * (t.omega_01 if p.eta < p.j else t.omega_03))
+    f, samples = 0.5, 4000
+    flow = Flow.sine(p.omega_0, times * p.omega_0, f)
+    start = analytic.simulate(p, State(omega_c=p.omega_0), 20 / f, flow, sample_interval=1 / f)
+    run = analytic.simulate(p, start.x[-1], 1 / f, flow, sample_interval=1 / f / samples)
+    x = State.of(run.x)
+    o_z = x.slip_z + x.v_y / p.r
+    lag = p.c * np.trapezoid(x.omega_c - flow(run.time), run.time)
+    turned = p.j * p.r / p.R * np.trapezoid(x.omega_c * o_z, run.time)
+    spin = x.slip_y - x.slip_x - 2 * p.R / p.r * x.omega_c  # omega_y - omega_x by (4)
+    ends = p.j * p.r / p.R * (spin[-1] - spin[0]) - (x.omega_c[-1] - x.omega_c[0])
+    assert lag == pytest.approx(ends - turned, abs=5 * np.abs(x.omega_c).max() / samples)
+    assert case in run.cases
+    error = pulsation.mean_error(p, times * p.omega_0, f)
+    if case is Case.SS:
+        assert error == pytest.approx(-turned * f / p.c, rel=1e-3)
+        assert error < -0.01 * p.omega_0
+    else:
+        assert {each.A.name for each in run.cases} | {each.B.name for each in run.cases} == {
+            "R",
+            "S",
+        }
+        assert Case.SS not in run.cases
+        assert abs(error) < 1e-6 * p.omega_0

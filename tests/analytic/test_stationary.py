@@ -143,3 +143,13 @@ def test_vanishing_parameters(change, expected, those):
             or abs(s.state.slip_x + p.R / p.r * s.state.omega_c) <= 1e-12
             or s.case is Case.NS
         )
+
+
+def test_dimensions_of_table_4():
+    """As many eigenvalues as Table 4 has variables; in NS y is cyclic, (48), and adds none."""
+    flows = {Case.RR: 9.0, Case.RS: 0.0, Case.SR: 30.0, Case.SS: 20.0, Case.NR: 30.0, Case.NS: 9.0}
+    printed = {Case.RR: 1, Case.RS: 2, Case.SR: 2, Case.SS: 4, Case.NR: 4, Case.NS: 6}
+    for case, flow in flows.items():
+        values = solution(P.replace(omega_0=flow), case, formal=True).eigenvalues
+        assert len(values) == printed[case] - (case is Case.NS), case
+        assert len(TRAITS[case].active) == printed[case]

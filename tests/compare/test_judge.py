@@ -116,8 +116,8 @@ def test_a_set_of_which_a_protocol_says_nothing_leaves_its_claims_undecided():
 
 def test_most_numbers_must_be_fine_enough_to_tell():
     sure, coarse = measured(P.omega_0, FINE), measured(P.omega_0, 0.01 * P.omega_0)
-    for numbers, expected in ([sure, sure], Outcome.CONFIRMED), ([sure], Outcome.INCONCLUSIVE):
-        (verdict,) = judge([claim()], sum([*numbers, coarse, coarse], Records()))
+    for count, expected in (4, Outcome.CONFIRMED), (3, Outcome.INCONCLUSIVE):
+        (verdict,) = judge([claim()], sum([*[sure] * count, coarse, coarse], Records()))
         assert verdict.outcome is expected
         assert verdict.resolving_power["omega_c"] < 1e-6
 
@@ -198,6 +198,17 @@ def test_judging_a_claim_takes_no_longer_than_it_may(monkeypatch):
     told = validation._in_time(endless, {"mujoco": {1: measured(P.omega_0, FINE)}})
     assert (told.outcome, told.error) == (Outcome.ERROR, "it took longer than 0.1 s")
     time.sleep(0.3)  # the clock has stopped
+
+
+def test_every_claim_predicts_a_number_that_could_refute_it():
+    """No case, no count, and no bound on one side only."""
+    asked = (each for each in CLAIMS if each.expected is Outcome.CONFIRMED and not each.algebra)
+    assert [each.id for each in asked if not each.numbers] == []
+    sides = (Relation.AT_MOST, Relation.AT_LEAST)
+    low, high = (Bearing("settled", "omega_c", lambda m: 1.0, relation=each) for each in sides)
+    counts = Bearing("plane", "cases", lambda m: 1.0)
+    for own, numbers in ((low, high), {0, 1}), ((low, counts), set()), ((high,), set()):
+        assert made.claim("it", *own).numbers == numbers
 
 
 NAMES = {protocol.name for protocol in PROTOCOLS}

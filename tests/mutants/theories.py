@@ -192,6 +192,12 @@ def _one_cone(right: Function, p: Parameters) -> float:
     )
 
 
+def _reads_low(right: Function, p: Parameters, *pulsation: float) -> float:
+    """A mean reading that is low wherever the ball slips."""
+    error = float(right(p, *pulsation))
+    return error if abs(error) > 1e-3 * p.omega_0 else -0.01 * p.omega_0
+
+
 _backwards = functools.partial(where, lambda p: p.omega_0 < 0)
 _FAULTS: dict[str, dict[str, Fault]] = {
     # Forces and equations of motion, (20)-(29)
@@ -577,7 +583,11 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "a fast pulsation never fills both cones": _one_cone,
     },
     "flowmeter.pulsation.mean_error": {
-        "mean reading of a pulsation with 2 % more floor friction": other(mu=1.02)
+        "mean reading of a pulsation with 2 % more floor friction": other(mu=1.02),
+        "a pulsation that makes the wall slip reads low by 1 %": _reads_low,
+        "strong pulsations read 5 % less low": lambda right, p, amplitude, *rest: (
+            (0.95 if amplitude > 3 * p.omega_0 else 1.0) * right(p, amplitude, *rest)
+        ),
     },
 }
 """By function of `analytic`, and what is wrong with it."""

@@ -18,8 +18,10 @@ from compare.judge import simulated, theory
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, state
 from compare.kit.statistics import hops
+from compare.states import solution_of
 from compare.subjects.attractors.measure import TOP
 
+_REFINED = "analytic.orbits.periodic.refine"
 _PERIODIC = "Section 5.3, last paragraph"
 
 
@@ -28,14 +30,13 @@ def _hops(m: Measurement) -> float:
     return hops(simulated(m.parameters, state(m), m.at("duration"), 2000))
 
 
-def _hops_on(m: Measurement) -> float:
-    """Whether the hop of a ball that rebounds is stable, by continuation from the hop without a
-    rebound."""
+def _rebounding(m: Measurement) -> Orbit:
+    """The hop of a ball that rebounds, by continuation from the hop without a rebound."""
     p, end = m.parameters, m.at("restitution")
     orbit = theory(orbits.refine, p, TOP, 0.22)  # s, about its period
     for restitution in [*np.arange(0.2, end, 0.1).tolist(), end] if end else []:
         orbit = theory(orbits.refine, p, tuple(orbit.loop.x.tolist()), orbit.period, restitution)
-    return float(orbit.stable)
+    return orbit
 
 
 def _eta_at_torus(orbit: Orbit) -> float:
@@ -57,14 +58,18 @@ _ORBIT: dict[str, Callable[[Orbit], float]] = {
 }
 
 
+def _of_orbit(quantity: str, orbit: Orbit) -> float:
+    """A quantity of an orbit, by its name in the measurements."""
+    return _ORBIT[quantity.partition("_")[2]](orbit)
+
+
 def _orbit_bearings(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
     """Bearings on quantities of the periodic orbit that theory has near the measured one."""
 
     def predict(m: Measurement) -> float:
-        _, _, of = m.quantity.partition("_")
-        return _ORBIT[of](theory(orbits.refine, m.parameters, state(m), m.at("period")))
+        return _of_orbit(m.quantity, theory(orbits.refine, m.parameters, state(m), m.at("period")))
 
-    return bearings(protocol, quantities, predict, by="analytic.orbits.periodic.refine")
+    return bearings(protocol, quantities, predict, by=_REFINED)
 
 
 def _after_rest(m: Measurement) -> float:
@@ -121,8 +126,14 @@ CLAIMS = (
     claim(
         "calm",
         _PERIODIC,
-        "In strong drag, κ > 2, no ball was found that hops on.",
+        "In strong drag, κ > 2, no ball was found that hops on: each settles to a stationary motion.",
         Bearing("calm", "hops", _hops, by="analytic.simulate"),
+        Bearing(
+            "calm",
+            "end_omega_c",
+            lambda m: solution_of(m).state.omega_c,
+            by="analytic.stable_solutions",
+        ),
         level=Level.DEFAULT,
     ),
     claim(
@@ -145,7 +156,13 @@ CLAIMS = (
         "of Floquet multipliers leaves the unit circle; beyond, the hops end. By continuation and "
         "time stepping: "
         "MuJoCo's contacts have no such coefficient.",
-        Bearing("rebounding", "hops", _hops_on, by="analytic.orbits.periodic.refine"),
+        Bearing("rebounding", "hops", lambda m: float(_rebounding(m).stable), by=_REFINED),
+        *bearings(
+            "rebounding",
+            ("orbit_period", "orbit_omega_c"),
+            lambda m: _of_orbit(m.quantity, _rebounding(m)),
+            by=_REFINED,
+        ),
         level=Level.DEFAULT,
         reason="Impacts are not in the paper: Newton's law of restitution and Coulomb's, at floor "
         "and wall at once.",

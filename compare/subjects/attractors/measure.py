@@ -27,9 +27,10 @@ import numpy as np
 from compare.kit.engines import MOREAU
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import Protocol
+from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import settled_readings
-from compare.kit.statistics import Measured, hops, peaks, top
+from compare.kit.statistics import Measured, hops, peaks, settled_case, tail, top
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, carry_out, constrained, with_step_error
@@ -270,14 +271,16 @@ results had been seen: at 0.56 disturbances grow so slowly that this doesn't sho
 def rebounding(
     lab: Lab, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
-    """Whether balls that rebound hop on, followed from one coefficient of restitution to the next.
+    """Whether balls that rebound hop on, and their hops, followed from one coefficient of
+    restitution to the next.
 
     By time stepping: MuJoCo's contacts have no such coefficient. At some, and at the first at which
-    a ball no longer hops, it is run without further change."""
+    a ball no longer hops, it is run without further change, with a half and a quarter of the
+    step."""
     p, x = Parameters.named(SET), TOP.stacked()
 
-    def task(x: Array, lasts: float, restitution: float) -> Task:
-        step = coarse_step(p) / 40
+    def task(x: Array, lasts: float, restitution: float, refine: int = 40) -> Task:
+        step = coarse_step(p) / refine
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
         return replace(
             lab.task(p, x, lasts, step, samples=round(lasts / Hopping.sample)), settings=settings
@@ -294,11 +297,16 @@ def rebounding(
             yield Missing("rebounding", SET, "the ball does not hop")
             return
         if not hops(run) or e in REBOUNDING:
-            (run,) = lab.campaign.run([alone := task(x, REBOUNDS_ALONE, e)])
+            alone = [task(x, REBOUNDS_ALONE, e, refine) for refine in (80, 160)]
+            runs = lab.campaign.run(alone)
             at = last.conditions(p) | {"restitution": e, "duration": REBOUNDS_ALONE}
-            yield measurement(lab, "rebounding", SET, p, "hops", hops(run), [alone], **at)
-            if not hops(run):
+            yield measurement(lab, "rebounding", SET, p, "hops", hops(runs[0]), alone[:1], **at)
+            if not hops(runs[0]):
                 return
+            coarse, fine = (tops(run, REBOUNDS_ALONE / 2, REBOUNDS_ALONE).values for run in runs)
+            for name in ("orbit_period", "orbit_omega_c"):
+                value = with_step_error(coarse[name].value, fine[name])
+                yield measurement(lab, "rebounding", SET, p, name, value, alone, **at)
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
@@ -358,7 +366,8 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
 def calm(
     lab: Lab, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
-    """Whether balls still hop after 60/c of the weakest drag: three of each of 16 sets."""
+    """Whether balls still hop after 60/c of the weakest drag, or how they go round: three of each of
+    16 sets."""
     reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
     low, high = np.array([0.05, 0.05, 0.2, 2.0, 0.5]), np.array([1.0, 1.0, 0.6, 8.0, 6.0])
     for mu, eta, j, kappa, Omega_0 in (low + sobol(len(low), 16, 5) * (high - low)).tolist():
@@ -369,6 +378,15 @@ def calm(
             x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
             tasks.append(lab.task(p, x, lasts, coarse_step(p) / 4, samples=2000))
     yield from _hops_at_end(lab, "calm", "strong drag", tasks)
+    for task, run in zip(tasks, lab.each(tasks), strict=True):
+        if not isinstance(run, str) and not hops(run):
+            last = run.omega_c[tail(run)]
+            # By chance samples may be the same: no state is known better than a settled one.
+            least = QUANTITIES["omega_c"].resolves * task.parameters.omega_0
+            end = Measured(float(last[-1]), max(float(np.ptp(last)), least))
+            at = {"case": settled_case(run).name}
+            p = task.parameters
+            yield measurement(lab, "calm", "strong drag", p, "end_omega_c", end, [task], **at)
 
 
 def _hops_at_end(

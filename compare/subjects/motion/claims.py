@@ -15,28 +15,19 @@ from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
 from compare.claim import Bearing, Text, bearings, claim, given
 from compare.judge import RTOL, simulated, theory
-from compare.kit.record import Condition, Measurement, state
+from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
 from compare.subjects.motion.measure.laws import FLUIDS
 from compare.subjects.motion.measure.motions import LANDED
 from compare.subjects.motion.measure.runs import late_ramp
-from model import Case
+from model import Case, Trajectory
 from model.cases import TRAITS
 from model.drag import STOKES
-from model.kinematics import VARIABLES
+from model.kinematics import TURNING, VARIABLES
 
 _OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
 
 
-_DIMENSIONS: dict[Condition, float] = {
-    "RR": 1.0,
-    "RS": 2.0,
-    "SR": 2.0,
-    "SS": 4.0,
-    "NR": 4.0,
-    "NS": 6.0,
-}
-"""Of the domain of each case, as Table 4 prints them."""
 _RUN = "analytic.simulate"
 _TORQUE = "analytic.flowmeter.real_fluid.rolling"
 _HOLDS = "analytic.slip_stability.stability"
@@ -96,9 +87,9 @@ def _braked_rolls(m: Measurement) -> float:
     return float(Case.RR)
 
 
-def _last_case(m: Measurement, leave_rolling: str = "slip-stability") -> float:
-    """The case in which theory's motion ends."""
-    run = theory(
+def _motion(m: Measurement, leave_rolling: str = "slip-stability") -> Trajectory:
+    """Theory's motion for the time of the measured one."""
+    return theory(
         analytic.simulate,
         m.parameters,
         state(m),
@@ -106,17 +97,24 @@ def _last_case(m: Measurement, leave_rolling: str = "slip-stability") -> float:
         leave_rolling=leave_rolling,
         rtol=RTOL,
     )
-    return float(run.case[-1])
 
 
-def _last_case_either(m: Measurement) -> float:
-    """The case in which theory's motion ends, or the measured one where both rolling and slipping
-    agree with theory.
+def _motion_either(m: Measurement) -> Trajectory:
+    """Theory's motion, or the one that rolls as long as forces admit it if that ends in the
+    measured case.
 
-    There the internal force between floor and wall decides, which the state doesn't contain
-    (docs/theory.md, 7)."""
-    leaves = _last_case(m)
-    return leaves if leaves == m.value or _last_case(m, "infeasible") != m.value else m.value
+    Where both agree with theory the internal force between floor and wall decides, which the state
+    doesn't contain (docs/theory.md, 7)."""
+    case, leaves = Case[str(m.conditions["case"])], _motion(m)
+    if leaves.case[-1] == case:
+        return leaves
+    stays = _motion(m, "infeasible")
+    return stays if stays.case[-1] == case else leaves
+
+
+def _end_in_case(m: Measurement) -> float:
+    """A variable of theory's motion at its end, by the name of the measured one."""
+    return float(getattr(_motion_either(m), m.quantity.removeprefix("end_"))[-1])
 
 
 LAW_CLAIMS = (
@@ -140,14 +138,6 @@ LAW_CLAIMS = (
         ),
     ),
     claim(
-        "table-4",
-        "Table 4, (22)",
-        "A ball that is pushed a little out of a stationary motion moves in as many independent "
-        "ways as the domain of "
-        "its case has dimensions.",
-        Bearing("rates", "modes", lambda m: _DIMENSIONS[m.conditions["case"]], by="Table 4"),
-    ),
-    claim(
         "eq-10",
         "(9), (10)",
         "A ball sinks freely at the speed at which Stokes' drag balances its weight less buoyancy.",
@@ -161,7 +151,8 @@ LAW_CLAIMS = (
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes "
         "through them as the "
         "equations of motion say.",
-        Bearing("motions", "case", _last_case_either, by=_RUN),
+        Bearing("motions", "case", lambda m: float(_motion_either(m).case[-1]), by=_RUN),
+        *bearings("motions", [f"end_{name}" for name in VARIABLES[TURNING]], _end_in_case, by=_RUN),
     ),
     claim(
         "flight",
@@ -210,6 +201,7 @@ LAW_CLAIMS = (
             )
             for holds, by in ((_is_stable, _HOLDS), (_exists, "analytic.stationary_solutions"))
         ),
+        Bearing("runs", "end_omega_c", _end_of_motion, when=given(start="smooth wall"), by=_RUN),
     ),
     claim(
         "definition-1-2",
@@ -221,10 +213,11 @@ LAW_CLAIMS = (
         Bearing(
             "runs",
             "case",
-            lambda m: Case.RR if _is_stable(Case.RR, m) else _last_case(m),
+            lambda m: Case.RR if _is_stable(Case.RR, m) else float(_motion(m).case[-1]),
             when=given(start="rough floor"),
             by=_HOLDS,
         ),
+        Bearing("runs", "end_omega_c", _end_of_motion, when=given(start="rough floor"), by=_RUN),
     ),
     claim(
         "fluid-torque",

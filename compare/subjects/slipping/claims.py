@@ -311,7 +311,8 @@ CLAIMS = (
         claim(
             f"lift-{inner.name}-{outer.name}",
             "Fig. 6, dotted",
-            f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
+            f"Out of {inner.name} the ball never lifts off the floor: whatever its orbit, the floor "
+            "carries its weight."
             if inner is Case.RS
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in "
             f"{outer.name}, would "
@@ -338,6 +339,18 @@ CLAIMS = (
                     ),
                 )
                 if quantity == "lifts" or inner is not Case.RS
+            ),
+            *(
+                Bearing(
+                    "lift",
+                    "moving_force_Ay",
+                    lambda m: float(
+                        analytic.contact_forces(_arrow(m)[0], _state(m), m.parameters)[0][1]
+                    ),
+                    when=given(inner=inner.name),
+                    by="analytic.contact_forces",
+                )
+                for _ in range(inner is not Case.RR)
             ),
         )
         for inner, outer in slip_stability.LIFT_ARROWS

@@ -102,7 +102,6 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
         Bearing(
             "rates", "frequency", lambda m: _mode(m).imag, when=when, size=_mode_size, by=_JACOBIAN
         ),
-        Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=_JACOBIAN),
         Bearing(
             "rates",
             "response",

@@ -66,6 +66,9 @@ PUSH = {Case.RS: 0.3, Case.SR: 0.1}
 """Size of a push, in the `units`, where it is extrapolated to zero from this and half of it."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; more at the others."""
+BENT = (
+    "only drag by Stokes' law is in proportion to the lag that a push makes which this case needs"
+)
 Exponents = npt.NDArray[np.complex128]
 
 
@@ -79,7 +82,9 @@ def measure(
         for each in chosen_states(records, name, p, lab.effort.rates_more)
     ]
     yield from (each for each in found if isinstance(each, Missing))
-    states = [each for each in found if isinstance(each, Pushed)]
+    pushed = [each for each in found if isinstance(each, Pushed)]
+    yield from (each.missing(BENT, rows=each.numbers) for each in pushed if each.bent)
+    states = [each for each in pushed if not each.bent]
     tasks = [state.tasks(lab) for state in states]
     for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
         if isinstance(runs, str):
@@ -99,7 +104,6 @@ def measure(
         at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
         row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
         values, uncertainty = spectrum(state, answers, step)
-        yield row(quantity="modes", value=len(values))
         yield from _modes(state, values, uncertainty, step, row)
         yield from _responses(state, answers, float(uncertainty.max()), row)
 
@@ -148,6 +152,16 @@ class Pushed:
         return coarse_step(self.start.p) / coarse, coarse_step(self.start.p) / fine
 
     @property
+    def bent(self) -> bool:
+        """Whether the push that the case asks for is too large for the drag: see `BENT`."""
+        return self.case in PUSH and self.start.p.drag != STOKES
+
+    @property
+    def numbers(self) -> int:
+        """Decay rates, frequencies, and responses."""
+        return 2 * len(self.active) + len(self.active) ** 2
+
+    @property
     def fast(self) -> bool:
         """Whether contacts slip fast enough for a push.
 
@@ -179,11 +193,12 @@ class Pushed:
                     tasks.append(lab.task(p, x, lasts * step, h, samples=samples))
         return tasks
 
-    def missing(self, why: str, modes: int = 0) -> Missing:
+    def missing(self, why: str, modes: int = 0, rows: int = 0) -> Missing:
         """A record of modes, all by default, whose decay rates and frequencies were not measured,
-        and why."""
+        and why; of so many `rows` if they are more."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
-        return Missing(PROTOCOL, self.start.set, f"{at}: {why}", 2 * (modes or len(self.active)))
+        count = rows or 2 * (modes or len(self.active))
+        return Missing(PROTOCOL, self.start.set, f"{at}: {why}", count)
 
 
 def chosen_states(
@@ -298,10 +313,7 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
     correction = (plain - matched(exponents_of(coarse, coarse), plain)) / 3
     half = np.abs(values - matched(exponents_of(large, small, 0.5), values))
     bent, size = np.abs(values - plain), max(state.sizes)
-    if state.start.p.drag == STOKES or state.case not in PUSH:
-        bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size**order, 1.0)
-    else:  # the drag of a slight lag goes with its size to a power below one: half the push changes that little
-        bent *= 2**order
+    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size**order, 1.0)
     stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
     slip = np.abs(state.start.x0 / state_units(state.start.p))[SLIP_XYZ].max()
     solved = SOLVED * max(1.0, slip) / (size * interval)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import analytic
@@ -24,7 +25,7 @@ from compare.states import (
     slips_first,
     solution_of,
 )
-from model import Case
+from model import Case, State
 from model.drag import SCHILLER_NAUMANN
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
@@ -152,6 +153,28 @@ def _omega_c_beyond_fold(m: Measurement) -> float:
     return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
 
 
+def _decay_leaning(m: Measurement) -> float:
+    """The slowest of what decays in a ball that leans on the floor, s-1; LookupError where the
+    region lacks SR."""
+    if Exists.SR not in _region(m):
+        raise LookupError("the region lacks SR")
+    decays = -theory(analytic.leaning_modes, m.parameters)[0].real
+    return float(decays[decays > 0].min())
+
+
+def _on_surface(m: Measurement) -> float:
+    """A threshold by the surface of Fig. 7 or 8 at the friction of floor and wall, rad s-1."""
+    p = m.parameters
+    surfaces = bifurcation.threshold_curves(p, p.mu, p.eta)
+    return float(surfaces[m.quantity]) * math.sqrt(p.g / p.R)
+
+
+def _slip_on_branch(m: Measurement) -> float:
+    """A component of slip of SS in closed form at the flow, before the fold, rad s-1."""
+    x, _ = slipping_branch.states(slipping_branch.points_at(m.parameters)[0], m.parameters)
+    return float(getattr(State.of(x), m.quantity))
+
+
 def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
     """The drag c in s-1 at which the fold is born at the eta of the set; that eta is proportional
     to c^2.
@@ -168,6 +191,13 @@ def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
 _LEANS = all_of(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
+
+
+def _crossed(m: Measurement) -> bool:
+    """Whether a threshold is that at which the ball settles in another case."""
+    return m.conditions["by"] != "floor force of settled slipping → 0"
+
+
 _DOUBLE = "analytic.bifurcation.diagram.double_points"
 
 CLAIMS = (
@@ -229,6 +259,13 @@ CLAIMS = (
         *(
             Bearing("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
             for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
+        ),
+        *bearings(
+            "settled",
+            ("slip_z", "slip_x"),
+            _slip_on_branch,
+            when=_SLIPS,
+            by="slipping_branch.states",
         ),
     ),
     claim(
@@ -314,8 +351,18 @@ DIAGRAMS = (
                 when=given(figure=figure),
                 by="analytic.stable_solutions",
             ),
+            *bearings(
+                "thresholds",
+                [f"omega_0{k}" for k in (1, 2, 3, 4)],
+                _on_surface,
+                when=all_of(_crossed, on_plane),
+                by="analytic.bifurcation.diagram.threshold_curves",
+            ),
         )
-        for figure, axis in (("fig-7", "η"), ("fig-8", "μ = η"))
+        for figure, axis, on_plane in (
+            ("fig-7", "η", lambda m: True),
+            ("fig-8", "μ = η", lambda m: m.parameters.mu == m.parameters.eta),
+        )
     ),
     claim(
         "regions",
@@ -326,13 +373,7 @@ DIAGRAMS = (
         "floor.",
         Bearing("plane", "cases", _cases_in_region, by="analytic.bifurcation.diagram.case_map"),
         Bearing("edge", "edge_omega_c", _omega_c_beyond_fold, by="case_map, analytic.solution"),
-        Bearing(
-            "rates",
-            "modes",
-            lambda m: 2.0 * (Exists.SR in _region(m)),
-            when=given(case="SR"),
-            by="case_map",
-        ),
+        Bearing("rates", "slowest_decay", _decay_leaning, when=given(case="SR"), by="case_map"),
     ),
     claim(
         "double-points",

@@ -6,11 +6,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
 from scipy.optimize import brentq
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import rolling_forces
+from analytic.stationary import slipping_branch
 from compare.claim import Bearing, When, bearings, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
@@ -39,6 +41,16 @@ def _unstable_quantity(m: Measurement) -> float:
     """A quantity of the unstable SS, which is on the border between two basins."""
     unstable = theory(analytic.solution, m.parameters, Case.SS, stable=False)
     return quantity_of(m.quantity.removeprefix("edge_"), unstable, m.parameters)
+
+
+def _greatest_flow(m: Measurement) -> float:
+    """The greatest flow along the whole branch of SS, rad s-1; LookupError if there is not one
+    maximum alone."""
+    _, flows = slipping_branch.states(np.linspace(-8.0, 8.0, 4001), m.parameters)
+    tops = np.flatnonzero((flows[1:-1] > flows[:-2]) & (flows[1:-1] > flows[2:])) + 1
+    if len(tops) != 1:
+        raise LookupError(f"the flow has {len(tops)} maxima along the branch")
+    return float(flows[tops[0]])
 
 
 _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
@@ -171,6 +183,7 @@ CLAIMS = (
             lambda m: bifurcation.number_of_folds(m.parameters),
             by="diagram.number_of_folds",
         ),
+        Bearing("thresholds", "omega_04", _greatest_flow, by="slipping_branch.states"),
     ),
 )
 SECTIONS = {"Bifurcations": CLAIMS}

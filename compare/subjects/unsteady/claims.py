@@ -56,6 +56,20 @@ def _lowest_flow(m: Measurement) -> float:
     return p.omega_0 - pulsation.slow_onset(p)
 
 
+_BOTH, _ONE = "at both points", "at one point"
+_MEAN = f"{_BY}.pulsation.mean_error"
+
+
+def _mean_error(m: Measurement) -> float:
+    """The mean of omega_c in a pulsation less that of the flow, rad s-1."""
+    return theory(pulsation.mean_error, m.parameters, m.at("amplitude"), m.at("f"))
+
+
+def _flow(m: Measurement) -> float:
+    """The mean flow, rad s-1, by which an error is divided that is none."""
+    return m.parameters.omega_0
+
+
 CLAIMS = (
     claim(
         "pulsation-lag",
@@ -140,13 +154,26 @@ CLAIMS = (
     ),
     claim(
         "pulsation-mean",
-        "(23), (26), Definitions 1-3",
-        "A pulsation that makes the ball slip makes its mean reading low.",
+        "(20), (23), (24), (26), Definitions 1-3",
+        "A pulsation that makes the ball slip at both points makes its mean reading low: on average "
+        "its spin about the tangent takes drag. One that makes it slip at the wall alone does not "
+        "change the mean, under Stokes' law.",
+        Bearing("pulsation", "mean_error", _mean_error, when=given(slips=_BOTH), by=_MEAN),
         Bearing(
             "pulsation",
             "mean_error",
-            lambda m: theory(pulsation.mean_error, m.parameters, m.at("amplitude"), m.at("f")),
-            by=f"{_BY}.pulsation.mean_error",
+            _mean_error,
+            when=given(slips=_ONE),
+            size=_flow,
+            by=_MEAN,
+        ),
+        Bearing(
+            "pulsation",
+            "mean_error",
+            lambda m: 0.0,
+            when=lambda m: m.conditions["slips"] == _ONE and m.parameters.drag == STOKES,
+            size=_flow,
+            by="the balance of spin, docs/theory.md, 11",
         ),
     ),
     claim(

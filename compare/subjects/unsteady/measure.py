@@ -5,7 +5,8 @@
   how the ball follows; every other run starts from there, so that it need not settle. With Stokes'
   law the response is linear; with another one the amplitude is raised step by step until the ball
   slips, and each time settled anew. The ball slips where the engine shows slip at both contacts.
-  Frequencies are powers of two.
+  Frequencies are powers of two. About other flows it is driven strongly, to slip at the wall alone
+  or at both points.
 * The flow changes once by a small jump. Half the difference of two runs, after a jump up and one
   down, is free of what goes with the square of the jump.
 * A ramp starts from settled slipping well below the end of it, and ends well above; the ball has
@@ -21,12 +22,21 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.record import (
+    Condition,
+    Measurement,
+    Missing,
+    Records,
+    if_found,
+    measurement,
+    state_of,
+)
 from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Measured, peaks, top
 from compare.kit.tasks import Task
@@ -67,6 +77,11 @@ class Driving:
         5  # samples for which slip must last to count: friction may be full for a moment before
     )
     phases: int = 8  # of a period at which the motion is started anew from its state
+    # Flows, in units of that at which rolling ends, about which the ball is driven by an amplitude
+    # in units of the flow: it slips at the wall alone about the slow ones, at both points about the
+    # others. In steps of a period so long that the ball forgets its start.
+    strong: tuple[tuple[float, float], ...] = ((0.25, 4.0), (0.4, 4.0), (0.6, 5.5), (0.75, 4.0))
+    octave: int = 3
 
 
 def pulsation(
@@ -83,7 +98,7 @@ def pulsation(
             )
             continue
         q = p.replace(omega_0=Changes.rolls_at * end)
-        room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
+        room, lowest = end - q.omega_0, _lowest(p)
         octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach * room
         small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
     followed = _as_followed(lab, small)
@@ -118,7 +133,25 @@ def pulsation(
                 each.set,
                 f"slip in {at} begins at no definite amplitude: no mean reading there",
             )
-    yield from mean_errors(lab, slipping)
+    strong = [each for name, p in sets.items() for each in _strong(name, p, records)]
+    yield from mean_errors(lab, slipping + strong)
+
+
+def _strong(name: str, p: Parameters, records: Records) -> Iterator[tuple[Pulsation, float]]:
+    """Pulsations by several times the mean flow of a set, under Stokes' law, and their
+    amplitudes."""
+    end = _threshold(records, name, "omega_01")
+    if end is not None and p.drag == STOKES:
+        frequency = _lowest(p) * 2.0**Driving.octave
+        for share, times in Driving.strong:
+            q = p.replace(omega_0=share * end)
+            amplitude = times * q.omega_0
+            yield Pulsation(name, q, frequency, amplitude, amplitude), amplitude
+
+
+def _lowest(p: Parameters) -> float:
+    """The lowest frequency of pulsations, Hz: a power of two near c/(4 pi)."""
+    return 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
 
 
 class Timing(NamedTuple):
@@ -170,7 +203,7 @@ class Pulsation:
         )
 
     def row(
-        self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float
+        self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: Condition
     ) -> Measurement:
         """A measurement in this pulsation."""
         return measurement(
@@ -373,8 +406,19 @@ def mean_errors(
         # half of that part.
         within = abs(value) / round(task.steps / Driving.periods) if task.settings.timestep else 0.0
         error = Measured(value, drift + within)
-        row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
+        slips = _slips(halved.case[-samples:])
+        row = each.row(lab, "mean_error", error, [task], amplitude=amplitude, slips=slips)
         yield if_found(row, f"{at} is none")
+
+
+def _slips(cases: npt.NDArray[np.int8]) -> str:
+    """Where the ball slips in a period, by its samples of which one may stray."""
+    seen = {Case(case) for case in np.unique(cases) if np.sum(cases == case) > 1}
+    if any(Contact.N in (case.A, case.B) for case in seen):
+        return "off the floor or the wall"
+    if Case.SS in seen:
+        return "at both points"
+    return "at one point" if seen - {Case.RR} else "nowhere"
 
 
 def _threshold(records: Records, set: str, threshold: str) -> float | None:

@@ -43,7 +43,7 @@ from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import STOKES
-from model.kinematics import VARIABLES, slip_velocities, state_units
+from model.kinematics import TURNING, VARIABLES, slip_velocities, state_units
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,8 @@ class Pieces:
 def motions(
     lab: Lab, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
-    """The case at the end of every piece, with the state at its beginning."""
+    """The case at the end of every piece, and how the ball turns there, with the state at its
+    beginning."""
     starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
     tasks = []
     for start in starts:
@@ -251,27 +252,48 @@ def motions(
         steps = round(6.0 * time_unit(start.p) / step)
         tasks.append(lab.task(start.p, start.x0, steps * step, step, samples=steps))
     seen: dict[str, set[Case]] = {name: set() for name in sets}
-    count = lab.effort.motions_pieces
+    count, again = lab.effort.motions_pieces, list[Trial]()
     for start, task, run in zip(starts, tasks, lab.each(tasks), strict=True):
         name, p = start.set, start.p
         if isinstance(run, str):
-            yield Missing("motions", name, f"a motion {run}", count)
+            yield Missing("motions", name, f"a motion {run}", count * (1 + len(VARIABLES[TURNING])))
             continue
         chosen = pieces(run, count)
         if lacking := count - len(chosen):
             why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips by a trace"
-            yield Missing("motions", name, why, lacking)
+            yield Missing("motions", name, why, lacking * (1 + len(VARIABLES[TURNING])))
         for first, last in ((first, first + Pieces.length) for first in chosen):
             case = Case(int(run.case[last]))
             seen[name].add(case)
-            at = state_of(constrained(Case(int(run.case[first])), run.x[first], p))
+            x = constrained(Case(int(run.case[first])), run.x[first], p)
             time = float(run.time[last] - run.time[first])
-            yield measurement(
-                lab, "motions", name, p, "case", case, [task], case=case.name, time=time, **at
-            )
+            at: dict[str, Condition] = {"case": case.name, "time": time, **state_of(x)}
+            yield measurement(lab, "motions", name, p, "case", case, [task], **at)
+            refine, rows = (REFINED, 2 * REFINED), len(VARIABLES[TURNING])
+            piece = Trial(name, p, case.name, x, time, refine, conditions=at, rows=rows)
+            again.append(piece)
+    for result in carry_out(lab, "motions", again):
+        yield from [result] if isinstance(result, Missing) else _turns_at_end(lab, result)
     for name, cases in seen.items():
         if unseen := [case.name for case in Case if case not in cases]:
             yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
+
+
+def _turns_at_end(lab: Lab, piece: TrialResult) -> Iterator[Measurement | Missing]:
+    """How the ball turns at the end of a piece that is run anew with both steps."""
+    trial, ends = piece.trial, (piece.coarse.x[-1], piece.fine.x[-1])
+    if {trial.name} != {Case(int(run.case[-1])).name for run in (piece.coarse, piece.fine)}:
+        why = f"a piece that ended in {trial.name} does not with other steps or forces at first"
+        yield Missing("motions", trial.set, why, len(VARIABLES[TURNING]))
+        return
+    # The change of one variable may vanish by chance, and so may all: the largest, in natural
+    # units, is used, or what forces do that lag behind.
+    units = state_units(trial.p)
+    change = max(float(np.abs((ends[1] - ends[0]) / units).max()), lag_error(trial.p))
+    for name, value, unit in zip(
+        VARIABLES[TURNING], ends[1][TURNING].tolist(), units[TURNING].tolist(), strict=True
+    ):
+        yield piece.row(lab, f"end_{name}", Measured(value, change * unit))
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:

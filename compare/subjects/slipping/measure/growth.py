@@ -33,7 +33,7 @@ PUSHES = {
     (Case.RR, Case.SR): 1,
     (Case.RR, Case.SS): 2,
     (Case.RS, Case.SS): 2,
-    (Case.SR, Case.SS): 2,
+    (Case.SR, Case.SS): 3,
     (Case.NR, Case.NS): 3,
 }
 """Arrows of Fig. 6 along which a contact begins to slip, and directions out of random states at the

@@ -234,7 +234,7 @@ def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
         (Case.RS, (0, 1, 0), "held", (slow, 3 * slow)),
         (Case.RS, (0, 1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing)),
         (Case.RS, (0, -1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing)),
-        (Case.SR, (-1, 0, 0), "held", (fast, 1.5 * fast)),
+        (Case.SR, (-1, 0, 0), "held", (fast, 1.75 * fast)),
         (Case.SR, (1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning)),
         (Case.SR, (-1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning)),
         (Case.SS, (0, 0, 1), "stationary", (0.4 * hanging, 0.8 * hanging)),
@@ -313,7 +313,12 @@ def lift(
             )
             yield Missing("lift", arrow.set, f"out of {arrow.inner.name}: {why}")
         elif leaves is None:
-            yield arrow.row("lifts", float(runs[-1].omega_c[0]), 0.0, tasks)
+            fastest = float(runs[-1].omega_c[0])
+            yield arrow.row("lifts", fastest, 0.0, tasks)
+            if arrow.inner is not Case.RR:  # whose floor and wall share the load in any way
+                load = None if isinstance(near, str) else _load(near)
+                row = arrow.row("moving_force_Ay", fastest, load or math.nan, later)
+                yield if_found(row, f"the force of the floor in {arrow.inner.name} is none")
         elif leaves is not arrow.outer:
             why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
             yield Missing("lift", arrow.set, why)
@@ -366,8 +371,11 @@ class Arrow:
 
     def tasks_near_onset(self, kept: Sequence[Trajectory]) -> list[Task]:
         """Tasks just below the orbit at which the ball lifts off by a line through the last two
-        forces of the floor."""
+        forces of the floor; at the fastest orbit where it stays on the floor at all."""
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
+        if kept and len(pressed) == len(kept):
+            fastest = float(kept[-1].omega_c[0])
+            return [self.task(fastest, times) for times in self.lab.effort.halves]
         if not 2 <= len(pressed) < len(kept):
             return []
         (a, high), (b, low) = pressed[-2:]
@@ -398,6 +406,17 @@ def _force(run: Trajectory) -> Measured | None:
         polynomials(time, force[:pressed], Lifts.degrees, begin)[0] / (p.m * p.g)
     ).tolist()
     return Measured(value, abs(value - lower))
+
+
+def _load(runs: Sequence[Trajectory]) -> Measured | None:
+    """Force of the floor in N at the beginning of runs with both steps; None if it doesn't
+    press."""
+    p, coarse, fine = runs[0].header.parameters, *map(_force, runs)
+    if coarse is None or fine is None:
+        return None
+    change, weight = fine.value - coarse.value, p.m * p.g
+    sure = math.hypot(fine.uncertainty, change * DOUBT, lag_error(p, 2))
+    return Measured((fine.value + change * EXTRAPOLATION) * weight, sure * weight)
 
 
 def _onset(runs: Sequence[Trajectory]) -> Measured | None:
