@@ -66,7 +66,7 @@ PUSH = {Case.RS: 0.3, Case.SR: 0.1}
 """Size of a push, in the `units`, where it is extrapolated to zero from this and half of it."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; more at the others."""
-BENT = (
+NOT_LINEAR = (
     "only drag by Stokes' law is in proportion to the lag that a push makes which this case needs"
 )
 Exponents = npt.NDArray[np.complex128]
@@ -83,7 +83,7 @@ def measure(
     ]
     yield from (each for each in found if isinstance(each, Missing))
     pushed = [each for each in found if isinstance(each, Pushed)]
-    yield from (each.missing(BENT, rows=each.numbers) for each in pushed if each.bent)
+    yield from (each.missing(NOT_LINEAR, rows=each.numbers) for each in pushed if each.bent)
     states = [each for each in pushed if not each.bent]
     tasks = [state.tasks(lab) for state in states]
     for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
@@ -153,7 +153,7 @@ class Pushed:
 
     @property
     def bent(self) -> bool:
-        """Whether the push that the case asks for is too large for the drag: see `BENT`."""
+        """Whether the push that the case asks for is too large for the drag: see `NOT_LINEAR`."""
         return self.case in PUSH and self.start.p.drag != STOKES
 
     @property
