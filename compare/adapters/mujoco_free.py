@@ -15,7 +15,14 @@ from compare.adapters.free import CORNERS, Free, State, Touch
 from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector, facing
 from model.arrays import Array
 
-FEATURES = ("two bodies", "moving surface", "dry joint", "tripod", "disc")
+FEATURES = (
+    "two bodies",
+    "moving surface",
+    "dry joint",
+    "tripod",
+    "disc",
+    "anisotropic friction",
+)
 _HEAVY = 1e6
 """Mass of a wall that moves divided by that of the body, which it doesn't feel."""
 _SOLIMP = 0.999
@@ -139,17 +146,19 @@ class Lawful(Bodies):
 
 
 def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
-    """Add a contact pair, with the surface's friction, for each surface and what touches it; yield
-    name and pair."""
+    """Add a contact pair, with the surface's friction, for each surface and what touches it, where
+    there is none; yield name and pair."""
     lowest = "under" if scene.under else "body"
+    there = {(pair.geomname1, pair.geomname2): pair for pair in spec.pairs}
     for surface in scene.surfaces:
         of = [
             [g.name for g in spec.geoms if g.name.rstrip("0123456789") == name]
             for name in (surface.name, lowest)
         ]
         for geom, part in itertools.product(*of):
-            pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
-            pair.friction = (surface.friction, surface.friction, 0.0, 0.0, 0.0)
+            if not (pair := there.get((geom, part))):
+                pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
+                pair.friction = (surface.friction, surface.friction, 0.0, 0.0, 0.0)
             yield surface.name, pair
 
 

@@ -44,6 +44,10 @@ class Surface:
     """Of its material along itself, m/s; a belt has one."""
     restitution: float = 0.0
     """Share of its normal speed with which the body leaves it after a blow."""
+    across: float | None = None
+    """Coulomb's coefficient along y on a level plane whose `friction` is that along x: the force is
+    within an ellipse, and the one in it that takes the most power. None: the same in every
+    direction."""
 
 
 @dataclass(frozen=True)
@@ -149,6 +153,7 @@ class Scene:
             "dry joint": self.joint,
             "tripod": self.body.shape == "tripod",
             "disc": self.body.shape == "disc",
+            "anisotropic friction": any(surface.across for surface in self.surfaces),
         }
         return tuple(name for name, needed in asked.items() if needed)
 
@@ -214,17 +219,28 @@ class Scene:
             )
             start = ([0.0], [float(np.dot(self.joint, body.velocity))]) if self.joint else free
             qpos, qvel = qpos + start[0], qvel + start[1]
-        pair = (
-            f'<pair geom1="under" geom2="body" friction="{self.between} {self.between} 0 0 0"/>'
-            if self.under
-            else ""
+        frictions = [("under", "body", self.between, self.between)] if self.under else []
+        # The engine's first direction on a level plane is y, its second one x.
+        frictions += [
+            (
+                surface.name,
+                ("body", "under")[len(self.bodies) - 1],
+                surface.across,
+                surface.friction,
+            )
+            for surface in self.surfaces
+            if surface.across
+        ]
+        pairs = "".join(
+            f'<pair geom1="{one}" geom2="{other}" friction="{first} {second} 0 0 0"/>'
+            for one, other, first, second in frictions
         )
         return f"""<mujoco model="{self.name}">
   <option timestep="{timestep}" gravity="0 0 {-self.g}"/>
   <worldbody>
     {(chr(10) + "    ").join(parts)}
   </worldbody>
-  <contact>{pair}</contact>
+  <contact>{pairs}</contact>
   <keyframe><key name="start" qpos="{_text(qpos)}" qvel="{_text(qvel)}"/></keyframe>
 </mujoco>
 """

@@ -17,9 +17,9 @@ from model import InputError
 from model.arrays import Array
 from model.files import reading_json
 
-VERSION = 2
-"""Of the set of cases and their files; a change of any number is another version. 2 has all of
-1."""
+VERSION = 3
+"""Of the set of cases and their files; a change of any number is another version. Each has all of
+those before."""
 TOLERANCE = 1e-2
 """Error, in units of the case's scales, up to which an engine passes at the shortest step. A method
 of first order is wrong by about a step divided by the time that the motion takes to change, 1 ms by
@@ -166,7 +166,7 @@ def reach(body: Body, normal: Array) -> Array:
 
 
 def read(path: Path) -> Case:
-    """A case from a file that `dualball cases -o` wrote, of this version or version 1; without its
+    """A case from a file that `dualball cases -o` wrote, of this version or one before; without its
     wrong answers.
 
     Raises

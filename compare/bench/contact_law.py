@@ -25,6 +25,8 @@ Array = npt.NDArray[Any]
 """Of floats, or of marks and numbers that choose contacts."""
 LARGEST, CONE = 1.0, 0.999
 """Steps are tried up to this, s; from this share of the cone on a contact slides."""
+IDLE = 0.01
+"""Friction that uses no more than this share of Coulomb's cone is given no direction."""
 FAINT = 1e-3
 """A load that could speed up the lighter body by less than this share of g counts as none."""
 SOLREF = (0.02, 1.0)
@@ -75,6 +77,19 @@ class Contacts:
             :, 0
         ]
         return share
+
+    def lacking(self, slides: Array) -> float:
+        """Share of Coulomb's friction that the pyramid lacks in all contacts; `slides` says which
+        slip. Nan for an elliptic cone, and where next to no friction acts.
+
+        With u_i = f_i/mu_i Coulomb's law holds up to |u| = N, the pyramid up to sum |u_i| = N.
+        Against a slip v Coulomb's force has u_i ~ mu_i v_i."""
+        load, u = self.force[:, 0], self._scaled_friction
+        if not self.pyramidal or np.hypot.reduce(u, 1).sum() <= IDLE * load.sum():
+            return math.nan
+        against = self.friction * np.abs(self.slip) * self._frictional
+        u = np.where(slides[:, None], against * (load / against.sum(1))[:, None], u)
+        return float(1 - np.hypot.reduce(u, 1).sum() / u.sum())
 
     @property
     def _frictional(self) -> Array:

@@ -18,6 +18,7 @@ from compare.adapters.vessel import scene_fields
 from compare.bench.case import TOLERANCE, VERSION, Case
 from compare.bench.closed_forms import CLOSED_FORMS
 from compare.bench.mechanisms import MECHANISMS
+from compare.bench.oblique import OBLIQUE
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import check_ours, make_directory, write_text
@@ -38,8 +39,10 @@ tolerance."""
 @cache
 def cases() -> tuple[Case, ...]:
     """All exact cases: those of version 1 first, of these those in closed form."""
-    older, newer = ([form() for form in those] for those in (CLOSED_FORMS, MECHANISMS))
-    return (*older, *(_in_vessel(*row) for row in VESSEL), *newer)
+    first, second, third = (
+        [form() for form in those] for those in (CLOSED_FORMS, MECHANISMS, OBLIQUE)
+    )
+    return (*first, *(_in_vessel(*row) for row in VESSEL), *second, *third)
 
 
 def listing() -> list[list[str]]:

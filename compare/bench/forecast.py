@@ -73,6 +73,10 @@ class PairForecast:
     turning_measured: float
     cone: float
     """Share of the friction cone, or pyramid, in use."""
+    short: float
+    """Share of Coulomb's friction that the pyramid lacks in the direction of the load or, if the
+    pair slides or moves, against its slip, of all its contacts; nan for an elliptic cone, and where
+    next to no friction acts."""
     slides: bool
     hover: float
     """Slip speed from which contact is lost again and again, m/s."""
@@ -266,6 +270,7 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
                 moves=bool(moves[part].any()),
                 parts=own.parts,
                 load=float(own.force[:, 0].sum()),
+                short=own.lacking((law.slides | moves)[part]),
                 slides=bool((law.slides & ~moves)[part].any()),
                 hover=float(law.hover[part].min()),
                 largest_step=largest,

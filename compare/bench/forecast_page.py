@@ -12,6 +12,8 @@ from compare.bench.forecast import SHOWN, Forecast
 from compare.bench.settled import NOISE, few
 from compare.kit import pages
 
+SHORT = 0.05
+"""Share of Coulomb's friction that a pyramid may lack without a word."""
 CREEP_OFF = 0.05
 """Share of the predicted creep by which the measured one may differ without a word."""
 Table = tuple[str, list[list[str]]]
@@ -21,7 +23,9 @@ Table = tuple[str, list[list[str]]]
 def sentences(f: Forecast) -> Iterator[str]:
     """A forecast in sentences: what to do, what was found when it was tried, and what else one
     should know."""
-    sliding, rattling = [p.name for p in f.pairs if p.slides], [p.name for p in f.pairs if p.moves]
+    short = {p.name: f"{p.name} by {100 * p.short:.0f} %" for p in f.pairs if p.short > SHORT}
+    sliding = [p.name for p in f.pairs if p.slides and p.name not in short]
+    rattling = [p.name for p in f.pairs if p.moves]
     moving = [*f.settled.moving.values()]
     if f.change:
         name, factor, unit = FAULTS[f.change.quantity]
@@ -40,6 +44,13 @@ def sentences(f: Forecast) -> Iterator[str]:
         )
     if sliding:
         yield f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction holds them."
+    if short:
+        yield (
+            "Loaded, or sliding, off the axes of MuJoCo's friction pyramid, where it is weaker than "
+            f'Coulomb\'s cone: {few([*short.values()])}. cone="elliptic" has friction in full.'
+        )
+    if slips := [p.name for p in f.pairs if p.slides and p.name in short]:
+        yield f"These slide, though friction in full may hold them: {few(slips)}."
     if lost := [p.name for p in f.pairs if p.slides and p.creep_measured > p.hover]:
         yield f"These slide so fast that contact is lost again and again: {few(lost)}."
     if off := [
@@ -55,7 +66,7 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield "Speeds still change, slowly: loads, and what is forecast from them, are means over a second."
     if rattling:
         yield f"Nothing is forecast, and what is shown are means, where bodies move or lose contact: {few(rattling)}."
-    if not (f.change or f.remedy or sliding or moving or rattling or f.settled.collapsed):
+    if not (f.change or f.remedy or sliding or short or moving or rattling or f.settled.collapsed):
         yield "Nothing needs to change."
     if f.settled.asleep:
         yield f"MuJoCo puts to sleep, so that nothing creeps till it wakes: {few(f.settled.asleep)}. Forecast awake."
@@ -99,12 +110,18 @@ def tables(f: Forecast, after: Forecast | None = None, held: Forecast | None = N
             "found\nµm",
         ]
     ]
-    rest[0] += ["load\nN", "cone\n%"]
+    rest[0] += ["load\nN", "cone\n%", "short\n%"]
     motion = [["pair", "hover\nmm/s", "step\nms"]]
     for p in f.pairs[:SHOWN]:
         micro = p.creep, p.creep_measured, p.turning, p.turning_measured, p.depth, p.depth_measured
         rest.append(
-            [p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), _number(p.cone, 100)]
+            [
+                p.name,
+                *(_number(v, 1e6, "∞") for v in micro),
+                _number(p.load),
+                _number(p.cone, 100),
+                _number(p.short, 100),
+            ]
         )
         motion.append([p.name, _number(p.hover, 1e3), _number(p.largest_step, 1e3)])
     title = f"Pairs in contact: {len(f.pairs)}" + (

@@ -51,45 +51,54 @@ def _plate(mass: float, tilt: float, size: tuple[float, float, float]) -> dict[s
 _FOOT, _OUT, _DOWN, _MOMENT = 0.01, 0.1, 0.04, 0.006
 """Of the tripod the size, m, as a `Body` has it, and the moment of inertia about its axis, kg
 m2."""
+TRIPOD = {"shape": "tripod", "size": (_FOOT, _OUT, _DOWN), "mass": 1.0, "inertia": (0.004, 0.004, _MOMENT)}
+WRONG_TRIPODS = {"each leg bears a third": {"share": 0.0}, "friction 5 % too weak": {"mu": 0.95 * 0.3},
+                 "a centre twice as high": {"height": 2 * (_FOOT + _DOWN)}}
+BALANCE = "Newton and Euler in the plane, loads from the balance of moments, integrated to 1e-13"
+
+
+def integrated(rates: Callable[[float, Array], Array], start: Array, t: Array) -> Array:
+    """The solution of a differential equation at times, a row for each variable."""
+    span = (0.0, float(max(t[-1], 1e-3)))
+    found = solve_ivp(rates, span, start, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True)
+    assert found.sol is not None
+    return np.asarray(found.sol(t))
 
 
 @_case(
     "tripod-turns",
     "three legs that slide and turn: each bears what keeps it from tilting, and slows it along its "
     "own slip",
-    {"shape": "tripod", "size": (_FOOT, _OUT, _DOWN), "mass": 1.0, "inertia": (0.004, 0.004, _MOMENT)},
-    (Surface("floor", 0.3),),
-    wrong={"each leg bears a third": {"share": 0.0}, "friction 5 % too weak": {"mu": 0.95 * 0.3},
-           "a centre twice as high": {"height": 2 * (_FOOT + _DOWN)}},
-    until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",),
-    source="Newton and Euler in the plane, loads from the balance of moments, integrated to 1e-13")
-def _tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: float = 1.0) -> _Motion:
+    TRIPOD, (Surface("floor", 0.3),), wrong=WRONG_TRIPODS,
+    until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",), source=BALANCE)
+def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: float = 1.0,
+           degrees: float = 0.0, turning: float = 10.0, pyramid: bool = False) -> _Motion:
     """Position, velocity and spin of a tripod of 1 kg each foot of which bears what keeps it from
     tilting.
 
-    The loads N of three feet at p follow from sum N = m g and the two moments of weight and
-    friction about the centre, at `height`; `share` 0 gives each a third of the weight. """
+    It is pushed off at 1.5 m/s, so many degrees from the x axis. The loads N of three feet at p
+    follow from sum N = m g and the two moments of weight and friction about the centre, at
+    `height`; `share` 0 gives each a third of the weight. A `pyramid` |f_x| + |f_y| <= mu N is as
+    weak as that between its edges. """
 
-    angles = math.tau / 3 * np.arange(3)
+    angles, way = math.tau / 3 * np.arange(3), math.radians(degrees)
 
     def rates(t: float, state: Array) -> Array:
         _, _, turn, *velocity, spin = state
         p = _OUT * np.array([np.cos(angles + turn), np.sin(angles + turn)])
         slip = np.array(velocity)[:, None] + spin * np.array([-p[1], p[0]])
-        slip /= np.hypot(*slip)
+        slip /= np.abs(slip).sum(axis=0) if pyramid else np.hypot(*slip)
         tilting = p - share * height * mu * slip
         loads = np.linalg.solve(np.vstack([np.ones(3), tilting if share else p]), [G, 0.0, 0.0])
         friction = -mu * loads * slip
         torque = float(np.sum(p[0] * friction[1] - p[1] * friction[0]))
         return np.array([*velocity, spin, *friction.sum(axis=1), torque / _MOMENT])
 
-    start, end = np.array([0.0, 0.0, 0.0, 1.5, 0.0, 10.0]), float(max(t[-1], 1e-3))
-    found = solve_ivp(rates, (0.0, end), start, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True)
-    assert found.sol is not None
-    x, y, _, v_x, v_y, turning = found.sol(t)
+    start = np.array([0.0, 0.0, 0.0, 1.5 * math.cos(way), 1.5 * math.sin(way), turning])
+    x, y, _, v_x, v_y, rate = integrated(rates, start, t)
     none = 0 * t
     place = np.stack([x, y, none + _FOOT + _DOWN], axis=1)
-    return place, np.stack([v_x, v_y, none], axis=1), np.outer(turning, UP)
+    return place, np.stack([v_x, v_y, none], axis=1), np.outer(rate, UP)
 
 
 _PLANK = (0.6, 0.2, 0.02)

@@ -4,6 +4,7 @@ trajectories in the vessel.
 The same task in, the same trajectory out; what can't be had, ends, hangs or gives no numbers is
 said in a line."""
 
+import dataclasses
 import re
 import sys
 import warnings
@@ -255,6 +256,20 @@ def test_under_coulombs_law_mujoco_is_right_in_every_case():
         # A blow that lifts the ball off its floor: else gravity has it for up to a step and a half
         # before, 2e-2.
         assert max(mujoco.result(CASES["hits-the-wall"], (1.09e-3, 1e-3, 0.93e-3)).errors) < 2.5e-3
+
+
+def test_mujocos_default_cone_is_the_pyramid_that_cases_must_notice():
+    """To what it is wrong by along an axis. And its pairs have the two frictions of a surface
+    whatever else is set of them."""
+    pyramid = "a pyramid with its edges along the axes"
+    with closing(EngineProcess(f"{OWN}.mujoco_free:defaults")) as mujoco:
+        along = mujoco.result(CASES["box-stops"], (1e-3,)).error
+        for name in ("slides-at-15", "slides-at-30", "slides-at-45"):
+            case = CASES[name]
+            weak = dataclasses.replace(case, exact=case.wrong[pyramid])
+            assert mujoco.result(case, (1e-3,)).error > 3 * along
+            assert mujoco.result(weak, (1e-3,)).error < along
+    assert run(CASES["anisotropic"], "compare.bench.native:on_joints", (1e-3,)).error < 0.05
 
 
 @pytest.mark.slow  # they compile for minutes where they haven't run before

@@ -185,7 +185,7 @@ def test_a_file_of_version_1_is_read_and_what_is_none_refused(tmp_path):
     new = ("spring", "joint", "dry", "under", "between")
     data = {key: value for key, value in data.items() if key not in new} | {"version": 1}
     data["surfaces"] = [
-        {k: v for k, v in s.items() if k not in ("velocity", "restitution")}
+        {k: v for k, v in s.items() if k not in ("velocity", "restitution", "across")}
         for s in data["surfaces"]
     ]
     (path := tmp_path / "case.json").write_text(json.dumps(data))
