@@ -12,7 +12,7 @@ from compare.bench.forecast import SHOWN, Forecast
 from compare.bench.settled import NOISE, few
 from compare.kit import pages
 
-SHORT = 0.05
+SLIGHT = 0.05
 """Share of Coulomb's friction that a pyramid may lack without a word."""
 CREEP_OFF = 0.05
 """Share of the predicted creep by which the measured one may differ without a word."""
@@ -23,7 +23,7 @@ Table = tuple[str, list[list[str]]]
 def sentences(f: Forecast) -> Iterator[str]:
     """A forecast in sentences: what to do, what was found when it was tried, and what else one
     should know."""
-    short = {p.name: f"{p.name} by {100 * p.short:.0f} %" for p in f.pairs if p.short > SHORT}
+    short = {p.name: f"{p.name} by {100 * p.short:.0f} %" for p in f.pairs if p.short > SLIGHT}
     sliding = [p.name for p in f.pairs if p.slides and p.name not in short]
     rattling = [p.name for p in f.pairs if p.moves]
     moving = [*f.settled.moving.values()]

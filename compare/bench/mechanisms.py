@@ -51,16 +51,23 @@ def _plate(mass: float, tilt: float, size: tuple[float, float, float]) -> dict[s
 _FOOT, _OUT, _DOWN, _MOMENT = 0.01, 0.1, 0.04, 0.006
 """Of the tripod the size, m, as a `Body` has it, and the moment of inertia about its axis, kg
 m2."""
-TRIPOD = {"shape": "tripod", "size": (_FOOT, _OUT, _DOWN), "mass": 1.0, "inertia": (0.004, 0.004, _MOMENT)}
-WRONG_TRIPODS = {"each leg bears a third": {"share": 0.0}, "friction 5 % too weak": {"mu": 0.95 * 0.3},
-                 "a centre twice as high": {"height": 2 * (_FOOT + _DOWN)}}
+TRIPOD = {
+    "shape": "tripod", "size": (_FOOT, _OUT, _DOWN), "mass": 1.0,
+    "inertia": (0.004, 0.004, _MOMENT),
+}
+WRONG_TRIPODS = {
+    "each leg bears a third": {"share": 0.0}, "friction 5 % too weak": {"mu": 0.95 * 0.3},
+    "a centre twice as high": {"height": 2 * (_FOOT + _DOWN)},
+}
 BALANCE = "Newton and Euler in the plane, loads from the balance of moments, integrated to 1e-13"
 
 
 def integrated(rates: Callable[[float, Array], Array], start: Array, t: Array) -> Array:
     """The solution of a differential equation at times, a row for each variable."""
     span = (0.0, float(max(t[-1], 1e-3)))
-    found = solve_ivp(rates, span, start, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True)
+    found = solve_ivp(
+        rates, span, start, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True
+    )
     assert found.sol is not None
     return np.asarray(found.sol(t))
 
@@ -72,16 +79,16 @@ def integrated(rates: Callable[[float, Array], Array], start: Array, t: Array) -
     TRIPOD, (Surface("floor", 0.3),), wrong=WRONG_TRIPODS,
     until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",), source=BALANCE)
 def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: float = 1.0,
-           degrees: float = 0.0, turning: float = 10.0, pyramid: bool = False) -> _Motion:
+           start: tuple[float, float] = (0.0, 10.0), pyramid: bool = False) -> _Motion:
     """Position, velocity and spin of a tripod of 1 kg each foot of which bears what keeps it from
     tilting.
 
-    It is pushed off at 1.5 m/s, so many degrees from the x axis. The loads N of three feet at p
-    follow from sum N = m g and the two moments of weight and friction about the centre, at
-    `height`; `share` 0 gives each a third of the weight. A `pyramid` |f_x| + |f_y| <= mu N is as
-    weak as that between its edges. """
+    At the `start` it goes at 1.5 m/s, so many degrees from the x axis, and turns at so many rad/s.
+    The loads N of three feet at p follow from sum N = m g and the two moments of weight and
+    friction about the centre, at `height`; `share` 0 gives each a third of the weight. A `pyramid`
+    |f_x| + |f_y| <= mu N is as weak as that between its edges. """
 
-    angles, way = math.tau / 3 * np.arange(3), math.radians(degrees)
+    angles, way = math.tau / 3 * np.arange(3), math.radians(start[0])
 
     def rates(t: float, state: Array) -> Array:
         _, _, turn, *velocity, spin = state
@@ -94,8 +101,8 @@ def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: floa
         torque = float(np.sum(p[0] * friction[1] - p[1] * friction[0]))
         return np.array([*velocity, spin, *friction.sum(axis=1), torque / _MOMENT])
 
-    start = np.array([0.0, 0.0, 0.0, 1.5 * math.cos(way), 1.5 * math.sin(way), turning])
-    x, y, _, v_x, v_y, rate = integrated(rates, start, t)
+    first = np.array([0.0, 0.0, 0.0, 1.5 * math.cos(way), 1.5 * math.sin(way), start[1]])
+    x, y, _, v_x, v_y, rate = integrated(rates, first, t)
     none = 0 * t
     place = np.stack([x, y, none + _FOOT + _DOWN], axis=1)
     return place, np.stack([v_x, v_y, none], axis=1), np.outer(rate, UP)

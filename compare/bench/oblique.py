@@ -214,4 +214,4 @@ _case(
     scales=(0.1, 0.5, 5.0),
     contacts=("S",),
     source=BALANCE,
-)(partial(tripod, degrees=30.0, turning=3.0))
+)(partial(tripod, start=(30.0, 3.0)))

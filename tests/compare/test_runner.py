@@ -144,7 +144,7 @@ def test_a_league_of_one(tmp_path, capsys):
     shown = told(capsys, f"league --engine {name} -o {tmp_path} --workers 1 --quiet --json")
     tried = [result for result in json.loads(shown)["engines"][name] if not result["skipped"]]
     assert len(tried) == sum(not case.needs for case in cases()) - 1
-    assert sum(result["passed"] for result in tried) == 14
+    assert sum(result["passed"] for result in tried) == 22
     assert not any(result["failure"] for result in tried)
     assert "no forces" in (tmp_path / "league.html").read_text("utf-8")
     lost = tmp_path / "lost"
