@@ -46,8 +46,8 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction holds them."
     if short:
         yield (
-            "Loaded, or sliding, off the axes of MuJoCo's friction pyramid, where it is weaker than "
-            f'Coulomb\'s cone: {few([*short.values()])}. cone="elliptic" has friction in full.'
+            "Loaded, or sliding, off the axes of MuJoCo's friction pyramid, where it is weaker "
+            f'than Coulomb\'s cone: {few([*short.values()])}. cone="elliptic" has friction in full.'
         )
     if slips := [p.name for p in f.pairs if p.slides and p.name in short]:
         yield f"These slide, though friction in full may hold them: {few(slips)}."

@@ -97,8 +97,8 @@ def _pulled(name: str, share: float, degrees: float, about: str, **given: Any) -
 for _degrees in (15.0, 30.0, 45.0):
     _case(
         f"slides-at-{_degrees:.0f}",
-        f"a box that is pushed off at {_degrees:.0f} degrees to the axes slides straight on, slower "
-        "by mu g, and stops",
+        f"a box that is pushed off at {_degrees:.0f} degrees to the axes slides straight on, "
+        "slower by mu g, and stops",
         block(),
         (Surface("floor", MU),),
         wrong=_WEAK | {_PYRAMID: {"pyramid": True}},
@@ -176,8 +176,8 @@ _ROLLS = float(np.linalg.norm(_FIRST)) / (_BALL_MU * G * (1 + 1 / J))
 
 @_case(
     "ball-curves",
-    "a ball that is pushed off with spin across its way slides along a parabola, then rolls straight "
-    "on; it spins on about the vertical",
+    "a ball that is pushed off with spin across its way slides along a parabola, then rolls "
+    "straight on; it spins on about the vertical",
     sphere(),
     (Surface("floor", _BALL_MU),),
     wrong={
