@@ -2,8 +2,8 @@
 
 A claim says what is stated and where, and which measurements bear on it: a `Bearing` picks
 measurements by protocol, quantity and conditions, and predicts each by a function of `analytic`.
-The verdict is computed from the numbers. That the paper's text had to be corrected, or holds
-formally only, is another matter: `Claim.text`."""
+The verdict is computed from the numbers. That the paper's text had to be corrected is another
+matter: `Claim.text`."""
 
 from __future__ import annotations
 
@@ -45,8 +45,6 @@ class Text(StrEnum):
     PRINTED = "as printed"
     CORRECTED = "corrected"
     """True once a listed erratum is corrected."""
-    FORMAL = "formal only"
-    """Outside the physical model: algebra is all there is."""
 
 
 def given(**conditions: Condition) -> When:
@@ -87,10 +85,8 @@ class Claim:
     source: str
     """Proposition, equation, figure or table."""
     statement: str
-    bearings: tuple[Bearing, ...] = ()
+    bearings: tuple[Bearing, ...]
     _: KW_ONLY
-    algebra: Callable[[], Iterable[Check]] | None = None
-    """For a claim that is formal only: theory against theory."""
     text: Text = Text.PRINTED
     reason: str = ""
     """What had to be corrected, or why a refutation is expected."""
@@ -101,13 +97,8 @@ class Claim:
     """Section of the report, set by the `catalogue`."""
 
     def __post_init__(self) -> None:
-        if bool(self.bearings) == bool(self.algebra):
-            raise ValueError(
-                f"claim {self.id}: measurements bear on it, or it is formal only and has its "
-                f"algebra"
-            )
-        if self.algebra:
-            object.__setattr__(self, "text", Text.FORMAL)
+        if not self.bearings:
+            raise ValueError(f"claim {self.id}: no measurement bears on it")
 
     @cached_property
     def numbers(self) -> frozenset[int]:

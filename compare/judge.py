@@ -89,7 +89,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         left_out[replace(each, rows=0)] += each.rows
     missing = tuple(replace(each, rows=rows) for each, rows in left_out.most_common())
     try:
-        checks = tuple(claim.algebra() if claim.algebra else checks_of(claim, records))
+        checks = tuple(checks_of(claim, records))
     except (
         Exception
     ) as error:  # a theory that breaks down, in whatever way, loses its claim and no other

@@ -19,7 +19,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import reduce
 from operator import or_
 from statistics import median
 from typing import Self
@@ -84,11 +84,6 @@ def full_verdict(claim: Claim, testimony: RecordsByEngine) -> Verdict:
     """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
     (name, steps), *others = testimony.items()
     measured = steps[max(steps)]
-    if claim.algebra:
-        formal = partial(Witness, outcome=Outcome.NOT_ASKED, reason="formal: theory against theory")
-        return replace(
-            verdict(claim, measured), witnesses=tuple(formal(engine=each) for each in testimony)
-        )
     thresholds = measured.select("thresholds", where=lambda m: m.quantity.startswith("omega_0"))
     ends = {(m.set, m.value) for m in thresholds}
     if len(steps) == 1 and not engine(name).allowance:

@@ -228,11 +228,8 @@ def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     passed = [verdict for verdict in ran if verdict.passed]
     left = sum(verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed for verdict in ran)
     counts = {
-        "confirmed by measurement": sum(
-            v.outcome is Outcome.CONFIRMED and not v.claim.algebra for v in passed
-        ),
+        "confirmed by measurement": sum(v.outcome is Outcome.CONFIRMED for v in passed),
         "refuted as expected": sum(v.outcome is Outcome.REFUTED for v in passed),
-        "formal, theory against theory": sum(bool(v.claim.algebra) for v in passed),
         "not as expected": len(ran) - len(passed) - left,
         "inconclusive": left,
     }

@@ -19,7 +19,6 @@ NAMES = (
     "slipping",
     "attractors",
     "unsteady",
-    "formal",
 )
 """In the order of the report; each measures only after those before it."""
 

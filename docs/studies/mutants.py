@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import analytic
 from compare.catalogue import CLAIMS
-from compare.claim import Outcome, Text
+from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit import pages
 from compare.kit.quantities import QUANTITIES
@@ -119,7 +119,7 @@ def _resolving(directory: Path) -> tuple[dict[str, list[Resolved]], list[str]]:
     power, records = defaultdict[str, list[Resolved]](list), trial.measured(directory)
     verdicts, called = watched(lambda: judge(CLAIMS, records))
     for each in verdicts:
-        if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
+        if each.outcome is Outcome.CONFIRMED:
             for check in each.checks:
                 power[check.measurement.quantity].append(
                     (check.resolves, check.measurement.set, each.claim.id)

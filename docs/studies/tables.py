@@ -24,7 +24,16 @@ from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import newcomer
 from compare.kit.pages import Rows
-from docs.studies import accuracy, confirmation, extrapolation, gains, settings, states, witnesses
+from docs.studies import (
+    accuracy,
+    confirmation,
+    extrapolation,
+    gains,
+    settings,
+    statements,
+    states,
+    witnesses,
+)
 from docs.studies.states import Entry
 from mjsim import ContactSettings
 from model import InputError
@@ -144,10 +153,14 @@ LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
     "league-about": lambda campaign: league.declarations(_league(campaign.directory)),
 }
 VERDICTS = {"witnesses": TABLES["witnesses"]}
+STATEMENTS: dict[str, Callable[[Campaign], Rows]] = {
+    "statements": lambda campaign: statements.table()
+}
 PAGES = {
     "mujoco-settings.md": ("settings", TABLES),
     "engines.md": ("league", LEAGUE),
     "README.md": ("settings", VERDICTS),
+    "statements.md": ("settings", STATEMENTS),
 }
 """Directory of the runs, and tables of each page."""
 

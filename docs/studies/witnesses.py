@@ -47,10 +47,7 @@ def counted(results: Path) -> Rows:
     `mujoco-coulomb`, which measures by itself, has a directory of its own below, as `make mutants`
     leaves it."""
     said = verdicts(results)
-    told, formal = (
-        wording.witnesses(said),
-        str(sum(bool(verdict.claim.algebra) for verdict in said)),
-    )
+    told = wording.witnesses(said)
     told += wording.witnesses(verdicts(results / "coulomb"))
     head = [
         "witness",
@@ -72,7 +69,7 @@ def counted(results: Path) -> Rows:
     rows = [
         [row[name] for name in ("engine", *head[1:6], "open", "typical", "worst")] for row in told
     ]
-    return [head, *rows, ["theory against theory", formal, formal, *["–"] * 6]]
+    return [head, *rows]
 
 
 def limits(results: Path) -> Rows:

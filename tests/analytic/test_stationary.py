@@ -57,7 +57,7 @@ def test_the_branch_is_stable_before_the_fold_and_has_one_unstable_direction_aft
 
 
 def test_hopf_points_exist_for_rough_floors_only():
-    """Between two of them two directions are unstable; with (12) released claim fig-12 has them."""
+    """Between two of them two directions are unstable; with (12) released so has Fig. 12."""
     assert hopf_places(P) == []
     p = P.replace(mu=3.0, eta=0.35)
     places = hopf_places(p)

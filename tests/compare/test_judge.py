@@ -171,11 +171,8 @@ def test_predictions_are_forgotten_between_judgements():
 def test_claims_that_are_none_are_refused():
     with pytest.raises(InputError, match="omega_c"):
         claim(quantity="omega_cc")
-    assert (
-        Claim(id="it", section="", source="", statement="", algebra=lambda: []).text is Text.FORMAL
-    )
-    with pytest.raises(ValueError, match="formal"):
-        Claim(id="it", section="", source="", statement="")
+    with pytest.raises(ValueError, match="no measurement bears on it"):
+        Claim("it", "", "", ())
     with pytest.raises(InputError, match="did you mean"):
         select([claim(), replace(claim(), id="prop-1")], ["prop-2"])
 
@@ -202,7 +199,7 @@ def test_judging_a_claim_takes_no_longer_than_it_may(monkeypatch):
 
 def test_every_claim_predicts_a_number_that_could_refute_it():
     """No case, no count, and no bound on one side only."""
-    asked = (each for each in CLAIMS if each.expected is Outcome.CONFIRMED and not each.algebra)
+    asked = (each for each in CLAIMS if each.expected is Outcome.CONFIRMED)
     assert [each.id for each in asked if not each.numbers] == []
     sides = (Relation.AT_MOST, Relation.AT_LEAST)
     low, high = (Bearing("settled", "omega_c", lambda m: 1.0, relation=each) for each in sides)

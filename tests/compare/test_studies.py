@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from compare.kit import pages
-from docs.studies import confirmation, settings, tables
+from docs.studies import confirmation, settings, statements, tables
 from mjsim import ContactSettings
 from model import InputError
 
@@ -39,6 +39,15 @@ def test_the_page_has_a_place_for_every_table(name, tmp_path):
     for table in named:
         tables.write(page, table, ROWS)
     assert page.read_text("utf-8").count(pages.markdown(ROWS)) == len(named)
+
+
+def test_every_statement_says_where_it_is_checked():
+    """The page is what the claims and the tests say now."""
+    assert pages.markdown(statements.table()) in (DOCS / "statements.md").read_text("utf-8")
+    for each in statements.TESTS:
+        file, _, test = each.partition("::")
+        source = (DOCS.parent / "tests" / "analytic" / f"{file}.py").read_text("utf-8")
+        assert f"def {test}(" in source, each
 
 
 def test_formulas_are_what_mujoco_does_and_one_that_is_off_is_noticed():

@@ -325,6 +325,6 @@ FIGURES["fig-12"] = Drawing(
     "Fig. 12: on the floor, η > j, (12) released",
     _select_released,
     draw_diagram,
-    ("fig-12",),
+    (),
     partial(Diagram, "fig-12"),
 )
