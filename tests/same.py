@@ -13,7 +13,8 @@ from pathlib import Path
 import h5py
 
 from compare.kit import record
-from compare.kit.record import Records
+from compare.kit.record import Missing, Records
+from model import InputError
 
 
 def protocols(directory: Path) -> dict[str, Records]:
@@ -23,7 +24,11 @@ def protocols(directory: Path) -> dict[str, Records]:
         with h5py.File(path) as file:
             about = json.loads(file.attrs["about"])
         by = about.get("by", about["engine"])
-        found[f"{path.stem} by {by}, step/{about.get('step', 1)}"] = record.load(path)
+        try:
+            own = record.load(path)
+        except InputError as error:  # as of a quantity that is measured no more
+            own = Records(missing=(Missing(path.stem, "all sets", str(error)),))
+        found[f"{path.stem} by {by}, step/{about.get('step', 1)}"] = own
     return found
 
 
