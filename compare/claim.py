@@ -215,6 +215,16 @@ class Verdict(Judged):
         return self.outcome is self.claim.expected
 
     @property
+    def told(self) -> int:
+        """How many of its numbers are fine enough to tell."""
+        return sum(check.conclusive for check in self.checks)
+
+    @property
+    def planned(self) -> int:
+        """How many numbers its protocols had to bear on it, or left out."""
+        return len(self.checks) + self.left_out
+
+    @property
     def left_out(self) -> int:
         """How many measurements its protocols left out."""
         return sum(each.rows for each in self.missing)

@@ -131,7 +131,7 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
         name: sum(getattr(check, name) for check in verdict.checks)
         for name in ("agrees", "conclusive")
     }
-    counts["left_out"] = verdict.left_out
+    counts |= {"left_out": verdict.left_out, "planned": verdict.planned}
     power = {"resolving_power": verdict.resolving_power, "worst": verdict.worst}
     less = {
         "expected": verdict.claim.expected,

@@ -100,7 +100,10 @@ def findings(verdict: Verdict) -> dict[str, str]:
         found = {"Largest deviation": f"theory knows no such state: {where}"}
     if errors := noticed_errors(verdict.resolving_power):
         found["Would notice"] = errors
-    if coarse := sum(not each.conclusive for each in verdict.checks):
+    told, planned = verdict.told, verdict.planned
+    if told < planned:
+        found["Can tell"] = f"{told} of {planned} numbers planned"
+    if coarse := len(verdict.checks) - told:
         found["Too coarse to tell"] = str(coarse)
     if verdict.left_out:
         found["Left out by its protocols"] = str(verdict.left_out)

@@ -97,6 +97,7 @@ def test_what_was_measured_must_be_there(gone):
     expected = Outcome.CONFIRMED if gone == "another claim's" else Outcome.INCONCLUSIVE
     (verdict,) = judge([both], less)
     assert verdict.outcome is expected
+    assert verdict.planned == 10
     bearing = [m for m in whole.measurements if m.quantity != "v_y"]
     assert verdict.left_out == sum(not GONE[gone](m) for m in bearing)
     steps = dict.fromkeys((1, 2, 3), less)
