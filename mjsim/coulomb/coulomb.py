@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import weakref
 from collections.abc import Iterator, Mapping
@@ -369,6 +370,7 @@ def _see_ahead(model: Any) -> None:
     ahead = model.opt.timestep * math.sqrt(
         2 * np.linalg.norm(model.opt.gravity) * model.stat.extent
     )
+    ahead /= 2 if _margins_add() else 1
     most = model.geom_rbound / 5
     np.maximum(model.geom_margin, np.minimum(ahead, most), out=model.geom_margin)
     pairs = [model.pair_geom1, model.pair_geom2]
@@ -377,6 +379,18 @@ def _see_ahead(model: Any) -> None:
         np.minimum(ahead, most[np.array(pairs)].max(axis=0)),
         out=model.pair_margin,
     )
+
+
+@functools.cache
+def _margins_add() -> bool:
+    """Whether this MuJoCo adds the margins of both geoms; older ones take the larger."""
+    ball = '<geom size=".1" margin=".01"/>'
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody>{ball}<body pos="0 0 .215"><freejoint/>{ball}</body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return bool(data.ncon)
 
 
 def _damp_at_the_end(model: Any) -> bool:

@@ -73,7 +73,7 @@ MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver"
 MJ_MODEL = _only(
     structure("mjModel"),
     *("nv", "nbody", "ngeom", "geom_rbound", "geom_bodyid"),
-    *("dof_parentid", "M_rownnz", "M_rowadr", "M_colind"),
+    *("nC", "dof_parentid", "M_rownnz", "M_rowadr", "M_colind"),
     opt=MJ_OPTION,
 )
 MJ_DATA = _only(

@@ -67,10 +67,17 @@ ITERATIONS = 20
 error, as a factor."""
 CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
-EXACT = 1e-6
-"""Part of what is asked for to which a prediction is as good as exact."""
+STEPS = 40
+"""Factorisations that Newton's method may take for an island."""
+EXACT = 1e-4
+"""Part of the forces without contacts to which it solves."""
+FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
+"""By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
+the shortest."""
+SOFTER = 100.0
+"""How much larger R is in Newton's method, until what contacts hold takes its part away."""
 FALLING = 0.1
-"""Part to which the error must fall from one solution of rigid contacts to the next to go on."""
+"""Part to which the error must fall from one solution to the next for another one."""
 OVER = 0.75
 """Part of a time step after which the next one has begun: stages of Runge and Kutta are in one."""
 NEXT = 1.5

@@ -29,11 +29,7 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
     """Make contacts stiff, and let them ask for velocities at the end of the step."""
     contacts, rows, law, h = contacts_of(memory), rows_of(memory), memory.law, model.opt.timestep
     estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
-    R, D, reference = (
-        reals(data.efc_R, data.nefc),
-        reals(data.efc_D, data.nefc),
-        reals(data.efc_aref, data.nefc),
-    )
+    R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
     for i in range(memory.contacts):
         contact = contacts[i]
         normal, first = rows[contact.address], contact.address
@@ -49,12 +45,8 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
         factor = law.softness * estimate[first] / R[first]
         for r in range(first, first + contact.dim):
             R[r] *= factor
-            D[r] = 1 / R[r]
             reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
-    if data.nisland > 0:
-        copy_to_islands(data, memory)
-    if model.opt.solver == PGS:
-        mj_projectConstraint(memory.model, memory.data)
+    share_softness(model, data, memory)
 
 
 @kernel
@@ -84,14 +76,18 @@ def rebound(
 
 
 @kernel
-def copy_to_islands(data: Any, memory: Any) -> None:
-    """Give the copies that MuJoCo's islands have of the rows the same regularisation."""
+def share_softness(model: Any, data: Any, memory: Any) -> None:
+    """Tell the R of contacts to all places where MuJoCo keeps it: D, islands, the matrix of PGS."""
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)
     place, contacts = integers(data.map_efc2iefc, data.nefc), contacts_of(memory)
     for i in range(memory.contacts):
         for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
-            island_R[place[r]], island_D[place[r]] = R[r], D[r]
+            D[r] = 1 / R[r]
+            if data.nisland > 0:
+                island_R[place[r]], island_D[place[r]] = R[r], D[r]
+    if model.opt.solver == PGS:
+        mj_projectConstraint(memory.model, memory.data)
 
 
 @kernel

@@ -29,7 +29,8 @@ from .engine import (
 )
 from .friction import find_forces, predict_slip, store_forces, subtract_references
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
-from .parameters import EXACT, FALLING, NEXT, OVER
+from .newton import solve_contacts
+from .parameters import EXACT, FALLING, NEXT, OVER, SOFTER
 from .rigid import (
     add_gyroscopic_moments,
     oppose_slip_at_mid_step,
@@ -165,37 +166,58 @@ def size_of_gravity(model: Any) -> float:
 
 @kernel
 def solve(model: Any, data: Any, memory: Any, enough: float) -> None:
-    """Let MuJoCo solve for accelerations until contacts slip as predicted, to `enough`, m s-2."""
-    contacts, rows, rigid = contacts_of(memory), rows_of(memory), memory.law.rigid
+    """Solve for the accelerations, until contacts slip as predicted, to `enough`, m s-2.
+
+    Of rigid contacts Newton's method finds slip and forces, for softer ones. Then MuJoCo solves, as
+    it will in the step itself, until what was predicted is what is found.
+    """
     start, last, slides = reals(data.qacc_warmstart, model.nv), math.inf, memory.law.rigid
     mj_fwdActuation(memory.model, memory.data)
     mj_fwdAcceleration(memory.model, memory.data)
+    memory.solves += 1
+    if memory.law.rigid:
+        soften(memory, SOFTER)
+        solve_contacts(model, data, memory, start, EXACT, enough)
+        soften(memory, 1 / SOFTER)
     for _ in range(memory.law.most):
-        for i in range(memory.contacts):  # what a blow does says nothing of the next step
-            contacts[i].extrapolated = -1.0
         write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)
-        memory.solves += 1
         qacc = reals(data.qacc, model.nv)
         for i in range(model.nv):
             start[i] = qacc[i]
         worst = find_forces(model, data, memory)
-        for i in range(memory.contacts):  # what was found is predicted next
-            contacts[i].predicted = contacts[i].found
-        for r in range(memory.rows if rigid else 0):
-            if rows[r].kind != CONTACT_ROW:
-                continue
-            rows[r].held = rows[r].remembered = rows[r].force
-        good = worst <= enough and (not rigid or worst > FALLING * last)
+        hold_what_was_found(memory)
+        good = worst <= enough and (not memory.law.rigid or worst > FALLING * last)
         if good or worst <= EXACT * enough:
             if not slides:
-                break
+                return
             multiply(model, data, memory)
             subtract_references(memory)
             if not oppose_slip_at_mid_step(model, data, memory):
-                break
+                return
             slides, worst = False, math.inf
         last = worst
+    memory.unsolved += 1
+
+
+@kernel
+def hold_what_was_found(memory: Any) -> None:
+    """Predict the slip that was found; rigid contacts hold the forces."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    for i in range(memory.contacts):  # what a blow does says nothing of the next step
+        contact = contacts[i]
+        contact.predicted, contact.extrapolated = contact.found, -1.0
+        for r in range(contact.address, contact.address + (contact.dim if memory.law.rigid else 0)):
+            rows[r].held = rows[r].remembered = rows[r].force
+
+
+@kernel
+def soften(memory: Any, factor: float) -> None:
+    """Make contacts softer, for a solution in which they come to hold what they bear."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    for i in range(memory.contacts):
+        for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
+            rows[r].R *= factor
 
 
 # -- MuJoCo's control callback ---------------------------------------------------------------------
