@@ -84,8 +84,7 @@ def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
     if settings.method == "event" and p.fluid_torque:
         raise InputError(
             f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque "
-            f"out; "
-            "method = 'time-stepping' takes it"
+            "out; time stepping takes it"
         )
     x = State.one(x0)
     check_place(x, p)

@@ -108,11 +108,6 @@ def simulate(
     """
     p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep
     every, count = sampling(t_end, h, task.sample_interval)
-    if p.fluid_torque:
-        raise InputError(
-            f"fluid_torque = {p.fluid_torque:g} s-1: {task.engine} leaves it out; mujoco, "
-            f"time-stepping don't"
-        )
     x = State.one(task.x0)
     check_timestep(h, p, flow, t_end, x)
     check_place(x, p, p.r / 10)

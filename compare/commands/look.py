@@ -15,17 +15,24 @@ from model import InputError, storage
 
 def figures(args: argparse.Namespace) -> int:
     """Draw every figure; one whose results are missing is named."""
+    from analytic.flowmeter import real_fluid
     from compare import gallery as registry
     from compare import validation  # here, because drawing takes a second to load
+    from compare.report import meter
 
     if args.results and not args.results.is_dir():
         raise InputError(f"cannot read {args.results}: there is no such directory")
     if own := list(options.own_set(args).values()):
         chosen = registry.of_set(*own)
+        for doubt in meter.model_warning(max(map(real_fluid.model_error, own))):
+            options.warn(doubt.removeprefix("Warning: "))
     else:
         chosen = registry.of_results(validation.stored_evidence(args.results or Path("results")))
-    for name, gap in registry.write(args.output, chosen, args.format or ["svg"]):
-        print(f"{args.output / name}: {gap or 'written'}")
+    formats = args.format or ["svg"]
+    for name, gap in registry.write(args.output, chosen, formats):
+        files = [name] if gap else [f"{name}.{suffix}" for suffix in formats]
+        for file in files:
+            print(f"{args.output / file}: {gap or 'written'}")
     return 0
 
 

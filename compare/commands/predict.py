@@ -125,7 +125,7 @@ def reading(p: Parameters) -> str:
 
 
 def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
-    """What `described` says of p: thresholds, solutions, the reading and what to mind, for the
+    """What `described` says of p: the reading, thresholds, solutions and what to mind, for the
     terminal.
 
     Where the model is off for a real fluid that comes first, and the numbers have three digits.
@@ -166,17 +166,18 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     for column, s in zip(shown.columns[1:], solutions, strict=True):
         column.style = "" if s["exists"] and s["case"] in attracting else "dim"
 
-    reach = f"it has no operating range: {data['operating_range_ends']['because']}"
+    answer = [Text(f"At ω₀ = {p.omega_0:g} rad/s {data['reading']}.", "bold")]
+    because = data["operating_range_ends"]["because"]
+    reach = f"It has no operating range: {because}."
     if limit := data["operating_range"]:
-        end = data["operating_range_ends"]["because"]
-        reach = f"rolling is its only lasting motion up to ω₀ = {to_digits(limit, 8)} rad/s: there {end}"
+        reach = f"It reads right up to ω₀ = {to_digits(limit, 5)} rad/s: there {because}."
         if math.isinf(data["reading_range"]):
-            reach += "; ω_c = ω₀ holds in every motion, however fast the flow"
+            reach += " ω_c = ω₀ holds in every motion, however fast the flow."
+    answer.append(Text(reach, "bold"))
     remarks: list[Text | str] = [
         Text("Forces in RR are not determined: shown are those that need least friction.", "dim")
     ]
-    remarks += [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {data['reading']}; {reach}."]
-    remarks += [meter.torque(p)] if p.c and p.omega_0 else []
+    remarks += filter(None, [meter.torque(p)])
     if data["fluid_inertia"]:
         shifts = ", ".join(
             f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "
@@ -198,11 +199,14 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         remarks.append(Text(f"Warning: Re = {', '.join(outside)}, but {law}.", "yellow"))
     return [
         *first,
-        head,
-        groups,
+        *answer,
+        "",
         pages.table("Thresholds", limits, justify="left"),
         shown,
         *remarks,
+        "",
+        head,
+        groups,
     ]
 
 

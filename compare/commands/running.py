@@ -55,6 +55,7 @@ def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
     """The run of a ball that the options of `add_engine`, `add_start`, `add_samples` and ``--time``
     describe."""
+    args.engine.check_set(p)
     chosen = settings(args, p)
     step = getattr(chosen, "timestep", None) or 0.0
     check_number("time", args.time or step, "s", Range(step), "to hold a time step it")

@@ -67,6 +67,8 @@ class Engine:
     """Packages whose sources determine the results."""
     stands_on: tuple[str, ...]
     """Packages whose versions do."""
+    torque: bool = False
+    """Whether it takes `Parameters.fluid_torque`."""
     needs: Library | None = None
     """An optional library that it needs; the version of that is one of `versions`."""
     title: str = ""
@@ -87,6 +89,14 @@ class Engine:
     def missing(self) -> str:
         """Why the engine can't run on this machine; empty if it can."""
         return self.needs.missing if self.needs else ""
+
+    def check_set(self, p: Parameters) -> None:
+        """`InputError` for a set with what the engine leaves out."""
+        if p.fluid_torque and not self.torque:
+            those = ", ".join(name for name, each in ENGINES.items() if each.torque)
+            raise InputError(
+                f"fluid_torque = {p.fluid_torque:g} s-1: {self.name} leaves it out; {those} don't"
+            )
 
     def check(self) -> None:
         """`InputError` if the engine can't run on this machine."""
@@ -192,6 +202,7 @@ MUJOCO = Engine(
     stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
+    torque=True,
     title="MuJoCo with corrections between its steps",
     about="they make rigid stationary states exact by construction; measured at two time steps of "
     "at most 4 and 2 ms",
@@ -243,6 +254,7 @@ MOREAU = replace(
     EVENT,
     name="time-stepping",
     options=("timestep", "rtol", "restitution"),
+    torque=True,
     configure=lambda given, p: analytic.Settings(method="time-stepping", **given),  # type: ignore[arg-type]
     simulate=partial(_theory, "time-stepping"),
     mark="^",

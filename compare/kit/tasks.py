@@ -120,6 +120,7 @@ def deadline(limit: float) -> Callable[[], None]:
 def carry_out(task: Task, check: Callable[[], None] = lambda: None) -> Trajectory:
     """Run a task, calling `check` from time to time; a run that breaks down has its failure in the
     header."""
+    task.simulator.check_set(task.parameters)
     if simulate := task.simulator.simulate:
         return simulate(task, lambda done: check())
     return _start_stream(task, progress=lambda done: check()).trajectory()

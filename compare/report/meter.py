@@ -22,10 +22,10 @@ SYMBOLS = {"mu": "μ", "eta": "η", "rho_b": "ρ_b", "rho_f": "ρ_f", "nu_f": "�
 SYMBOLS |= {key: QUANTITIES[key].symbol for key in THRESHOLDS}
 UNITS = {"r": "m", "R": "m", "rho_b": "kg/m³", "rho_f": "kg/m³", "nu_f": "m²/s", "gravity": "m/s²"}
 MEANING = {
-    "omega_01": "two-point rolling becomes two-point slipping (P3)",
-    "omega_02": "the wall begins to carry the ball (P2; NF2 where η < j)",
-    "omega_03": "the floor lets go of the rolling ball (NT1)",
-    "omega_04": "two-point slipping ends in a fold (F)",
+    "omega_01": "two-point rolling becomes two-point slipping",
+    "omega_02": "the wall begins to carry the ball",
+    "omega_03": "the floor lets go of the rolling ball",
+    "omega_04": "two-point slipping ends in a fold",
     "eta_cr": "least wall friction for which there is a fold",
 }
 """What happens at a threshold."""
@@ -39,37 +39,28 @@ def model_warning(off: float) -> list[str]:
         return []
     return [
         "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the "
-        "fluid's torque on "
-        f"the spinning ball, changes its numbers by up to {100 * off:.0f} %, more than "
-        f"{100 * real_fluid.LIMIT:g} %: "
-        "all that follows may be off by as much."
+        f"fluid's torque on the spinning ball, changes its numbers by up to {100 * off:.0f} %."
     ]
 
 
 def torque(p: Parameters) -> str:
-    """In words what the fluid's torque does to a ball that rolls at both points, by Stokes and by
-    boundary layer."""
-    laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
-    stokes_told, layer_told = (
-        f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s "
-        f"({100 * law.shift:+.0f} %), and "
-        f"it would need "
-        f"{f'{rounded(law.friction, most=2)} times' if math.isfinite(law.friction) else 'more than'} "
-        "the friction that there is"
-        for law in laws
+    """In words what the fluid's torque, which theory leaves out, does to a ball that rolls at both
+    points; empty where the fluid isn't known."""
+    if not (p.nu_f or p.fluid_torque) or not (p.c and p.omega_0):
+        return ""
+    laws = {"by Stokes": real_fluid.rolling(p, False)}
+    layer = real_fluid.rolling(p)
+    if p.fluid_torque:
+        laws = {f"at the rate of {p.fluid_torque:g} 1/s that is given": layer}
+    elif layer.Re > 8:
+        laws["with a boundary layer"] = layer
+    told = ", ".join(
+        f"{law.omega_c:.3g} rad/s ({100 * law.shift:+.0f} %) {how}" for how, law in laws.items()
     )
-    how = (
-        "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
-    )
-    said = f"At ω₀ = {p.omega_0:g} rad/s the fluid's torque, which is left out, brakes the spin {how} = {stokes_told}"
-    if layer.Re > 8 and not p.fluid_torque:
-        said += f"; with a boundary layer, as for the spin's Re = {rounded(layer.Re, most=2)}, at {layer_told}"
-    if max(stokes.friction, layer.friction) > 1:
-        said += ". With more than 1 it can't roll at both points"
-    known = p.nu_f or p.fluid_torque
-    return (
-        f"{said}." if known else f"{said}. (This takes c for Stokes' drag: the fluid isn't known.)"
-    )
+    said = f"Left out is the fluid's torque on the spin: the rolling ball's ω_c would be {told}."
+    if max(law.friction for law in laws.values()) > 1:
+        said += " That takes more friction than there is: it would slip."
+    return said
 
 
 AT_WALLS = (

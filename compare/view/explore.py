@@ -25,9 +25,11 @@ from scipy.ndimage import distance_transform_edt
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
+from analytic.flowmeter import real_fluid
 from compare.branches import slipping_curve, stable_ends
 from compare.kit.pages import typeset
 from compare.kit.style import COLOURS
+from compare.report import meter
 from compare.subjects.thresholds.figures import TINTS
 from compare.view import page as motion
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
@@ -198,7 +200,8 @@ def simulated(p: Parameters, start: State) -> Trajectory:
 
 
 def in_words(p: Parameters) -> str:
-    """Thresholds of a set, and the motions to which its ball settles, in a line."""
+    """Whether the model holds, thresholds of a set, and the motions to which its ball settles, in a
+    line."""
     t = bifurcation.thresholds(p)
     parts = [
         f"{symbol} = {at:.4g}"
@@ -209,7 +212,8 @@ def in_words(p: Parameters) -> str:
         f"{each.case.name} at ω_c = {float(each.state.omega_c):.4g}"
         for each in analytic.stable_solutions(p)
     )
-    return f"{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
+    doubts = "".join(f"{doubt} " for doubt in meter.model_warning(real_fluid.model_error(p)))
+    return f"{doubts}{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
 
 
 def serve(p: Parameters, port: int, show: bool) -> None:

@@ -213,6 +213,23 @@ def test_what_is_not_installed_says_what_to_do(name, named, says, tmp_path, monk
     assert not [*tmp_path.iterdir()]
 
 
+def test_the_torque_of_the_fluid_is_refused_by_all_that_leave_it_out(tmp_path, monkeypatch, capsys):
+    """In the words of the command, and before anything is written."""
+    monkeypatch.chdir(tmp_path)
+    leave = [name for name, each in ENGINES.items() if not each.torque and not each.missing]
+    assert {"event", "mujoco-defaults"} <= {*leave}
+    for name in leave:
+        for command in ("simulate", "sweep --vary eta=0.1,0.2", "attractors --random 1 --time 1"):
+            said = refused(capsys, f"{command} --engine {name} --fluid-torque 0.0763")
+            if (command, name) != ("attractors --random 1 --time 1", "event"):
+                assert f"fluid_torque = 0.0763 s-1: {name} leaves it out; mujoco, " in said
+    assert not [*tmp_path.iterdir()]
+    p = P.replace(mu=1.0, eta=1.0, fluid_torque=10 / 3)
+    for name in (name for name, each in ENGINES.items() if each.torque):
+        run = carry_out(task_of(name, p, State(omega_c=0.2 * p.omega_0), 0.5, 2e-3))
+        assert run.omega_c[-1] == pytest.approx(0.2 * p.omega_0, rel=2e-2)
+
+
 def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
     asked = []
     monkeypatch.setattr(

@@ -368,3 +368,9 @@ def test_every_set_has_its_figures_and_a_motion(changes):
     assert explore.with_value(p, "drag", "schiller-naumann").nu_f == explore.OIL
     with pytest.raises(InputError, match="j = 2"):
         explore.with_value(p, "j", 2.0)
+
+
+def test_explore_says_where_the_model_does_not_hold():
+    doubt = "Warning: the paper's model doesn't hold for this fluid."
+    assert explore.in_words(Parameters.named("steel-in-water")).startswith(doubt)
+    assert doubt not in explore.in_words(P)
