@@ -73,8 +73,8 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
 def build(p: Parameters, settings: ContactSettings, shown: bool = False) -> tuple[Any, str]:
     """The scene compiled to an `mujoco.MjModel` of its own, and as the MJCF text that is simulated.
 
-    The model has the textures of the text only if it is to be `shown`: they are 1.7 MB, and no step
-    looks at them.
+    Both have textures only if the scene is to be `shown`: they are 1.7 MB, take most of the time to
+    build it, and no step looks at them.
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
@@ -89,12 +89,12 @@ def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[An
     """`build` from a cache; the model is shared."""
     filled = spec(p, settings)
     try:
-        text = str(filled.to_xml())
         if not shown:
             for texture in list(filled.textures):
                 filled.delete(texture)
             for material in filled.materials:
                 material.textures = [""] * len(material.textures)
+        text = str(filled.to_xml())
         model = filled.compile()
     except ValueError as error:
         raise InputError(

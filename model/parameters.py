@@ -19,6 +19,8 @@ from model import drag as laws
 from model.errors import InputError, StorageError, suggestion
 from model.files import write_text
 
+LARGEST = 1_000_000
+"""Bytes of a TOML file that is read: of more Python makes nothing for seconds."""
 _SETS = Path(__file__).parent / "parameter_sets"
 
 
@@ -331,7 +333,11 @@ Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", "\n    ".j
 def read_toml(path: str | Path) -> dict[str, Any]:
     """What a TOML file holds; raises `StorageError` if it can't be read."""
     try:
-        text = Path(path).read_text("utf-8-sig")
+        with Path(path).open("rb") as file:
+            content = file.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise StorageError(f"cannot read {path}: it has more than {LARGEST / 1e6:g} MB")
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
         return tomllib.loads(text)
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error

@@ -17,10 +17,12 @@ import numpy as np
 from compare.bench.contact_law import Array, Contacts, geom_names, parameters
 from mjsim import Coulomb
 
+USUAL = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95)}
+"""MuJoCo's own values, which a geom has that names none."""
 CHECKS = 3
 """Of the changes that help, so many are tried, after which there is no advice."""
-LINES = 8
-"""Geoms in what is to be pasted."""
+NAMED = 8
+"""Most geoms that are named in what is to be pasted."""
 FAULTS = {
     "creep": ("creep", 1e6, "µm/s"),
     "depth": ("depth", 1e6, "µm"),
@@ -42,6 +44,8 @@ class Change:
     """Predicted."""
     geoms: tuple[str, ...]
     """Of those that touch, the ones to be changed."""
+    own: tuple[str, ...] = ()
+    """Of all that are to be changed, those with a value of their own, which no default reaches."""
     found: float = math.nan
     """Measured, if it was tried."""
 
@@ -52,27 +56,36 @@ class Change:
 
     @property
     def mjcf(self) -> str:
-        """What to paste: an element for the model, or one for each geom."""
-        if self.option not in ("solref", "solimp"):
+        """What to paste: elements for within ``<mujoco>``."""
+        if self.option not in USUAL:
             return f"<option {self.written}/>"
-        more = len(self.geoms) - LINES
-        lines = [f"<geom {self.written}/> <!-- {name} -->" for name in self.geoms[:LINES]]
-        return "\n".join([*lines, *([f"<!-- and {more} more geoms -->"] if more > 0 else [])])
+        default = f"<default><geom {self.written}/><pair {self.written}/></default>"
+        if not self.own:
+            return default
+        more = f" and {len(self.own) - NAMED} more" if len(self.own) > NAMED else ""
+        names = ", ".join(self.own[:NAMED]).replace("--", "- -")
+        return f"{default}\n<!-- and where it is set now, at {names}{more} -->"
 
 
 def remedy_code(model: Any) -> str:
-    """Lines of Python that hold the contacts of a model which no option holds."""
-    integrator = mujoco.mjtIntegrator
-    two_halves = model.opt.integrator not in (integrator.mjINT_RK4, integrator.mjINT_DISCRETE)
-    other = "" if two_halves else "model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST\n"
-    return f"{other}coulomb = mjsim.Coulomb(model)\ncoulomb.step(data)  # in the place of mujoco.mj_step(model, data)"
+    """Lines of Python that hold the contacts of a `model` which no option holds, and step its
+    `data`."""
+    lines = []
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
+        lines.append("model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST")
+    if model.opt.noslip_iterations:
+        lines.append("model.opt.noslip_iterations = 0")
+    lines.append("coulomb = mjsim.Coulomb(model)")
+    lines.append("coulomb.step(data)  # in the place of mujoco.mj_step(model, data)")
+    return "\n".join(lines)
 
 
 def remedied(model: Any, data: Any) -> tuple[Any, Any, Callable[[Any, Any, int], None]]:
     """A copy of a model and its data, and a function that steps them as `remedy_code` does."""
     twin = copy.copy(model)
-    if "integrator" in remedy_code(model):
+    if twin.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
         twin.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    twin.opt.noslip_iterations = 0
     twin.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     state = mujoco.MjData(twin)
     mujoco.mj_copyData(state, twin, data)
@@ -156,7 +169,8 @@ def best_change(
         softness = [(model.geom_solref, model.geom_solimp) for model in (scene.model, other)]
         differ = np.any([(old != new).any(1) for old, new in zip(*softness, strict=True)], axis=0)
         geoms = tuple(names[g] for g in np.unique(c.geoms) if differ[g])
-        tried.append((left, harms, Change(option, value, pair, what, now, then, geoms), other))
+        own = tuple(names[g] for g in _with_own_values(scene.model, option) if differ[g])
+        tried.append((left, harms, Change(option, value, pair, what, now, then, geoms, own), other))
     cures = [each for each in tried if each[0] <= 1]
     helps = [each for each in tried if 1 < each[0] < harm[what] / 1.4]
     helps.sort(key=lambda each: (each[0], max(1, float(each[1][what].max()))))
@@ -164,6 +178,14 @@ def best_change(
         if calm(other):
             return best, harms
     return None, scene.harm(c)
+
+
+def _with_own_values(model: Any, option: str) -> list[int]:
+    """Geoms that name an option of softness themselves, or by their class."""
+    if option not in USUAL:
+        return []
+    values = getattr(model, f"geom_{option}")[:, :2]
+    return [int(geom) for geom in np.flatnonzero((values != USUAL[option]).any(1))]
 
 
 def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:

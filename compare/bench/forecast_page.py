@@ -141,11 +141,34 @@ def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
     return [[*itertools.compress(row, there)] for row in rows]
 
 
-def snippets(f: Forecast) -> list[tuple[str, str]]:
-    """Text to paste into the model or program that makes it better, each with what it is: MJCF or
-    Python."""
-    mjcf = [("MJCF", f.change.mjcf)] if f.change else []
-    return mjcf + ([("Python", f.remedy)] if f.remedy else [])
+def snippets(f: Forecast, file: str) -> list[tuple[str, str]]:
+    """What makes a model's file better: what it is, and text to paste into the MJCF, or a program
+    of Python."""
+    mjcf = [("MJCF, within <mujoco>", f.change.mjcf)] if f.change else []
+    program = f"""\
+import mujoco
+import mjsim
+
+model = mujoco.MjModel.from_xml_path({file!r})
+data = mujoco.MjData(model)
+{f.remedy}"""
+    return mjcf + ([("Python", program)] if f.remedy else [])
+
+
+LEGEND = (
+    "Creep: speed at which what should rest slides on; turning: the same of spinning and rolling "
+    "friction. Depth: how far bodies sink into one another. Each is predicted from the load of a "
+    "contact and its parameters; found: measured beside it, from where bodies are after the next "
+    "tenth of a second, or a second where speeds still change.",
+    "Cone: share of the friction that a contact can bear which it needs; beyond 100 % it slides. "
+    "Short: share of Coulomb's friction that the pyramid lacks in the direction of the load or "
+    "slip. "
+    "Hover: slip speed from which a sliding contact is lost again and again. Step: largest time "
+    "step at which small motions die out; “any” if it is a second or more.",
+    f"–: it slides, moves on, or has no such friction. A contact that bears less than {FAINT:.1%} "
+    "of the weight of its lighter body counts as none. #2: a geom without a name, by its number.",
+)
+"""What the columns of the tables mean."""
 
 
 def html(f: Forecast, after: Forecast | None, held: Forecast | None, file: str) -> str:
@@ -154,7 +177,7 @@ def html(f: Forecast, after: Forecast | None, held: Forecast | None, file: str) 
     said = {
         "file": file,
         "sentences": list(sentences(f)),
-        "paste": snippets(f),
-        "faint": f"{FAINT:.1%}",
+        "paste": snippets(f, file),
+        "legend": LEGEND,
     }
     return pages.render("compare.bench", "forecast.html", tables=shown, **said)

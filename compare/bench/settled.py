@@ -26,6 +26,8 @@ Advance = Callable[[Any, Any, int], None]
 STEADY, STILL = 2e-3, 1e-8
 """A speed that changes by less than this share, or by this (m/s), from one window to the next has
 settled."""
+MOST_POINTS = 25_000_000
+"""Of a heightfield or texture: 5000 by 5000, some 200 MB while it is compiled."""
 NOISE = 1e-6
 """Speeds that are not told apart, m/s."""
 RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
@@ -61,8 +63,8 @@ class Rest:
 def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     """A model and its state, at a keyframe by name or number.
 
-    Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it has no
-    such keyframe, or its time step is no positive number."""
+    Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it is huge,
+    it has no such keyframe, or its time step is no positive number."""
     if not path.is_file():
         raise StorageError(
             f"cannot read {path}: "
@@ -71,7 +73,9 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     try:
         # MuJoCo takes the bytes of a name as UTF-8, also where Python's file system has another
         # encoding.
-        model = mujoco.MjModel.from_xml_path(os.fsencode(path).decode("utf-8", "surrogateescape"))
+        name = os.fsencode(path).decode("utf-8", "surrogateescape")
+        _check_sizes(mujoco.MjSpec.from_file(name))
+        model = mujoco.MjModel.from_xml_path(name)
         check_number("timestep", model.opt.timestep, "s", POSITIVE)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
@@ -86,6 +90,17 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
             model, data, names.index(keyframe) if keyframe in names else int(keyframe)
         )
     return model, data
+
+
+def _check_sizes(spec: Any) -> None:
+    """`InputError` for what a line of MJCF can ask for and no memory holds."""
+    sizes = {f"heightfield {each.name!r}": (each.nrow, each.ncol) for each in spec.hfields}
+    sizes |= {f"texture {each.name!r}": (each.width, each.height) for each in spec.textures}
+    for what, (rows, columns) in sizes.items():
+        if rows * columns > MOST_POINTS:
+            raise InputError(
+                f"{what} has {rows} x {columns} points; {MOST_POINTS:g} are the most that are taken"
+            )
 
 
 def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:

@@ -119,9 +119,12 @@ def run_forecast(args: argparse.Namespace) -> int:
     if args.output:
         write_text(args.output, forecast_page.html(found, after, held, args.file.name))
     shown: list[Any] = [Text(f"• {line}") for line in forecast_page.sentences(found)]
-    shown += [Text(f"\n{text}") for _, text in forecast_page.snippets(found)]
+    shown += [
+        Text(f"\n{what}:\n{text}") for what, text in forecast_page.snippets(found, args.file.name)
+    ]
     tables = forecast_page.tables(found, after, held)
     shown += [Text(""), *(pages.table(title, rows, **LOOK) for title, rows in tables)]
+    shown += [Text(text, "dim") for text in forecast_page.LEGEND]
     options.show({"before": found, "after": after, "held": held}, args.json, *shown)
     said = [f"{args.file}: {found.unsettled}"] if found.unsettled else []
     limits = ("creep", "m/s", args.max_creep), ("depth", "m", args.max_depth)

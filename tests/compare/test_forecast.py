@@ -327,7 +327,9 @@ ADVISED = [name for name in SCENES | DEEP if name != "slope, noslip"]
 @pytest.mark.parametrize(
     "scene", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in ADVISED]
 )
-def test_advice_does_what_it_says(scene):
+def test_advice_does_what_it_says(scene, tmp_path, monkeypatch):
+    """What is to be pasted is an element of MJCF that does the same, and a program that runs."""
+    monkeypatch.chdir(tmp_path)
     model, data, found = settled((SCENES | DEEP)[scene])
     found, after, held = forecast.follow_advice(model, data, found, 10.0)
     assert after
@@ -335,11 +337,22 @@ def test_advice_does_what_it_says(scene):
     assert change
     assert change.found == pytest.approx(change.after, rel=0.2)
     assert change.found < change.before / 1.4
+    text = (SCENES | DEEP)[scene].replace("<worldbody>", f"{change.mjcf}<worldbody>", 1)
+    pasted = mujoco.MjModel.from_xml_string(text)
+    names = [f"{kind}_{change.option}" for kind in ("geom", "pair")]
+    for name in names if hasattr(model, names[0]) and not change.own else ():
+        np.testing.assert_allclose(getattr(pasted, name), getattr(model, name))
+    for name in [change.option] if hasattr(model.opt, change.option) else ():
+        assert getattr(pasted.opt, name) == getattr(model.opt, name)
     assert (
         bool(found.remedy)
         == bool(held)
         == (max(pair.creep for pair in after.pairs) > forecast.CREEP)
     )
+    if held:
+        (tmp_path / "scene.xml").write_text((SCENES | DEEP)[scene])
+        exec(dict(forecast_page.snippets(found, "scene.xml"))["Python"], names := {})
+        assert names["data"].time == names["model"].opt.timestep
     for pair in held.pairs if held else ():
         assert pair.creep == 0
         assert pair.creep_measured < 1e-3 * forecast.CREEP
@@ -357,6 +370,10 @@ REFUSED = {
     mjcf(SLOPE + ROUND): (1, "still moves: body 'ball' at"),
     mjcf(LEVEL.replace('"/></body>', '" /><joint/></body>')): (2, "MuJoCo refuses it"),
     mjcf(LEVEL, 'timestep="0"'): (2, "scene.xml: timestep = 0 s is out of range: must be > 0"),
+    mjcf(LEVEL, rest='<asset><hfield name="h" nrow="30000" ncol="30000" size="1 1 1 1"/></asset>'): (
+        2,
+        "scene.xml: heightfield 'h' has 30000 x 30000 points; 2.5e.07 are the most",
+    ),
     mjcf(LEVEL, 'timestep="nan"'): (2, "scene.xml: timestep = nan s must be finite"),
 }
 

@@ -177,6 +177,14 @@ def test_a_bad_file_is_one_clear_line(tmp_path, text, says):
     assert "\n" not in str(caught.value)
 
 
+def test_a_file_of_a_million_keys_is_refused_at_once(tmp_path):
+    many = tmp_path / "many.toml"
+    many.write_text("".join(f"k{n} = 1\n" for n in range(100_000)))
+    for path in (many, "/dev/zero"):
+        with pytest.raises(StorageError, match=f"cannot read {path}: it has more than 1 MB"):
+            Parameters.load(path)
+
+
 def test_files_that_cannot_be_read_or_written(tmp_path):
     with pytest.raises(StorageError, match="No such file"):
         Parameters.load(tmp_path / "absent.toml")
