@@ -25,6 +25,7 @@ from model.hdf5 import dataset, reading
 from model.parameters import POSITIVE, check_number
 from model.trajectory import COMPONENTS, columns, component
 
+__tracebackhide__ = True  # pytest shows the test that fails, and what is said of it
 SETTLED_PART = 0.25
 """Last part of a motion, in which it has to have settled."""
 FEWEST, SAMPLES = 10, 10_000_000

@@ -34,7 +34,14 @@ def check_type(name: str, value: object, kind: type | UnionType) -> None:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the known name nearest to `name`, or ``""``."""
-    import difflib  # here, because only a mistake needs it
+    import difflib  # here and below, because only a mistake needs it
+    import unicodedata
 
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f" (did you mean {near[0]!r}?)" if near else ""
+    def plain(text: str) -> str:
+        """In small letters, with Greek ones spelled out."""
+        names = [(letter, unicodedata.name(letter, "").split()) for letter in text.lower()]
+        return "".join(of[-1].lower() if of[:1] == ["GREEK"] else letter for letter, of in names)
+
+    spelled = {plain(each): each for each in known}
+    near = difflib.get_close_matches(plain(name), list(spelled), n=1)
+    return f" (did you mean {spelled[near[0]]!r}?)" if near else ""

@@ -176,6 +176,8 @@ def reading(path: str | Path, remedy: str = "", sealed: bool = True) -> Iterator
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         if isinstance(error, OSError):
             reason = error.strerror or reason
+            if "synchronously" in reason:  # the library tells its own functions
+                reason = "HDF5 finds it damaged"
         elif not isinstance(error, InputError):
             reason = f"it does not hold what it should ({reason})"
         raise StorageError(f"cannot read {path}: {reason}{remedy and f'; {remedy}'}") from error

@@ -17,11 +17,11 @@ import numpy as np
 from compare.bench.contact_law import Array, Contacts, geom_names, parameters
 from mjsim import Coulomb
 
-USUAL = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95)}
-"""MuJoCo's own values, which a geom has that names none."""
+UNNAMED = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95)}
+"""MuJoCo's own values, which a geom has that says nothing of its own."""
 CHECKS = 3
 """Of the changes that help, so many are tried, after which there is no advice."""
-NAMED = 8
+MENTIONED = 8
 """Most geoms that are named in what is to be pasted."""
 FAULTS = {
     "creep": ("creep", 1e6, "µm/s"),
@@ -57,13 +57,13 @@ class Change:
     @property
     def mjcf(self) -> str:
         """What to paste: elements for within ``<mujoco>``."""
-        if self.option not in USUAL:
+        if self.option not in UNNAMED:
             return f"<option {self.written}/>"
         default = f"<default><geom {self.written}/><pair {self.written}/></default>"
         if not self.own:
             return default
-        more = f" and {len(self.own) - NAMED} more" if len(self.own) > NAMED else ""
-        names = ", ".join(self.own[:NAMED]).replace("--", "- -")
+        more = f" and {len(self.own) - MENTIONED} more" if len(self.own) > MENTIONED else ""
+        names = ", ".join(self.own[:MENTIONED]).replace("--", "- -")
         return f"{default}\n<!-- and where it is set now, at {names}{more} -->"
 
 
@@ -182,10 +182,10 @@ def best_change(
 
 def _with_own_values(model: Any, option: str) -> list[int]:
     """Geoms that name an option of softness themselves, or by their class."""
-    if option not in USUAL:
+    if option not in UNNAMED:
         return []
     values = getattr(model, f"geom_{option}")[:, :2]
-    return [int(geom) for geom in np.flatnonzero((values != USUAL[option]).any(1))]
+    return [int(geom) for geom in np.flatnonzero((values != UNNAMED[option]).any(1))]
 
 
 def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:

@@ -52,17 +52,6 @@ ENTRY_MARKS, ENTRY_COLOURS = (
     "osv^DPX*<>phd",
     ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
 )
-CAPTION = (
-    "Errors at the shortest step in units of each case's scales; up to "
-    f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors "
-    f"fall, the median over "
-    "the cases. "
-    "Cost: processor time divided by simulated time at the shortest step, the median. The shortest "
-    "step is 1 ms, of "
-    "MuJoCo on Warp and of Newton's Kamino and VBD 2 ms. A dash: the engine can't express the "
-    "case, and was not tried."
-)
-"""What the numbers are."""
 
 
 def measure(
@@ -123,6 +112,24 @@ def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
     return table
 
 
+def caption(league: Mapping[str, Sequence[Result]]) -> str:
+    """What the numbers are."""
+    engines: dict[float, list[str]] = {}
+    for name, results in ranked(league).items():
+        for step in {result.steps[-1] for result in results if result.steps}:
+            engines.setdefault(step, []).append(name)
+    steps = [f"{1e3 * step:g} ms ({', '.join(names)})" for step, names in sorted(engines.items())]
+    if len(steps) == 1:
+        steps = [steps[0].partition(" (")[0]]
+    return (
+        "Errors at the shortest step in units of each case's scales; up to "
+        f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors "
+        "fall, the median over the cases. Cost: processor time divided by simulated time at the "
+        f"shortest step, the median. The shortest step is {' or '.join(steps)}. A dash: the engine "
+        "can't express the case, and was not tried."
+    )
+
+
 def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
     """Engines that were tried in some case; those that pass the largest share first, as they come
     behind all others."""
@@ -156,9 +163,9 @@ def number(value: float, floor: float) -> str:
 
 
 def declarations(league: Mapping[str, Sequence[Result]]) -> Rows:
-    """What each engine that was tried declares, its worst case and why; `notes` say why others were
-    not."""
-    table = [["engine", "version", "declared", "worst case", "why"]]
+    """What each engine that was tried declares, its worst case, and what its adapter says that it
+    does worst; `notes` say why others were not tried."""
+    table = [["engine", "version", "declared", "worst case", "known to do worst"]]
     for name, results in league.items():
         if tried := [result for result in results if not result.skipped]:
             worst = max(tried, key=lambda r: r.error if math.isfinite(r.error) else math.inf)
@@ -214,7 +221,11 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
     from compare.kit import style
 
     kinds = {case.name: case.kind for case in cases()}
-    shown = {name: [r for r in results if r.errors] for name, results in ranked(league).items()}
+    shown = {
+        name: there
+        for name, results in ranked(league).items()
+        if (there := [r for r in results if np.isfinite(r.errors).any()])
+    }
     families = list(dict.fromkeys(name.removesuffix("-defaults") for name in shown))
     figure, panels = style.panels(9.0, 4.4 + 0.19 * len(shown), 2, 2, sharex=True, sharey=True)
     for axes, each in zip(panels.ravel(), KINDS, strict=True):
@@ -244,7 +255,8 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
         axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)
     shared = panels[0, 0]
-    for axis, limit in ((shared.xaxis, shared.set_xlim), (shared.yaxis, shared.set_ylim)):
+    axes_with_data = ((shared.xaxis, shared.set_xlim), (shared.yaxis, shared.set_ylim))
+    for axis, limit in axes_with_data if shown else ():
         low, high = np.log10(axis.get_view_interval())
         limit(10 ** np.floor(low), 10 ** np.ceil(high))  # whole decades, each with its number
         axis.set_minor_formatter(NullFormatter())

@@ -72,7 +72,7 @@ def run_league(args: argparse.Namespace) -> int:
         },
         "about": league.declarations(found),
         "notes": list(league.notes(found)),
-        "caption": league.CAPTION,
+        "caption": league.caption(found),
         "least": f"{league.LEAST:g}",
     }
     pictures, shown["letters"] = embedded({"": svg(league.draw(found))})
@@ -86,7 +86,7 @@ def run_league(args: argparse.Namespace) -> int:
     head = [name.replace("-", "- ") for name in rows[0]]  # which may be broken there
     tables = {"League": summary, "Errors by case": [head, *rows[1:]]}
     drawn = (pages.table(title, own, no_wrap=True, padding=0) for title, own in tables.items())
-    options.show(data, args.json, *drawn, league.CAPTION)
+    options.show(data, args.json, *drawn, shown["caption"])
     if not args.json:
         print(f"page: {args.output / LEAGUE_PAGE}")
     return 0

@@ -15,9 +15,10 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import NoReturn
 
-from compare.commands import signals
+from compare.commands import signals, waiting
 from compare.kit import pages
 from model import InputError, SimulationError
 from model.files import leave
@@ -99,6 +100,8 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
         re.sub(r"^--[\w-]+", lambda option: option[0].replace("_", "-"), word) for word in words
     ]
     words = words or ["--help"]
+    if words[0] == "help":
+        words = [*words[1:2], "--help"]
     if words == ["--version"]:
         print(f"dualball {version('dualball')}")
         return 0
@@ -111,5 +114,7 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
         "dualball",
         *(word.strip() for word in words),
     ]  # a page says with what it was written
-    with options.no_empty_directories(args), signals.raised():
+    own = hasattr(args, "quiet") or getattr(args, "view", False) or args.run == "look.explore"
+    telling = nullcontext() if own or getattr(args, "json", False) else waiting.told(words[0])
+    with options.no_empty_directories(args), signals.raised(), telling as args.tell:
         return int(run(args))

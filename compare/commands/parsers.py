@@ -371,7 +371,7 @@ def cases(parser: Parser) -> None:
 @command("contacts and engines", "bench.run_league", "--quick")
 def league(parser: Parser) -> None:
     """All installed engines on the exact cases, as they come and in the best settings known."""
-    parser.add_argument("--quick", action="store_true", help="one time step")
+    parser.add_argument("--quick", action="store_true", help="one time step of 2 ms")
     named = (
         "only this one (repeatable), or a module of your own: siconos, mujoco-plain, NAME or "
         f"NAME-defaults of {options.FOREIGN}, mujoco, mujoco-warp, newton-xpbd; newton-kamino, "

@@ -136,14 +136,6 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         return meter.rounded(value, off, most)
 
     first = [Text(doubt, "bold yellow") for doubt in meter.model_warning(off)]
-    given = [["", "", ""]]
-    for field in p.quantities():
-        meta, value = field.metadata, f"{getattr(p, field.name):.8g}"
-        given.append([meta["symbol"], f"{value} {readable(meta['unit'])}", meta["meaning"]])
-    look: dict[str, Any] = {"justify": "left", "show_header": False, "box": None}
-    head = pages.table("Parameters", [*given, ["drag", p.drag, "law of drag"]], **look)
-    groups = Text(f"κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}", "dim")
-
     limits = [["", "value", "what happens there"]]
     for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
@@ -205,9 +197,19 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         shown,
         *remarks,
         "",
-        head,
-        groups,
+        *_set(p),
     ]
+
+
+def _set(p: Parameters) -> list[Table | Text]:
+    """The parameters of a set, and its dimensionless groups."""
+    given = [["", "", ""]]
+    for field in p.quantities():
+        meta, value = field.metadata, f"{getattr(p, field.name):.8g}"
+        given.append([meta["symbol"], f"{value} {readable(meta['unit'])}", meta["meaning"]])
+    look: dict[str, Any] = {"justify": "left", "show_header": False, "box": None}
+    head = pages.table("Parameters", [*given, ["drag", p.drag, "law of drag"]], **look)
+    return [head, Text(f"κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}", "dim")]
 
 
 def _complex(value: complex, largest: float, shown: Callable[[float, int], str]) -> str:

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     # The first signal ends the run with its samples, the second without.
     with tempfile.TemporaryDirectory() as scratch, signals.noted() as heard:
         path = args.output or Path(scratch) / "run.h5"
-        failure = store(task, path, stop=lambda: bool(heard))
+        failure = store(task, path, stop=lambda: bool(heard), tell=args.tell or (lambda done: None))
         about = motions.describe(failed_path(path) if failure else path)
         options.show(about, args.json, motions.table(about))
         if args.output and not failure and not args.json:

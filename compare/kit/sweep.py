@@ -90,10 +90,15 @@ class Axis:
         return self.values[0], self.values[1]
 
 
+def check_size(axes: Sequence[Axis], unit: str) -> None:
+    """`InputError` if axes span more than `MOST` points."""
+    check_number("the grid", math.prod(len(axis.points) for axis in axes), unit, Range(1, MOST))
+
+
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
     """Every combination of the axes' values, the last axis fastest; `InputError` if there are more
     than `MOST`."""
-    check_number("the grid", math.prod(len(axis.points) for axis in axes), "runs", Range(1, MOST))
+    check_size(axes, "runs")
     for values in itertools.product(*(axis.points for axis in axes)):
         yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))
 

@@ -106,35 +106,40 @@ class Task:
         return self.simulator.stream is not None and self.steps > LONG
 
 
-def deadline(limit: float) -> Callable[[], None]:
-    """A function that raises `TimeoutError` once more than `limit` s of real time have passed."""
+def deadline(limit: float) -> Callable[[float], None]:
+    """A function of the fraction done that raises `TimeoutError` once more than `limit` s of real
+    time have passed."""
     start = time.monotonic()
 
-    def check() -> None:
+    def check(done: float) -> None:
         if time.monotonic() - start > limit:
             raise TimeoutError(f"it took longer than {limit:g} s")
 
     return check
 
 
-def carry_out(task: Task, check: Callable[[], None] = lambda: None) -> Trajectory:
-    """Run a task, calling `check` from time to time; a run that breaks down has its failure in the
-    header."""
+def carry_out(task: Task, check: Callable[[float], None] = lambda done: None) -> Trajectory:
+    """Run a task, calling `check` from time to time with the fraction done; a run that breaks down
+    has its failure in the header."""
     task.simulator.check_set(task.parameters)
     if simulate := task.simulator.simulate:
-        return simulate(task, lambda done: check())
-    return _start_stream(task, progress=lambda done: check()).trajectory()
+        return simulate(task, check)
+    return _start_stream(task, progress=check).trajectory()
 
 
 def store(
-    task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False
+    task: Task,
+    path: Path,
+    limit: float = math.inf,
+    stop: Callable[[], bool] = lambda: False,
+    tell: Callable[[float], None] = lambda done: None,
 ) -> str:
     """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 
     A run that breaks down is kept under `failed_path`, until one into the same file is whole.
     Samples of MuJoCo go to the file as they come, and a run of more than `LONG` steps keeps a
     journal, from which it goes on after having been killed. Once `stop` says so, a run ends as if
-    it had broken down, but MuJoCo's keeps its journal.
+    it had broken down, but MuJoCo's keeps its journal. `tell` is called with the fraction done.
 
     Raises
     ------
@@ -146,8 +151,9 @@ def store(
     check = deadline(limit)
     if task.simulator.simulate:
 
-        def check_stop() -> None:
-            check()
+        def check_stop(done: float) -> None:
+            check(done)
+            tell(done)
             if stop():
                 raise InterruptedError("interrupted")
 
@@ -158,7 +164,7 @@ def store(
         journal = Journal(journal_path(task, path)) if task.long else None
         earlier, state = journal.recall() if journal else (iter(()), {})
         try:
-            under_way = _start_stream(task, state=state)
+            under_way = _start_stream(task, state=state, progress=tell)
         except InputError:  # there is nothing to go on with
             if journal:
                 journal.discard()
@@ -168,7 +174,7 @@ def store(
             for block in earlier:
                 writer.append(block)
             for block in under_way:
-                check()
+                check(0.0)
                 writer.append(block)
                 if journal:
                     journal.note(block, under_way.state())

@@ -12,6 +12,7 @@ import errno
 import json
 import socket
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -41,6 +42,8 @@ REST, PATIENCE = 0.3, 3600.0
 """How long nothing is moved before the motion is simulated anew, s, and a tab is kept that doesn't
 answer: a browser that is busy for seconds, as with 3-D without a graphics card, would begin with
 the first set again."""
+FETCHED = 60.0
+"""How long a page is kept that no browser connects to, s."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
 SLIDERS: dict[str, tuple[str, float, float, float]] = {
@@ -223,9 +226,11 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     Raises `InputError` if NiceGUI, an extra, isn't installed, or the port is in use.
     """
     try:
-        from nicegui import app, ui
+        from nicegui import Client, app, ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware
         from starlette.responses import HTMLResponse
+
+        from compare.view import guard
     except ImportError as error:
         raise InputError("explore needs NiceGUI: pip install 'dualball[explore]'") from error
     with socket.socket() as tried:
@@ -242,12 +247,24 @@ def serve(p: Parameters, port: int, show: bool) -> None:
             raise InputError(f"port {port} {why}; choose another one by --port") from error
     scene = motion.write(p, 1.0)
     app.add_route("/motion", lambda _: HTMLResponse(scene))
+    connected = set[str]()
+    app.on_connect(lambda client: connected.add(client.id))
+
+    def forget() -> None:
+        """Delete tabs that nobody looks at: of a page that was fetched and never opened."""
+        for client in [*Client.instances.values()]:
+            if client.id not in connected and time.time() - client.created > FETCHED:
+                client.delete()
+
+    app.timer(FETCHED / 6, forget)
+    app.add_middleware(guard.OwnOrigin)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
     quiet: dict[str, Any] = {
         "reload": False,
         "show_welcome_message": False,
         "reconnect_timeout": PATIENCE,
+        "http": guard.Prompt,
     }
     ui.run(partial(page, p), host=HOST, port=port, title="dualball", show=show, **quiet)
 

@@ -329,6 +329,8 @@ def test_every_command_is_in_the_tutorial_and_claims_and_parameters_are_listed_o
         ("basins --across y=0:1:2 --up h=0:99:2 --results new/map", "h = 99 m is out of range"),
         ("basins --across y=0:1:2 --up h=0:0.01:2 --c 0", "there are no basins"),
         ("simulate --tme=3 --omega-0 5", "there is no option '--tme' (did you mean '--time'?)"),
+        ("predict --μ 0.3", "there is no option '--μ' (did you mean '--mu'?)"),
+        ("simulate --engine MuJoCo", "no engine is called 'MuJoCo' (did you mean 'mujoco'?)"),
         ("predict extra", "'extra' is one argument too many"),
         (
             "sweep --vary eta=0.1,0.2 --workers 1e5",

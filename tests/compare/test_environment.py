@@ -1,8 +1,10 @@
 """The program works in environments that are not a developer's: encodings, backends, closed
 outputs, no home."""
 
+import ast
 import codecs
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -48,7 +50,7 @@ def test_any_encoding(here, encoding):
     shown = done.stdout.decode(encoding)
     assert ("omega01" in shown) is (encoding != "utf-16")
     codecs.register_error("spelled", pages.spell_out)
-    assert "ω₀₁Ωω̃²√±…é \udcff✓".encode("ascii", "spelled") == b"omega01Omegaomega2sqrt +-...e ??"
+    assert "ω₀₁Ωω̃²√±…é \udcff✓".encode("ascii", "spelled") == b"omega01Omega omega2sqrt +-...e ??"
 
 
 def test_any_backend_and_no_home(here):
@@ -99,6 +101,18 @@ def test_closed_outputs_take_nothing_with_them(here, closed):
     )
     assert storage.load(path).complete
     assert dualball(here, "predict", "--nonsense", before=closed).returncode == 2
+
+
+def test_make_installs_all_that_readme_imports():
+    code = re.findall(
+        r"^```python\n(.*?)^```", (ROOT / "README.md").read_text("utf-8"), re.M | re.S
+    )
+    nodes = [node for each in code for node in ast.walk(ast.parse(each))]
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    locked = re.findall(r"^([\w-]+)==", (ROOT / "requirements.lock").read_text("utf-8"), re.M)
+    assert "xarray" in names
+    assert names <= {*locked, "analytic", "mjsim"}
+    assert "h5netcdf" in locked  # by which xarray reads
 
 
 def test_a_directory_in_which_nothing_can_be_written(monkeypatch, capsys):

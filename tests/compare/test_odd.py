@@ -414,3 +414,10 @@ def test_a_page_of_somebody_else_is_left_alone(command, name, tmp_path, capsys):
     (tmp_path / name).write_text("mine")
     assert f"{name} is not of this program" in refused(capsys, *command.split(), "-o", tmp_path)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_plane_of_too_many_starts_is_refused_at_once(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    said = refused(capsys, "basins --across omega_c=0:50:100000 --up y=0:0.01:100000")
+    assert "the grid = 1e+10 starts is out of range: must be >= 1 and <= 100000" in said
+    assert not [*tmp_path.iterdir()]

@@ -96,6 +96,26 @@ def test_tracking(theory):
         assert_tracks(theory, theory, quantity="omega_x", rms=1.0)
 
 
+def test_pytest_shows_the_test_that_fails_and_no_line_of_ours(pytester):
+    pytester.makepyfile(
+        """
+        import numpy as np
+        from compare.testing import assert_tracks
+
+        def test_mine():
+            t = np.linspace(0, 1, 50)
+            assert_tracks((t, t), (t, 1 + t), rms=1e-3)
+
+        def test_bad():
+            assert_tracks(([0, 1], [0, np.nan]), ([0, 1], [0, 1]), rms=1e-3)
+        """
+    )
+    shown = pytester.runpytest("-p", "no:cacheprovider").stdout.str()
+    assert "omega_c of the motion does not track the motion: rms" in shown
+    assert "omega_c is nan in sample 1" in shown
+    assert "testing.py" not in shown
+
+
 def test_the_doubt_is_what_interpolation_adds(theory):
     """Both are the same motion after its kinks: all that there is comes from interpolation."""
     here, there = ((theory.time[begin::4], theory.omega_c[begin::4]) for begin in (300, 301))

@@ -344,6 +344,33 @@ def test_nobody_else_is_served(address, capsys):
     assert f"port {port} is in use; choose another one by --port" in said
 
 
+@pytest.mark.parametrize("path", ["", "motion", "_nicegui_ws/socket.io/?EIO=4&transport=polling"])
+def test_pages_of_other_sites_are_not_answered(address, path):
+    own, foreign = address.strip("/"), ("http://example.org", "null", "http://127.0.0.1:1")
+    for origin, answer in [(own, 200), *((each, 403) for each in foreign)]:
+        asked = urllib.request.Request(address + path, headers={"Origin": origin})
+        try:
+            got = urllib.request.urlopen(asked, timeout=10)
+        except urllib.error.HTTPError as error:
+            got = error
+        assert got.status == answer, origin
+        assert answer == 200 or "access-control-allow-origin" not in got.headers
+    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Origin": "http://example.org"}
+    upgrade |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="}
+    url = f"{address}_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(urllib.request.Request(url, headers=upgrade), timeout=10)
+
+
+@pytest.mark.slow
+def test_who_is_slow_with_headers_is_not_waited_for(address):
+    guard = pytest.importorskip("compare.view.guard")
+    port = int(address.strip("/").rsplit(":", 1)[1])
+    with socket.create_connection(("127.0.0.1", port), timeout=3 * guard.HEADERS) as slow:
+        slow.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n")
+        assert slow.recv(100) == b""  # closed
+
+
 def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "nicegui", None)
     with pytest.raises(InputError, match=r"pip install 'dualball\[explore\]'"):

@@ -3,6 +3,7 @@ cases."""
 
 import json
 import os
+import re
 import time
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -137,6 +138,19 @@ def test_what_is_not_installed_says_what_to_do(tmp_path, monkeypatch, capsys):
         said = refused(capsys, f"league --engine mujoco --engine {name} -o {tmp_path / 'lost'}")
         assert said == f"dualball: error: {says}\n"
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("state", ["[numpy.full(3, numpy.nan)] * 3", "os._exit(3)", "1 / 0"])
+def test_an_adapter_that_gives_nothing_loses_all_cases(state, tmp_path, monkeypatch, capsys):
+    """It has its page all the same."""
+    functions = "build = lambda case, timestep: None; step = lambda n: None; state = lambda: "
+    (tmp_path / "mine.py").write_text(f"import os, numpy; {functions}{state}")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    shown = told(capsys, "league --engine mine --quick --quiet -o out --workers 1")
+    assert re.search(r"mine +f64 +0 of \d\d lost lost lost lost", shown)
+    assert "The shortest step is 2 ms." in shown
+    assert "lost" in (tmp_path / "out" / "league.html").read_text("utf-8")
 
 
 def test_a_league_of_one(tmp_path, capsys):

@@ -50,16 +50,16 @@ def spell_out(error: UnicodeError) -> tuple[str, int]:
     digits as such."""
     assert isinstance(error, UnicodeEncodeError)
     shown = []
-    for letter in error.object[error.start : error.end]:
+    for k, letter in enumerate(error.object[error.start : error.end], error.start + 1):
         name = unicodedata.name(letter, "?").split()
         greek = name[-1].capitalize() if "CAPITAL" in name else name[-1].lower()
         plain = (
             _SIGNS.get(letter)
             or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
         )
-        shown.append(
-            greek if name[0] == "GREEK" else plain or "?" * (not unicodedata.combining(letter))
-        )
+        if name[0] == "GREEK":  # two symbols in a row are two words
+            plain = greek + " " * error.object[k : k + 1].isalpha()
+        shown.append(plain or "?" * (not unicodedata.combining(letter)))
     return "".join(shown), error.end
 
 

@@ -22,7 +22,7 @@ from analytic.simulation.settings import start_state
 from compare.kit.campaign import Campaign
 from compare.kit.engines import MUJOCO
 from compare.kit.statistics import hops_on
-from compare.kit.sweep import Axis
+from compare.kit.sweep import Axis, check_size
 from compare.kit.tasks import Task
 from mjsim import ContactSettings
 from model import Case, Contact, InputError, Parameters, State
@@ -106,6 +106,7 @@ def basins(
     check_names((*start, across.name, up.name), VARIABLES, "state variable")
     if across.name == up.name:
         raise InputError(f"across and up are both {up.name}: a plane needs two state variables")
+    check_size(plane, "starts")
     if p.c == 0:
         raise InputError("c = 0 1/s: without drag a ball doesn't settle, and there are no basins")
     x, y, lasts = np.array(across.points), np.array(up.points), 10.0 / p.c
