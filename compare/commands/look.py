@@ -18,13 +18,13 @@ def figures(args: argparse.Namespace) -> int:
     from analytic.flowmeter import real_fluid
     from compare import gallery as registry
     from compare import validation  # here, because drawing takes a second to load
-    from compare.report import meter
+    from compare.kit.doubt import model_warning
 
     if args.results and not args.results.is_dir():
         raise InputError(f"cannot read {args.results}: there is no such directory")
     if own := list(options.own_set(args).values()):
         chosen = registry.of_set(*own)
-        for doubt in meter.model_warning(max(map(real_fluid.model_error, own))):
+        for doubt in model_warning(max(map(real_fluid.model_error, own))):
             options.warn(doubt.removeprefix("Warning: "))
     else:
         chosen = registry.of_results(validation.stored_evidence(args.results or Path("results")))

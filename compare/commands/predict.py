@@ -18,6 +18,7 @@ from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from compare.commands import options
 from compare.kit import pages
+from compare.kit.doubt import model_warning
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
 from compare.report import meter
@@ -135,7 +136,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     def to_digits(value: float, most: int) -> str:
         return meter.rounded(value, off, most)
 
-    first = [Text(doubt, "bold yellow") for doubt in meter.model_warning(off)]
+    first = [Text(doubt, "bold yellow") for doubt in model_warning(off)]
     limits = [["", "value", "what happens there"]]
     for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")

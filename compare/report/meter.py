@@ -15,6 +15,7 @@ from analytic.flowmeter.characteristic import End
 from analytic.flowmeter.design import THRESHOLDS, Choice, Design
 from analytic.mechanics import drag
 from compare.kit import pages
+from compare.kit.doubt import model_warning
 from compare.kit.quantities import QUANTITIES
 from model import Parameters
 
@@ -30,17 +31,6 @@ MEANING = {
 }
 """What happens at a threshold."""
 _NONE = "–"
-
-
-def model_warning(off: float) -> list[str]:
-    """The warning that the model leaves out too much of a real fluid, if its error `off` exceeds
-    the limit."""
-    if off <= real_fluid.LIMIT:
-        return []
-    return [
-        "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the "
-        f"fluid's torque on the spinning ball, changes its numbers by up to {100 * off:.0f} %."
-    ]
 
 
 def torque(p: Parameters) -> str:

@@ -28,9 +28,9 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.flowmeter import real_fluid
 from compare.branches import slipping_curve, stable_ends
+from compare.kit.doubt import model_warning
 from compare.kit.pages import typeset
 from compare.kit.style import COLOURS
-from compare.report import meter
 from compare.subjects.thresholds.figures import TINTS
 from compare.view import page as motion
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
@@ -215,7 +215,7 @@ def in_words(p: Parameters) -> str:
         f"{each.case.name} at ω_c = {float(each.state.omega_c):.4g}"
         for each in analytic.stable_solutions(p)
     )
-    doubts = "".join(f"{doubt} " for doubt in meter.model_warning(real_fluid.model_error(p)))
+    doubts = "".join(f"{doubt} " for doubt in model_warning(real_fluid.model_error(p)))
     return f"{doubts}{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
 
 
