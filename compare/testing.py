@@ -35,7 +35,9 @@ UNITS: dict[str, str] = {
 }
 """Units of what a motion may have, by name: the columns of a trajectory, of its forces each
 component."""
-_COLUMNS = {name: (unit, [*(["t"] * (name == "time"))]) for name, unit in UNITS.items()}
+_COLUMNS = {
+    name: (unit, [*(["t"] * (name == "time"))]) for name, unit in UNITS.items() if name != "case"
+}
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,12 +3,16 @@ with units."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from model.errors import InputError, StorageError, suggestion
+from model.files import write_text
 from model.parameters import parse_number
 
 _LABEL = re.compile(r"(?P<name>.*?)\s*(?:[(\[](?P<unit>.*?)[)\]]|\bin (?P<after>.*))?")
@@ -126,3 +130,18 @@ def _in_line(path: str | Path, n: int) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{path}, line {n}: {error}") from error
+
+
+def label(name: str, unit: str) -> str:
+    """The label of a column, as `columns` reads it: ``omega_c (rad/s)``."""
+    return name if unit == "1" else f"{name} ({unit.replace(' s-1', '/s')})"
+
+
+def write(path: Path, columns: Mapping[str, Sequence[Any]]) -> None:
+    """Write columns of numbers and text by their labels as CSV, whole or not at all; raises
+    `StorageError`."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(columns)
+    rows.writerows(zip(*columns.values(), strict=True))
+    write_text(path, text.getvalue())

@@ -10,7 +10,7 @@ from compare import testing
 from compare.commands import options
 from compare.kit import collection, drawing
 from compare.view import motions
-from model import InputError, storage
+from model import InputError, storage, table
 
 
 def figures(args: argparse.Namespace) -> int:
@@ -38,13 +38,18 @@ def figures(args: argparse.Namespace) -> int:
 
 def inspect(args: argparse.Namespace) -> int:
     """Describe what a file of a run or a collection holds."""
-    if gathered := collection.describe(args.file):
+    if gathered := collection.read(args.file):
         if args.plot:
-            raise InputError(f"{args.file} is a collection: only a run can be drawn")
-        options.show(gathered, args.json, collection.table(gathered))
+            drawing.save(collection.draw(gathered), args.plot)
+        if args.table:
+            table.write(args.table, collection.labelled(gathered))
+        told = collection.described(gathered)
+        options.show(told, args.json, collection.shown(told))
         return 0
     if args.plot:
         drawing.save(motions.draw(storage.load(args.file)), args.plot)
+    if args.table:
+        table.write(args.table, motions.labelled(storage.load(args.file)))
     about = motions.describe(args.file)
     options.show(about, args.json, motions.table(about))
     return 0

@@ -161,12 +161,13 @@ class Output:
 
 
 HDF5 = Output("HDF5", (".h5", ".hdf5", ".nc"))
+TABLE = Output("CSV", (".csv",))
 MARKDOWN = Output("Markdown", (".md",))
 PAGE = Output("an HTML page", (".html", ".htm"))
 FIGURE = Output("a figure", (".png", ".svg", ".pdf"))
 MAP = Output("a map", (*FIGURE.suffixes, ".json"))
 FILM = Output("a picture, a film or a page", (".png", ".gif", ".mp4", ".html"))
-ENDINGS = {suffix for each in (HDF5, MARKDOWN, PAGE, MAP, FILM) for suffix in each.suffixes}
+ENDINGS = {suffix for each in (HDF5, TABLE, MARKDOWN, PAGE, MAP, FILM) for suffix in each.suffixes}
 """Names of files end in these."""
 
 

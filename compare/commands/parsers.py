@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from compare.commands import options
-from compare.commands.options import FILM, HDF5, MAP, MARKDOWN, PAGE, Number, Parser
+from compare.commands.options import FILM, HDF5, MAP, MARKDOWN, PAGE, TABLE, Number, Parser
 from model import InputError
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range
@@ -161,7 +161,9 @@ def simulate(parser: Parser) -> None:
 def inspect(parser: Parser) -> None:
     """What a trajectory file holds."""
     parser.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
-    options.add_plot(parser, "the run")
+    options.add_plot(parser, "the run, or what the runs of a collection read")
+    written = "write samples, or the runs of a collection, as a table (default: don't)"
+    parser.add_argument("--table", type=TABLE, help=written)
     options.add_json(parser)
 
 

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,12 +25,15 @@ import analytic
 from compare.kit import pages, steady
 from compare.kit.statistics import settled_case
 from compare.kit.workers import processes
-from model import Case, InputError, Parameters, StorageError, Trajectory, storage
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.files import check_writable
 from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
 from model.trajectory import CONVENTIONS, attributes, columns
 from model.versions import current_versions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SCHEMA, SCHEMA_VERSION = "dualball-collection", 2
 """The first version knew no grids."""
@@ -254,10 +257,15 @@ def varied_parameters(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
 
 def describe(path: Path) -> dict[str, Any]:
     """What a collection or batch holds: names of runs, engines, failures, the range of every
-    column, JSON-able.
+    column, JSON-able; empty for a file that holds a single run. Errors as of `read`."""
+    of = read(path)
+    return described(of) if of else {}
 
-    Empty for a file that holds a single run. Raises `StorageError` for one that is not whole or of
-    a newer version."""
+
+def read(path: Path) -> Columns:
+    """The columns of a collection or batch, a row a run; none of a file that holds a single run.
+
+    Raises `StorageError` for one that is not whole or of a newer version."""
     if path.parent.is_file():  # one run of a batch
         return {}
     with reading(path) as file:
@@ -278,12 +286,44 @@ def describe(path: Path) -> dict[str, Any]:
                         strict=True,
                     )
                 )
-            return described({name: values.ravel() for name, values in of.items()})
+            return {name: values.ravel() for name, values in of.items()}
     if schema not in (MEANS, storage.BATCH):
         return {}
-    return described(
-        {name: values for name, values in _rows(path, path).items() if name not in _HELD}
-    )
+    return {name: values for name, values in _rows(path, path).items() if name not in _HELD}
+
+
+def labelled(of: Columns) -> dict[str, Sequence[Any]]:
+    """The columns as a table has them: units in their labels, cases by name."""
+    about, names = _attributes(), {case.value: case.name for case in Case}
+    rows = {table.label(name, about[name].get("units", "1")): of[name].tolist() for name in of}
+    return rows | {"case": [names.get(code, "") for code in rows["case"]]}
+
+
+def draw(of: Columns) -> Figure:
+    """A figure of omega_c over what varies first, the flow if it does, by case, with theory."""
+    from compare.kit import style  # here, because drawing takes a second to load
+
+    varied = [name for name in varied_parameters(of) if name != "drag"]
+    if not varied:
+        raise InputError("only a collection in which a parameter varies can be drawn")
+    name = "omega_0" if "omega_0" in varied else varied[0]
+    about = {f.name: f.metadata for f in Parameters.quantities()}[name]
+    unit = pages.readable(about["unit"])
+    x, label = of[name], about["symbol"] + f" ({unit})" * bool(unit)
+    figure, axes = style.panels(7, 4.6, 1)
+    axes = np.ravel(axes)[0]
+    axes.plot(x, of["omega_c_theory"], "x", color="0.6", label="theory")
+    for case in Case:
+        of_case = of["case"] == case
+        if of_case.any():
+            axes.errorbar(
+                x[of_case], of["omega_c"][of_case], of["omega_c_uncertainty"][of_case],
+                fmt="o", ms=4, color=style.COLOURS[case], label=case.name,
+            )  # fmt: skip
+    axes.set(xlabel=label, ylabel=f"{style.symbol('omega_c')} (rad/s)")
+    axes.grid(alpha=0.3)
+    style.legend(axes)
+    return figure
 
 
 def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
@@ -322,7 +362,7 @@ def unsettled(about: dict[str, Any]) -> str:
     )
 
 
-def table(about: dict[str, Any]) -> Table:
+def shown(about: dict[str, Any]) -> Table:
     """What `describe` gives as a table for the terminal."""
     ranges, names = about["ranges"], about["names"]
     more = f"\n… and {len(names) - NAMED} more" if len(names) > NAMED else ""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,9 @@ from rich.table import Table
 from compare.kit import pages, steady
 from compare.testing import UNITS, Series, common_times, difference
 from model import Case, Flow, InputError, Parameters, Trajectory, kinematics, storage
+from model import table as storage_table
 from model.kinematics import VARIABLES
+from model.trajectory import FLUID
 
 if TYPE_CHECKING:  # it takes a second to load
     from matplotlib.figure import Figure
@@ -118,6 +121,16 @@ def table(about: dict[str, Any]) -> Table:
         "steady value": in_words(about),
     }
     return pages.pairs(rows | ({"failure": about["failure"]} if about["failure"] else {}))
+
+
+def labelled(run: Trajectory) -> dict[str, Sequence[Any]]:
+    """The samples of a run as a table has them: units in their labels, cases by name."""
+    units = UNITS | {FLUID["name"]: FLUID["units"]}
+    columns = {
+        storage_table.label(name, units[name]): values.tolist()
+        for name, values in run.table().items()
+    }
+    return columns | {"case": [Case(code).name for code in run.case]}
 
 
 def in_words(about: dict[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """What was measured comes back from its files; collections have what varies as coordinates, and
 name what they lack."""
 
+import csv
 import dataclasses
 import json
 import shutil
@@ -15,6 +16,7 @@ from compare.kit import collection, record
 from compare.kit.campaign import Campaign
 from compare.kit.record import Missing, Records
 from compare.kit.tasks import Task
+from compare.testing import assert_tracks
 from model import Flow, InputError, Parameters, StorageError, storage
 from model.hdf5 import column, dataset, reading
 from tests.commands import refused, told
@@ -89,7 +91,7 @@ def test_the_law_of_drag_is_kept(tmp_path):
     )
     about = collection.describe(tmp_path / "all.h5")
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
-    assert collection.table(about).row_count == 7
+    assert collection.shown(about).row_count == 7
     with reading(tmp_path / "all.h5") as file:
         older = {name: column(dataset(file, name)) for name in file if name != "drag"}
     assert collection.described(older)["varied"] == ["nu_f"]
@@ -229,3 +231,26 @@ def test_a_missing_file_is_named_and_an_unknown_quantity_refused(tmp_path):
         record.load(tmp_path / "nothing.h5")
     with pytest.raises(InputError, match="omega_c"):
         measured("settled", "omega_d", 1.0)
+
+
+def test_runs_and_collections_as_tables_and_a_collection_drawn(tmp_path, monkeypatch, capsys):
+    """What is written has units in its head, and is read again."""
+    monkeypatch.chdir(tmp_path)
+    ran(tmp_path / "runs", [P.replace(omega_0=10.0), P.replace(omega_0=20.0), P])
+    told(capsys, "collect runs -o all.h5 --workers 0")
+    told(capsys, "inspect all.h5 --table all.csv --plot curve.svg")
+    head, *rows = csv.reader((tmp_path / "all.csv").read_text("utf-8").splitlines())
+    assert {"run", "omega_0 (rad/s)", "omega_c_uncertainty (rad/s)", "eta", "case"} <= {*head}
+    with reading(tmp_path / "all.h5") as file:
+        flows = sorted(dataset(file, "omega_0")[...].tolist())
+    assert sorted(float(row[head.index("omega_0 (rad/s)")]) for row in rows) == flows
+    assert "theory" in (tmp_path / "curve.svg").read_text("utf-8")
+    told(capsys, "simulate --time 0.1 --engine event -o run.h5")
+    told(capsys, "inspect run.h5 --table run.csv")
+    assert (
+        (tmp_path / "run.csv").read_text("utf-8").startswith("time (s),theta (rad),y (m),v_y (m/s)")
+    )
+    assert_tracks("run.csv", "run.h5", rms=1e-15)
+    ran(tmp_path / "one", [P])
+    told(capsys, "collect one -o one.h5 --workers 0")
+    assert "only a collection in which" in refused(capsys, "inspect one.h5 --plot x.png")

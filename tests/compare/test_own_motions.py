@@ -14,6 +14,7 @@ from compare.testing import assert_settles, assert_tracks, difference, read
 from model import InputError, Parameters, storage
 from tests.commands import told
 
+pytest_plugins = ("pytester",)
 P = Parameters.named("reference").replace(omega_0=25.0)
 
 
