@@ -87,8 +87,8 @@ $(VENV)/installed-engines: requirements-engines.lock $(VENV)/installed
 	@touch $@
 
 lock:
-	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra fast --extra xarray -o requirements.lock
-	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra fast --extra xarray --group dev -c requirements.lock -o requirements-dev.lock
+	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra xarray -o requirements.lock
+	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra xarray --group dev -c requirements.lock -o requirements-dev.lock
 	echo $(ENGINES) | tr ' ' '\n' | uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml - -c requirements.lock -o requirements-engines.lock
 
 clean:

@@ -36,7 +36,7 @@ target of 0. Where mu > 1, sticking and slipping may both obey the law. The solu
 the one near the first guess: with the impulses of the last step the ball goes on rolling until no
 impulses near the present ones hold it.
 
-All on plain floats, and compiled where numba is installed.
+All on plain floats, and compiled.
 """
 
 from __future__ import annotations

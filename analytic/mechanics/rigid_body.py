@@ -1,7 +1,6 @@
 """The ball as a rigid body under gravity, drag and contact forces, whatever its case.
 
-All on plain floats, with parameters p that have the names of `model.Parameters`; compiled where
-numba is installed."""
+All on plain floats, with parameters p that have the names of `model.Parameters`; compiled, too."""
 
 from __future__ import annotations
 

@@ -12,8 +12,8 @@ horizontal motion is kept in complex numbers: position Z = rho e^(i theta), and 
 paper's i, k becomes e^(i theta)(-a + i b); coordinates are their real and imaginary parts. The spin
 about the vertical never changes.
 
-The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J. Compiled
-where numba is installed, like `equations`."""
+The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J.
+Compiled, like `equations`."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def moment(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
     """The state with azimuth and work at a time t, from coordinates z of a case that began at the
     moment `at`.
 
-    Or those at times (m,) from z (n, m). An azimuth off the wall is given up to whole turns.
+    An azimuth off the wall is given up to whole turns.
     """
     if k.case % 3 == AWAY:
         return _moment_off_wall(t, z, at, k)

@@ -1,46 +1,37 @@
-"""Compiling by numba, which the extra `fast` installs."""
+"""Compiling by numba."""
 
 from __future__ import annotations
 
 import gc
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import FunctionType, MappingProxyType, ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, TypeVar
 
-try:
-    import numba
-    from numba.extending import overload, register_jitable
-except ImportError:
-    numba = None
+import numba
+from numba.extending import register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
 _CALLED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-_registered = set[Callable[..., Any]]()
-"""Functions that compiled ones may call."""
+called = set[Callable[..., Any]]()
+"""Functions that compiled ones call."""
 
 
-def compiled(
-    function: F, replaced: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({})
-) -> F:
-    """Compile a function at its first call, for threads to run it at once; without numba it stays
-    as it is.
-
-    So are the functions of `analytic` that it calls, or those by which some of them are `replaced`.
+def compiled(function: F) -> F:
+    """Compile a function at its first call, for threads to run it at once, with the functions of
+    `analytic` that it calls.
 
     Numba keeps what it compiles on disk by name and compiles it again when its own file has
     changed, but not when that of a function has which it calls: the name contains the digest of
     those. Of processes that need it at once one compiles, the others take what it keeps."""
-    if numba is None or numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:
         return function
-    for each, other in replaced.items():
-        overload(each, strict=False, jit_options=_CALLED)(lambda *types, other=other: other)
-    called = _called(function, replaced)
-    for each in called - _registered - {*replaced}:
-        _registered.add(register_jitable(**_CALLED)(each))
-    files = sorted({each.__code__.co_filename for each in called})
+    its_own = _called(function)
+    for each in its_own - called:
+        called.add(register_jitable(**_CALLED)(each))
+    files = sorted({each.__code__.co_filename for each in its_own})
     digest = hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()
     own: Any = FunctionType(
         function.__code__, function.__globals__, function.__name__, function.__defaults__
@@ -72,9 +63,7 @@ def compiled(
     return dispatcher  # type: ignore[no-any-return]
 
 
-def _called(
-    function: Callable[..., Any], replaced: Mapping[Callable[..., Any], Callable[..., Any]]
-) -> set[Callable[..., Any]]:
+def _called(function: Callable[..., Any]) -> set[Callable[..., Any]]:
     """The functions of `analytic` that a function calls, by their names or as those of a module;
     and so on."""
     found, todo = set[Callable[..., Any]](), [function]
@@ -89,8 +78,8 @@ def _called(
             ),
         ]
         for each in (place.get(name) for place in places for name in code.co_names):
-            each = replaced.get(each, each) if isinstance(each, FunctionType) else None
-            if each and each.__module__.startswith("analytic.") and each not in found:
+            ours = isinstance(each, FunctionType) and each.__module__.startswith("analytic.")
+            if ours and each not in found:
                 found.add(each)
                 todo.append(each)
     return found

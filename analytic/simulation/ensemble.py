@@ -60,7 +60,7 @@ def simulate_many(
     quiet: float | None = None,
     threads: int | None = None,
 ) -> Ensemble:
-    """Many runs as by `simulate`, on all cores if numba is installed: each is one compiled call.
+    """Many runs as by `simulate`, on all cores: each is one compiled call.
 
     Parameters
     ----------

@@ -1,5 +1,4 @@
-"""Rates of the coordinates of `charts`, and what ends a case: one text of plain floats, which numba
-compiles.
+"""Rates of the coordinates of `charts`, and what ends a case, on plain floats, compiled by numba.
 
 At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with
 h = 0; away from it both are written in the resting frame. `dynamics` has them for arrays of states,
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 from analytic.mechanics import drag
 from analytic.mechanics.rigid_body import Velocities
 from model import Case
+from model.arrays import Array
 
 RR, RS, RN, SR, SS, SN, NR, NS, NN = (int(case) for case in Case)
 A_STICKS, B_STICKS, A_SLIPS, B_SLIPS, A_LIFTS, B_OPENS, A_LANDS, B_LANDS, RR_ENDS = range(9)
@@ -87,8 +87,8 @@ class Motion(NamedTuple):
     """Natural units: of time, s,"""
     spin: float
     """and of the spin of the ball, rad s-1."""
-    waves: Any
-    """Rows of amplitude, angular frequency and phase, a tuple of tuples or an array (k, 3)."""
+    waves: Array
+    """Rows of amplitude, angular frequency and phase, (k, 3)."""
     line: Line
     case: int
     side: float

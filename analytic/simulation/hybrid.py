@@ -1,9 +1,8 @@
 """Event-driven simulation: each case by its own equations, from one change of case to the next.
 
 `follow` goes along the coordinates of `charts` up to the guard that turns negative first, and
-`transitions` says how to go on. One text: where numba is installed it is compiled with the steps of
-`solvers`, so that a run is one call, which threads can make at once; else, and where those steps
-become too short, it is plain Python with the steps of `integrator`."""
+`transitions` says how to go on. All is compiled together, so that a run is one call, which threads
+can make at once."""
 
 from __future__ import annotations
 
@@ -18,20 +17,13 @@ import numpy.typing as npt
 
 from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import Forces
-from analytic.simulation import charts, compiling, equations, motion, solvers, transitions
+from analytic.simulation import charts, compiling, equations, motion, transitions
 from analytic.simulation.charts import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
-from analytic.simulation.integrator import (
-    DONE,
-    FIRED,
-    STUCK,
-    StalledError,
-    Stretch,
-    first_pace,
-    stretch,
-)
+from analytic.simulation.integrator import StalledError, first_pace, stretch
 from analytic.simulation.motion import Moment, Recorder
 from analytic.simulation.settings import ENDLESS, Settings
+from analytic.simulation.solvers import DONE, FIRED, STUCK, Stretch
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 
@@ -103,6 +95,99 @@ class Record(NamedTuple):
         )
 
 
+def _moment_parts(at: Moment) -> tuple[Any, ...]:
+    """The fields of a moment as a plain tuple."""
+    return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
+
+
+def follow(
+    case: int, at: Moment, until: float, k: Motion, run: Record, steps: int
+) -> tuple[int, Moment]:
+    """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and
+    the moment then."""
+    room = np.empty((6, charts.MOST))
+    k, n = charts.begin(case, at, k, room[0], room[1])
+    z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], charts.count_guards(k)
+    values, arm, level = room[3, :count], room[4, :count], room[5, :count]
+    lands, until = k.fall.landing <= until, min(until, k.fall.landing)
+    equations.guards(at.time, z, k, values)
+    opens, lasts = charts.arm_guards(values, k, arm, level), charts.rebound_time(at, z, k, rate)
+    pace = first_pace(
+        at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0
+    )
+    if run.taken[0] == 0:
+        _keep_sample(at, k, run)
+    of = Stretch(
+        k, until, z, scale, run.times, run.z[: n * len(run.times)].reshape(-1, n), arm, level
+    )
+    why, pace, guard, taken = stretch(of, pace, run.taken[0], steps)
+    near = _keep_samples(of, at, taken, run)
+    now = until if why == DONE else max(pace[0] + pace[1], run.times[taken - 1])
+    run.reached[0] = now
+    if run.stop.over[0]:
+        raise InterruptedError("nobody wants the run any more")
+    if why == STUCK:
+        raise StalledError("steps become too short")
+    fired = charts.ENDS[case][guard] if why == FIRED else A_LANDS if lands and why == DONE else NONE
+    return fired, _with_nearest_azimuth(charts.moment(now, z, at, k), k, near)
+
+
+def _with_nearest_azimuth(at: Moment, k: Motion, near: float) -> Moment:
+    """The same moment; of the azimuths that it may have off the wall that which is nearest to
+    another."""
+    if k.case % 3 != AWAY:
+        return at
+    theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
+    return Moment(at.time, theta, at.x, at.alpha, at.beta, at.work)
+
+
+def _keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
+    """Store samples up to number `taken` of a stretch that began at `at`; return the azimuth at the
+    last, or `at`'s."""
+    near = at.theta
+    for row in range(run.taken[0], taken):
+        m = _with_nearest_azimuth(
+            charts.moment(run.times[row], of.samples[row], at, of.k), of.k, near
+        )
+        near = m.theta
+        _keep_sample(m, of.k, run)
+    return near
+
+
+def _keep_sample(at: Moment, k: Motion, run: Record) -> None:
+    """Store a moment as the next sample."""
+    row = run.taken[0]
+    for i in range(8):
+        run.x[row, i] = at.x[i]
+    run.case[row] = k.case
+    if len(run.path) > 0:
+        path = run.path[row]
+        path[0], path[1], path[2], path[3] = at.theta, at.alpha, at.beta, at.work
+        path[4] = equations.fluid(at.time, k)
+    run.taken[0] += 1
+
+
+def _keep_event(run: Record, at: Moment, case: int, after: int, impulse: Forces) -> None:
+    """Store a change of case or an impact, and count landings."""
+    if max(impulse.A_y, impulse.B_x) > run.stop.blow:
+        run.landings[min(run.taken[0], len(run.times) - 1)] += 1
+        run.reached[1] = _quiet_from(at.time, run.times, run.stop.quiet)
+    if run.taken[1] < len(run.events):
+        event = run.events[run.taken[1]]
+        event[0], event[1], event[2] = at.time, case, after
+        for i in range(6):
+            event[3 + i] = impulse[i]
+        run.taken[1] += 1
+
+
+def _quiet_from(landed: float, times: Array, quiet: float) -> float:
+    """Time of the first sample at which nothing has landed for `quiet` seconds, if nothing does
+    from now on; or inf."""
+    row = np.searchsorted(times, landed + quiet, side="right")
+    return float(times[row]) if row < len(times) else math.inf
+
+
+@compiling.compiled
 def run_through_flow(
     stage: Stage, k: Motion, pieces: Any, run: Record, strides: int, steps: int
 ) -> tuple[Any, ...]:
@@ -147,124 +232,6 @@ def run_through_flow(
     return True, _moment_parts(at), case, begun, at_once
 
 
-def _moment_parts(at: Moment) -> tuple[Any, ...]:
-    """The fields of a moment as a plain tuple."""
-    return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
-
-
-def follow(
-    case: int, at: Moment, until: float, k: Motion, run: Record, steps: int
-) -> tuple[int, Moment]:
-    """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and
-    the moment then."""
-    room = np.empty((6, charts.MOST))
-    k, n = charts.begin(case, at, k, room[0], room[1])
-    z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], charts.count_guards(k)
-    values, arm, level = room[3, :count], room[4, :count], room[5, :count]
-    lands, until = k.fall.landing <= until, min(until, k.fall.landing)
-    equations.guards(at.time, z, k, values)
-    opens, lasts = charts.arm_guards(values, k, arm, level), charts.rebound_time(at, z, k, rate)
-    pace = first_pace(
-        at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0
-    )
-    if run.taken[0] == 0:
-        _keep_sample(at, k, run)
-    of = Stretch(
-        k, until, z, scale, run.times, run.z[: n * len(run.times)].reshape(-1, n), arm, level
-    )
-    why, pace, guard, taken = stretch(of, pace, run.taken[0], steps)
-    near = keep_samples(of, at, taken, run)
-    now = until if why == DONE else max(pace[0] + pace[1], run.times[taken - 1])
-    run.reached[0] = now
-    if run.stop.over[0]:
-        raise InterruptedError("nobody wants the run any more")
-    if why == STUCK:
-        raise StalledError("steps become too short")
-    fired = charts.ENDS[case][guard] if why == FIRED else A_LANDS if lands and why == DONE else NONE
-    return fired, _with_nearest_azimuth(charts.moment(now, z, at, k), k, near)
-
-
-def _with_nearest_azimuth(at: Moment, k: Motion, near: float) -> Moment:
-    """The same moment; of the azimuths that it may have off the wall that which is nearest to
-    another."""
-    if k.case % 3 != AWAY:
-        return at
-    theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
-    return Moment(at.time, theta, at.x, at.alpha, at.beta, at.work)
-
-
-def keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
-    """Store samples up to number `taken` of a stretch that began at `at`; return the azimuth at the
-    last, or `at`'s."""
-    k, these, near = of.k, slice(int(run.taken[0]), taken), at.theta
-    if taken > these.start:
-        t = run.times[these]
-        m = charts.moment(t, of.samples[these].T, at, k)
-        run.x[these], run.case[these], run.taken[0] = m.x.stacked(), k.case, taken
-        if len(run.path):
-            theta = np.unwrap(np.append(near, m.theta))[1:] if k.case % 3 == AWAY else m.theta
-            columns = (
-                theta,
-                m.alpha,
-                m.beta,
-                m.work,
-                [equations.fluid(time, k) for time in t.tolist()],
-            )
-            run.path[these] = np.stack(np.broadcast_arrays(*columns), axis=-1)
-            near = float(run.path[taken - 1, 0])
-    return near
-
-
-def _keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
-    """`keep_samples` in a form that numba compiles."""
-    near = at.theta
-    for row in range(run.taken[0], taken):
-        m = _with_nearest_azimuth(
-            charts.moment(run.times[row], of.samples[row], at, of.k), of.k, near
-        )
-        near = m.theta
-        _keep_sample(m, of.k, run)
-    return near
-
-
-def _keep_sample(at: Moment, k: Motion, run: Record) -> None:
-    """Store a moment as the next sample."""
-    row = run.taken[0]
-    for i in range(8):
-        run.x[row, i] = at.x[i]
-    run.case[row] = k.case
-    if len(run.path) > 0:
-        path = run.path[row]
-        path[0], path[1], path[2], path[3] = at.theta, at.alpha, at.beta, at.work
-        path[4] = equations.fluid(at.time, k)
-    run.taken[0] += 1
-
-
-def _keep_event(run: Record, at: Moment, case: int, after: int, impulse: Forces) -> None:
-    """Store a change of case or an impact, and count landings."""
-    if max(impulse.A_y, impulse.B_x) > run.stop.blow:
-        run.landings[min(run.taken[0], len(run.times) - 1)] += 1
-        run.reached[1] = _quiet_from(at.time, run.times, run.stop.quiet)
-    if run.taken[1] < len(run.events):
-        event = run.events[run.taken[1]]
-        event[0], event[1], event[2] = at.time, case, after
-        for i in range(6):
-            event[3 + i] = impulse[i]
-        run.taken[1] += 1
-
-
-def _quiet_from(landed: float, times: Array, quiet: float) -> float:
-    """Time of the first sample at which nothing has landed for `quiet` seconds, if nothing does
-    from now on; or inf."""
-    row = np.searchsorted(times, landed + quiet, side="right")
-    return float(times[row]) if row < len(times) else math.inf
-
-
-run_compiled = compiling.compiled(
-    run_through_flow, {stretch: solvers.stretch, keep_samples: _keep_samples}
-)
-
-
 @lru_cache
 def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[Motion, Array]:
     """What runs of one ball in one flow share: constants of the motion, and pieces of the flow as
@@ -293,18 +260,16 @@ def carry_out(
     """Simulate a run into new arrays; return these and the error it broke down with, or None;
     `look` sees progress.
 
-    In plain Python where the compiled text isn't there or can't go on.
+    Where the ball hardly leaves what it touches, round-off may stop it: it is then tried once more,
+    with half of the tolerance.
     """
     failure: Exception | None = None
-    for way in dict.fromkeys((run_compiled, run_through_flow)):
-        waves = (
-            k.waves if way is run_through_flow else np.array(k.waves, dtype=float).reshape(-1, 3)
-        )
+    for rtol in (k.rtol, k.rtol / 2):
         run, stage, done = rows(), Stage(start), False
         try:
             while not done:
-                done, (time, theta, x, *rest), *far = way(
-                    stage, k._replace(waves=waves), pieces, run, STRIDES if look else ENDLESS, STEPS
+                done, (time, theta, x, *rest), *far = run_through_flow(
+                    stage, k._replace(rtol=rtol), pieces, run, STRIDES if look else ENDLESS, STEPS
                 )
                 stage = Stage(Moment(time, theta, State(*x), *rest), *far)
                 if look:

@@ -52,9 +52,9 @@ def of_ball(p: Parameters, flow: Flow, settings: Settings) -> Motion:
     leaves = {"slip-stability": equations.STABILITY, "infeasible": equations.FEASIBILITY}[
         settings.leave_rolling
     ]
-    waves = tuple(
-        (amplitude, 2 * math.pi * f, phase) for amplitude, f, phase in flow.waves.tolist()
-    )
+    waves = np.array(
+        [(amplitude, 2 * math.pi * f, phase) for amplitude, f, phase in flow.waves.tolist()]
+    ).reshape(-1, 3)
     return Motion(
         m, r, R, j, mu, eta, g, c, law, p.drag == STOKES, float(settings.rtol), float(settings.restitution), leaves,
         unit, R / (unit * r), waves, line_of(flow, 0.0), int(Case.NN), 0.0, equations.NO_FALL,

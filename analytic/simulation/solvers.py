@@ -1,7 +1,7 @@
-"""Steps through one case, compiled by numba, and the moments at which it ends.
+"""Two methods of stepping through one case, and the moments at which it ends.
 
-`_explicit_steps` is Dormand and Prince's method of order 8, with the coefficients and the dense
-output of `scipy.integrate.DOP853`; guards are looked at four times in each step. `_implicit_steps`
+`explicit_steps` is Dormand and Prince's method of order 8, with the coefficients and the dense
+output of `scipy.integrate.DOP853`; guards are looked at four times in each step. `implicit_steps`
 is for a slip that has just set in, whose direction is stiff: linearly implicit Euler steps,
 extrapolated (Deuflhard, SIAM Rev. 27 (1985) 505; Hairer & Wanner, Solving ODEs II, IV.9). Its steps
 end at samples, and are taken anew to end at a guard."""
@@ -9,6 +9,7 @@ end at samples, and are taken anew to end at a guard."""
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,18 +17,12 @@ from scipy.integrate import DOP853
 
 from analytic.simulation import charts, equations
 from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, Motion
-from analytic.simulation.integrator import (
-    DONE,
-    EPS,
-    FIRED,
-    PAUSED,
-    STUCK,
-    Pace,
-    Stretch,
-    finish_straight,
-)
 from model.arrays import Array
 
+DONE, FIRED, STUCK, PAUSED, OTHER = range(5)
+"""Why steps end: at the end, at a guard, because they would be too short, for a breath, or as the
+other method should go on."""
+EPS = math.ulp(1.0)
 A, B, C, E3, E5, D = (
     np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D")
 )
@@ -38,8 +33,6 @@ GROWN_SLIP = 1e-4
 FINEST, FINEST_STIFF = 1e-13, 1e-11
 """Least relative tolerances: what round-off leaves of explicit steps, and of those of a small
 slip."""
-OTHER = 4
-"""Why steps return beside what `integrator.stretch` says: as the other method should go on."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 """Of the length of a step: below what its error allows; and by how much it may change."""
 LOOKS_A_STEP = 4
@@ -53,6 +46,26 @@ rate would change."""
 ROOT_STEPS = 200
 COLUMNS, USUAL = 12, 9
 """Most columns of an extrapolation, and how many steps aim at."""
+
+
+class Stretch(NamedTuple):
+    """What to integrate; z, level and samples are written to."""
+
+    k: Motion
+    until: float
+    """s"""
+    z: Array
+    """Coordinates (n,)."""
+    scale: Array
+    """Natural size of each (n,)."""
+    times: Array
+    """Of all samples of the run, s, shape (m,)."""
+    samples: Array
+    """Coordinates then (m, n)."""
+    arm: Array
+    """Above which values guards are armed, and at which they fire (guards,), as `charts.arm_guards`
+    says."""
+    level: Array
 
 
 def _copy(given: Array, out: Array) -> None:
@@ -213,7 +226,7 @@ def _is_past(time: float, start: float, tau: float) -> bool:
     return time <= start + tau or time - start <= tau
 
 
-def _explicit_steps(
+def explicit_steps(
     of: Stretch, start: float, tau: float, h: float, taken: int, most: int
 ) -> tuple[int, float, float, int, int]:
     """Up to `most` explicit steps from start + tau on: why they end, tau, h, guard, samples taken.
@@ -379,10 +392,10 @@ def _extrapolation_step(
     return error, COLUMNS
 
 
-def _implicit_steps(
+def implicit_steps(
     of: Stretch, start: float, tau: float, h: float, taken: int
 ) -> tuple[int, float, float, int, int]:
-    """As `_explicit_steps`, by implicit ones: for `PATIENCE` steps, or until all slips are
+    """As `explicit_steps`, by implicit ones: for `PATIENCE` steps, or until all slips are
     `GROWN_SLIP`.
 
     A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times
@@ -451,27 +464,3 @@ def _implicit_steps(
         if charts.least_slip(z, scale, k.case) > GROWN_SLIP:
             return OTHER, tau, 0.0, -1, taken
     return PAUSED, tau, h, -1, taken
-
-
-def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
-    """Integrate a case as `integrator.stretch` does, in a form that numba compiles."""
-    start, tau, h, small, slow = pace
-    why, left = OTHER, most
-    while why == OTHER or (why == PAUSED and left > 0):
-        left -= PATIENCE if small else most
-        end = finish_straight(start + tau, of, taken) if slow % 2 == 1 else -1
-        if end >= 0:
-            return DONE, (start, tau, h, small, slow), -1, end
-        if small:
-            why, tau, h, guard, taken = _implicit_steps(of, start, tau, h, taken)
-        else:
-            why, tau, h, guard, taken = _explicit_steps(of, start, tau, h, taken, most)
-        total = 0.0
-        for value in of.z:
-            total += value
-        if not abs(total) < math.inf:
-            why = STUCK
-        slow = 0 if charts.least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP else slow + 1
-        if why == OTHER:
-            start, tau, h, small = start + tau, 0.0, 0.0, not small
-    return why, (start, tau, h, small, slow), guard, taken

@@ -1,5 +1,4 @@
-"""Moreau-Jean steps and the loops over them, compiled where numba is installed: plain floats in
-named tuples."""
+"""Moreau-Jean steps and the loops over them, compiled: plain floats in named tuples."""
 
 from __future__ import annotations
 

@@ -13,8 +13,7 @@ normal is constant within the step and a ball that is held at the wall neither d
 it; a stationary orbit is reproduced exactly. Otherwise the axes stand still, so that the vessel's
 axis is no singular point.
 
-Steps and the loop over them are in `stepping`, which numba compiles where it is installed (the
-extra `fast`)."""
+Steps and the loop over them are in `stepping`, which is compiled."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ only if every slight slip dies out: at two rolling contacts that is `rolling_for
 a single one this means that its cone holds forces that keep it rolling (docs/theory.md). Case and
 slip directions are then those of the contact problem of the accelerations.
 
-All on plain floats, cases and guards by number, and compiled where numba is installed.
+All on plain floats, cases and guards by number, and compiled.
 """
 
 from __future__ import annotations

@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import BDF, LSODA, solve_ivp
+from scipy.integrate import solve_ivp
 
 from analytic import contact_forces, simulate, vector_field
 from analytic.mechanics import rolling_forces
-from analytic.simulation import hybrid
-from model import Case, Flow, Parameters, SimulationError
+from model import Case, Flow, Parameters
 from model.cases import TRAITS
 from model.drag import LAWS
 from model.kinematics import VARIABLES
@@ -185,32 +184,3 @@ def test_a_case_ends_where_its_forces_do(p, x, flow, before, after, left):
         "friction of the wall": of_wall,
     }
     assert loads[left] == pytest.approx(0.0, abs=1e-7 * p.m * p.g)
-
-
-def failing(solver, at):
-    """The step of a solver of scipy that breaks off at some times."""
-    calls, right = itertools.count(1), solver.step
-
-    def step(self):
-        if next(calls) not in at:
-            return right(self)
-        self.status = "failed"
-        return "step size below spacing of numbers"
-
-    return step
-
-
-def test_a_solver_that_fails_gives_way_to_the_other(monkeypatch):
-    """The same motion, through RR and the onset of SS; where both fail for ever, the run ends."""
-    given = P.replace(omega_0=25.0), [0, 0, 9.0, 0, 0, 0], 1.5
-    right = simulate(*given, sample_interval=0.1)
-    monkeypatch.setattr(hybrid, "run_compiled", hybrid.run_through_flow)
-    for solver in (BDF, LSODA):
-        with monkeypatch.context() as patch:
-            patch.setattr(solver, "step", failing(solver, (10, 30, 31, 60)))
-            run = simulate(*given, sample_interval=0.1)
-        np.testing.assert_allclose(run.x, right.x, rtol=0, atol=1e-7 * 25.0)
-    for solver in (BDF, LSODA):
-        monkeypatch.setattr(solver, "step", failing(solver, range(10**9)))
-    with pytest.raises(SimulationError, match="steps become too short"):
-        simulate(given[0], [0, 0, 9.0, 3, 2, -3], 1.5)

@@ -9,18 +9,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
-from unittest import mock
 
-from analytic.simulation import hybrid
+from analytic.simulation import compiling
 from compare.kit.levels import Level
+from tests.by_scipy import runs_by_scipy
 
 Function = Callable[..., Any]
 Fault = Callable[..., Any]
 """Takes the right function, then what that takes, and gives its own answer."""
 PACKAGES = ("analytic", "compare")
 """Where functions of the theory are known by name."""
-COMPILED = "analytic.mechanics", "analytic.simulation"
-"""Those of which compiled runs are made."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +43,8 @@ def believed(*wrongs: WrongTheory) -> Iterator[None]:
     rights = [getattr(importlib.import_module(each.module), each.function) for each in wrongs]
     puts = [faulty(right, each.wrong) for each, right in zip(wrongs, rights, strict=True)]
     _exchange(dict(zip(map(id, rights), puts, strict=True)))
-    plainly = mock.patch.object(hybrid, "run_compiled", hybrid.run_through_flow)
     # Compiled runs would believe what they believed when they were compiled.
-    with plainly if any(each.module.startswith(COMPILED) for each in wrongs) else nullcontext():
+    with runs_by_scipy() if compiling.called.intersection(rights) else nullcontext():
         try:
             yield
         finally:
