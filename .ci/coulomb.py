@@ -1,27 +1,28 @@
-"""Try the wheel mujoco-coulomb, with nothing else than it, MuJoCo and NumPy: python coulomb.py compiled|plain."""
+"""Try the wheel mujoco-coulomb, with nothing else than what it needs: python coulomb.py"""
 
 import math
-import sys
 
 import mujoco
-import mujoco_coulomb.compiled
 import numpy as np
 from mujoco_coulomb import Coulomb
 
 G = 9.81
 CONES = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtCone.mjCONE_PYRAMIDAL
+"""Of the model: the law's own is round."""
 
 
 def boxes(mu, slope=0.0, number=1, height=0.05, **options):
     """Boxes, one above the other, over a plane; gravity is tilted instead of the plane, degrees."""
     bodies = "".join(
-        f'<body pos="0 0 {height + 0.1 * i}"><freejoint/><geom type="box" size=".05 .05 .05"/></body>'
+        f'<body pos="0 0 {height + 0.1 * i}"><freejoint/>'
+        '<geom type="box" size=".05 .05 .05"/></body>'
         for i in range(number)
     )
     a = math.radians(slope)
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option tolerance="1e-12" gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/><default>'
-        f'<geom friction="{mu}"/></default><worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+        f'<mujoco><option tolerance="1e-12" gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/>'
+        f'<default><geom friction="{mu}"/></default><worldbody><geom type="plane" size="9 9 1"/>'
+        f"{bodies}</worldbody></mujoco>"
     )
     for name, value in options.items():
         setattr(model.opt, name, value)
@@ -42,17 +43,18 @@ def holds(cone, rigid):
     model, data = boxes(0.6, slope=15, cone=cone)
     coulomb = Coulomb(model, rigid=rigid)
     assert creep(lambda: coulomb.step(data), data) <= 1e-12
+    assert model.opt.cone == cone
 
 
-def holds_in_four_stages(cone):
-    model, data = boxes(0.6, slope=15, cone=cone, integrator=mujoco.mjtIntegrator.mjINT_RK4)
+def holds_in_four_stages():
+    model, data = boxes(0.6, slope=15, integrator=mujoco.mjtIntegrator.mjINT_RK4)
     with Coulomb(model).installed():
         assert creep(lambda: mujoco.mj_step(model, data), data) <= 1e-12
 
 
 def slides(rigid):
-    """Along x, which an edge of the pyramid follows."""
-    model, data = boxes(0.25, slope=20, cone=CONES[0])
+    """With the acceleration of Coulomb's law, and on all four corners."""
+    model, data = boxes(0.25, slope=20)
     coulomb = Coulomb(model, rigid=rigid)
     coulomb.step(data, 500)
     speed, time = data.qvel[0], data.time
@@ -63,9 +65,9 @@ def slides(rigid):
     assert abs((data.qvel[0] - speed) / (data.time - time) / exact - 1) <= 1e-9
 
 
-def lands(cone):
+def lands():
     """Once the last step has closed the gap and no more, nothing moves."""
-    model, data = boxes(0.6, height=0.08, cone=cone)
+    model, data = boxes(0.6, height=0.08)
     coulomb, speeds = Coulomb(model, rigid=True), []
     while data.time < 0.2:
         coulomb.step(data)
@@ -96,14 +98,11 @@ def is_the_same_through_all_doors(cone, rigid):
 
 
 if __name__ == "__main__":
-    form = "compiled" if mujoco_coulomb.compiled.COMPILES else "plain"
-    assert form == sys.argv[1], f"it is {form}, not {sys.argv[1]}"
     for rigid in False, True:
         slides(rigid)
         for cone in CONES:
             holds(cone, rigid)
             is_the_same_through_all_doors(cone, rigid)
-    for cone in CONES:
-        holds_in_four_stages(cone)
-        lands(cone)
-    print(f"mujoco-coulomb, {form}, MuJoCo {mujoco.__version__}: as it should be")
+    holds_in_four_stages()
+    lands()
+    print(f"mujoco-coulomb, MuJoCo {mujoco.__version__}: as it should be")

@@ -18,7 +18,7 @@ if not hasattr(mujoco.MjModel, "pair_adhesion"):
     raise ImportError(
         f"dualball needs MuJoCo 4.0, and this is {mujoco.__version__}: Coulomb's law alone, "
         f"package mujoco-coulomb, "
-        "runs on 3.3 and later"
+        "runs on 3.3.6 and later"
     )
 
 from mjsim.contact_settings import ContactSettings

@@ -1,5 +1,4 @@
-"""The law serves with numba and without it, and says so where MuJoCo is another one than it
-knows."""
+"""The law says so where MuJoCo is another one than it knows, and needs no place for a cache."""
 
 import re
 import subprocess
@@ -25,7 +24,7 @@ coulomb.step(data, 50)
 with coulomb.installed():
     mujoco.mj_step(model, data, 50)
 assert abs(data.qpos[0] - place) < 1e-12, data.qpos[0] - place
-print("compiled")
+print("holds")
 """
 
 
@@ -50,6 +49,7 @@ STRUCTS = "import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fie
             f"{NAME}.* which has no time",
         ),
         (STRUCTS.format("d.fields[::-1]"), f"{NAME}.* doesn't lie in memory"),
+        (STRUCTS.format("d.fields[1:]"), f"{NAME}.* doesn't lie in memory"),
         (
             "import mujoco; mujoco.__version__, mujoco.MjModel = '3.3.0', object\n",
             "needs MuJoCo 4.0, and this is 3.3",
@@ -61,18 +61,18 @@ def test_another_mujoco_is_named(before, says):
         [sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True
     )
     assert done.returncode == 1
+    assert len(done.stderr.splitlines()[-1]) < 160
     assert re.search(says, done.stderr.splitlines()[-1])
 
 
 @pytest.mark.slow  # it compiles
 def test_compiled_loops_need_no_place_for_a_cache():
-    pytest.importorskip("numba")
     before = (
         "from numba.core import caching\n"
         "for name in 'CacheImpl', '_CacheImpl', 'CompileResultCacheImpl':\n"
         "    vars(caching).get(name, type('', (), {}))._locator_classes = []\n"
     )
-    assert serves(before) == "compiled"
+    assert serves(before) == "holds"
 
 
 def test_both_wheels_have_one_version():
