@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import math
 import weakref
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -25,6 +24,17 @@ _INTEGRATORS = {
 }
 _ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 _NO_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+_NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+
+
+class _Options(NamedTuple):
+    """Of a model, as they are without the law."""
+
+    cone: int
+    integrator: int
+    disableflags: int
+    tendon_armature: npt.NDArray[np.float64] | None
+    rigid: bool = False
 
 
 class Coulomb:
@@ -39,8 +49,8 @@ class Coulomb:
         True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
         within one step. Geoms get a `margin` in which contacts are seen ahead, but bear nothing: at
         least the way of a step at the speed of a fall through the scene, or a fifth of their radius.
-        Dampers become inertia, of the same effect, which contacts know: the integrator is Euler's
-        from then on. Margins are for steps up to the model's as it is now, dampers for that one
+        Margins are for steps up to the model's as it is now. While the law acts the integrator is
+        Euler's, and dampers are inertia of the same effect, which contacts know
     restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
     servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It
         needs geoms with a `margin`, more than bodies sink in, of which an open contact then takes no
@@ -82,16 +92,18 @@ class Coulomb:
                 raise ValueError("servo is for soft contacts: rigid ones have no depth")
         _check_number("share", share, "", 1e-9, 1.0)
         law = Law(bool(rigid), float(restitution), float(servo or 0.0), float(share))
-        self._begin(model, law, float(model.opt.timestep), damped=False)
+        self._begin(model, law, float(model.opt.timestep))
         self._check()
         _check_friction(model)
         if rigid:
             _see_ahead(model)
-            self._damped = _damp_at_the_end(model)
 
-    def _begin(self, model: Any, law: Law, step: float, damped: bool) -> None:
+    def _begin(self, model: Any, law: Law, step: float) -> None:
         """Set what belongs to the model; nothing is remembered."""
-        self.model, self._law, self._step, self._damped = model, law, step, damped
+        self.model, self._law, self._step = model, law, step
+        self._dampers: tuple[float, float] | None = (
+            None  # of joints, of servos: times for inertia, s
+        )
         self._simulations: dict[int, Simulation] = {}
         self._restored: Mapping[str, npt.NDArray[Any]] | None = None
         weakref.finalize(self, _remove_all, self._simulations)
@@ -99,7 +111,7 @@ class Coulomb:
     def __reduce__(self) -> Any:
         alone = len(self._simulations) == 1
         state = self.state() if alone else self._restored
-        return _copy, (self.model, self._law, self._step, self._damped, state)
+        return _copy, (self.model, self._law, self._step, state)
 
     def _check(self) -> None:
         """Raise `ValueError` if the model has an option or a part the law can't be applied with."""
@@ -112,7 +124,7 @@ class Coulomb:
             raise ValueError(
                 f"integrator = {name} {why}; Coulomb's law needs Euler, implicit or implicitfast"
             )
-        if rigid and (h > self._step or (self._damped and h != self._step)):
+        if rigid and h > self._step:
             raise ValueError(
                 f"timestep = {h:g} s was {self._step:g} s when Coulomb(…, rigid=True) was made"
             )
@@ -155,8 +167,8 @@ class Coulomb:
         if self._restored is not None:
             simulation.restore(self._restored)
             self._restored = None
-        if CALLBACK.installed(self.model._address):
-            simulation.active[0] = 1
+        simulation.dampers[0] = self._dampers or (0.0, 0.0)
+        simulation.active[0] = CALLBACK.installed(self.model._address)
         return simulation
 
     def addresses(self, data: Any) -> tuple[int, int, int]:
@@ -228,14 +240,14 @@ class Coulomb:
         """
         if isinstance(nstep, bool) or not isinstance(nstep, (int, np.integer)) or nstep < 0:
             raise ValueError(f"nstep = {nstep!r} must be a whole number, at least 0")
-        simulation, cone, active = self._enter(data)  # `acting` in fewer microseconds
+        simulation, active, options = self._enter(data)  # `acting` in fewer microseconds
         try:
             mujoco.mj_step(self.model, data, nstep)
         except BaseException:
             simulation.reset()
             raise
         finally:
-            self._leave(simulation, cone, active)
+            self._leave(simulation, active, options)
 
     def forward(self, data: Any) -> None:
         """Compute forces, accelerations and sensors under the law, as `mujoco.mj_forward` does."""
@@ -255,9 +267,9 @@ class Coulomb:
             return
         with self.acting(data):
             mujoco.mj_forwardSkip(self.model, data, mujoco.mjtStage.mjSTAGE_VEL, 0)
-        mujoco.mj_checkAcc(self.model, data)
-        euler = self.model.opt.integrator == _EULER
-        (mujoco.mj_Euler if euler else mujoco.mj_implicit)(self.model, data)
+            mujoco.mj_checkAcc(self.model, data)
+            euler = self.model.opt.integrator == _EULER
+            (mujoco.mj_Euler if euler else mujoco.mj_implicit)(self.model, data)
 
     def _check_halves(self, data: Any) -> None:
         self._simulation(data)
@@ -268,27 +280,61 @@ class Coulomb:
     @contextlib.contextmanager
     def acting(self, data: Any) -> Iterator[None]:
         """Within this MuJoCo's own functions, called with these data, obey the law."""
-        simulation, cone, active = self._enter(data)
+        simulation, active, options = self._enter(data)
         try:
             yield
         except BaseException:
             simulation.reset()  # the step was left in its middle
             raise
         finally:
-            self._leave(simulation, cone, active)
+            self._leave(simulation, active, options)
 
-    def _enter(self, data: Any) -> tuple[Simulation, int, int]:
-        """Let the law act; return whose memory it has, and the cone and whether it acted before."""
-        simulation, option = self._simulation(data), self.model.opt
+    def _enter(self, data: Any) -> tuple[Simulation, int, _Options]:
+        """Let the law act; return whose memory it has, whether it acted before, and the options."""
+        simulation = self._simulation(data)
         self._check()
-        cone, active = option.cone, simulation.active[0]
+        options, active = self._switch(), simulation.active[0]
         CALLBACK.set()
-        option.cone, simulation.active[0] = _ELLIPTIC, 1
-        return simulation, cone, active
+        simulation.active[0] = 1
+        return simulation, active, options
 
-    def _leave(self, simulation: Simulation, cone: int, active: int) -> None:
+    def _leave(self, simulation: Simulation, active: int, options: _Options) -> None:
         CALLBACK.unset()
-        self.model.opt.cone, simulation.active[0] = cone, active
+        simulation.active[0] = active
+        self._switch_back(options)
+
+    def _switch(self) -> _Options:
+        """Switch the model to options under which the law acts; return those before.
+
+        Rigid contacts ask for velocities after a step, so they must know of dampers: `add_dampers`
+        makes these inertia, and Euler's method leaves them alone. MuJoCo's integrators take them into
+        account, too, but only after contacts have been solved for.
+        """
+        option, h = self.model.opt, self.model.opt.timestep
+        before = _Options(option.cone, option.integrator, option.disableflags, None)
+        option.cone = _ELLIPTIC
+        if not self._law.rigid or self._dampers is not None:
+            return before
+        implicit = before.integrator != _EULER
+        damped = implicit or not before.disableflags & _NO_DAMPING
+        self._dampers = h * damped, h * implicit
+        option.integrator, option.disableflags = _EULER, before.disableflags | _NO_DAMPING
+        armature = None
+        if implicit and self.model.ntendon:
+            armature = self.model.tendon_armature.copy()
+            self.model.tendon_armature += _tendon_inertia(self.model)
+        for simulation in self._simulations.values():
+            simulation.dampers[0] = self._dampers
+        return before._replace(tendon_armature=armature, rigid=True)
+
+    def _switch_back(self, options: _Options) -> None:
+        option = self.model.opt
+        option.cone = options.cone
+        if options.rigid:
+            option.integrator, option.disableflags = options.integrator, options.disableflags
+            self._dampers = None
+            if options.tendon_armature is not None:
+                self.model.tendon_armature[:] = options.tendon_armature
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[Coulomb]:
@@ -303,11 +349,11 @@ class Coulomb:
         ValueError
             If the model is installed already, or asks for what the law cannot serve.
         """
-        model, address, option = self.model, self.model._address, self.model.opt
+        address = self.model._address
         self._check()
         if CALLBACK.installed(address):
             raise ValueError("this model is under installed() already")
-        cone, option.cone = option.cone, _ELLIPTIC
+        options = self._switch()
         CALLBACK.install(address, self._adopt)
         for simulation in self._simulations.values():
             simulation.active[0] = 1
@@ -317,17 +363,17 @@ class Coulomb:
         finally:
             CALLBACK.unset()
             CALLBACK.install(address, None)
-            model.opt.cone = cone
+            self._switch_back(options)
             for simulation in self._simulations.values():
                 simulation.active[0] = 0
 
 
 def _copy(
-    model: Any, law: Law, step: float, damped: bool, state: Mapping[str, npt.NDArray[Any]] | None
+    model: Any, law: Law, step: float, state: Mapping[str, npt.NDArray[Any]] | None
 ) -> Coulomb:
     """A copy of a `Coulomb`, whose model is as it needs it."""
     coulomb = Coulomb.__new__(Coulomb)
-    coulomb._begin(model, law, step, damped)
+    coulomb._begin(model, law, step)
     coulomb._restored = state
     return coulomb
 
@@ -370,7 +416,6 @@ def _see_ahead(model: Any) -> None:
     ahead = model.opt.timestep * math.sqrt(
         2 * np.linalg.norm(model.opt.gravity) * model.stat.extent
     )
-    ahead /= 2 if _margins_add() else 1
     most = model.geom_rbound / 5
     np.maximum(model.geom_margin, np.minimum(ahead, most), out=model.geom_margin)
     pairs = [model.pair_geom1, model.pair_geom2]
@@ -381,45 +426,13 @@ def _see_ahead(model: Any) -> None:
     )
 
 
-@functools.cache
-def _margins_add() -> bool:
-    """Whether this MuJoCo adds the margins of both geoms; older ones take the larger."""
-    ball = '<geom size=".1" margin=".01"/>'
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><worldbody>{ball}<body pos="0 0 .215"><freejoint/>{ball}</body></worldbody></mujoco>'
-    )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return bool(data.ncon)
-
-
-def _damp_at_the_end(model: Any) -> bool:
-    """Replace dampers at the speed after a step by inertia, h times their damping; the integrator
-    becomes Euler's.
-
-    Returns whether there are any.
-
-    That is what MuJoCo's integrators do, but only after contacts have been solved for, so that
-    velocities are not those which contacts asked for. Of implicit integrators the dampers of
-    joints, tendons and servos on them are kept."""
-    option, euler, h = model.opt, mujoco.mjtIntegrator.mjINT_EULER, model.opt.timestep
-    implicit, joints = option.integrator != euler, np.zeros(model.nv)
-    tendons = h * implicit * model.tendon_damping
-    if implicit or not option.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP:
-        joints += h * model.dof_damping
-    option.integrator = euler
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+def _tendon_inertia(model: Any) -> npt.NDArray[np.float64]:
+    """Inertia of the same effect as the dampers of tendons at the speed after a step, and as servos
+    on them, kg or kg m2."""
+    inertia: npt.NDArray[np.float64] = model.opt.timestep * model.tendon_damping
     servos = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
-    for k in np.flatnonzero(servos & implicit).tolist():
-        servo = -h * model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
-        kind, target = mujoco.mjtTrn(model.actuator_trntype[k]), model.actuator_trnid[k, 0]
-        if kind == mujoco.mjtTrn.mjTRN_TENDON:
-            tendons[target] += servo
-        elif kind == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[target] >= int(
-            mujoco.mjtJoint.mjJNT_SLIDE
-        ):
-            joints[model.jnt_dofadr[target]] += servo
-    model.dof_armature += joints
-    if hasattr(model, "tendon_armature"):  # MuJoCo 3.3.0 has none
-        model.tendon_armature += tendons
-    return bool(joints.any() or tendons.any())
+    servos &= model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+    for k in np.flatnonzero(servos).tolist():
+        damping = -model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
+        inertia[model.actuator_trnid[k, 0]] += model.opt.timestep * damping
+    return inertia

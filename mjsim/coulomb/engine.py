@@ -72,7 +72,9 @@ MJ_WARNING = _only(structure("mjWarningStat"), "number")
 MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver")
 MJ_MODEL = _only(
     structure("mjModel"),
-    *("nv", "nbody", "ngeom", "geom_rbound", "geom_bodyid"),
+    *("nv", "nbody", "njnt", "ngeom", "geom_rbound", "geom_bodyid"),
+    *("nu", "jnt_type", "jnt_dofadr", "dof_damping", "actuator_biastype", "actuator_trntype"),
+    *("actuator_trnid", "actuator_gear", "actuator_biasprm"),
     *("nC", "dof_parentid", "M_rownnz", "M_rowadr", "M_colind"),
     opt=MJ_OPTION,
 )
@@ -154,7 +156,7 @@ mj_step = _function("mj_step")
 mj_fwdActuation, mj_fwdAcceleration = _function("mj_fwdActuation"), _function("mj_fwdAcceleration")
 mj_fwdConstraint, mj_fwdVelocity = _function("mj_fwdConstraint"), _function("mj_fwdVelocity")
 mj_makeConstraint, mj_island = _function("mj_makeConstraint"), _function("mj_island")
-mj_projectConstraint = _function("mj_projectConstraint")
+mj_projectConstraint, mj_factorM = _function("mj_projectConstraint"), _function("mj_factorM")
 mj_isSparse = _function("mj_isSparse", types.int32, 1)
 mj_addContact = _function("mj_addContact", types.int32, 3)
 

@@ -128,6 +128,7 @@ MEMORY = np.dtype(
         # steps that were solved; factorisations that took; steps that didn't reach their tolerance
         *((name, _i8) for name in ("solves", "factorisations", "unsolved")),
         ("active", _i8),  # whether the law applies
+        ("dampers", _f8, 2),  # times that make dampers of joints, and servos on them, inertia, s
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
@@ -187,7 +188,7 @@ class Simulation:
         self._own("xpos", np.zeros((model.ngeom, 3)))
         self._own("xmat", np.zeros((model.ngeom, 9)))
         self.make_room(16, 64, 64 * min(model.nv, 16))
-        self.active = record["active"]
+        self.active, self.dampers = record["active"], record["dampers"]
         self.data: Callable[[], Any] = lambda: None
         self.reset()
         _SIMULATIONS[self.address] = self

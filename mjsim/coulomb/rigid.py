@@ -10,13 +10,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import mujoco
+
 from .compiling import kernel
 from .contacts import smaller_radius
-from .engine import integers, mj_projectConstraint, reals
+from .engine import integers, mj_factorM, mj_projectConstraint, reals
 from .friction import shift
 from .memory import SLIDES, bodies_at, contacts_of, rows_of
 from .parameters import APART, BOUNCES, ITERATIONS, USUAL_STEP
 
+AFFINE, JOINT = int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtTrn.mjTRN_JOINT)
+SLIDE, BIASES = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjNBIAS)
 PGS = 0
 """MuJoCo's solver that has the regularisation in its matrix."""
 
@@ -133,6 +137,42 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
         contact.predicted = max(contact.extrapolated + contact.bias, 0.0)
         some = True
     return some
+
+
+# -- dampers ---------------------------------------------------------------------------------------
+
+
+@kernel
+def add_dampers(model: Any, data: Any, memory: Any) -> None:
+    """Let dampers act at the velocity after the step: h times their damping is added to M.
+
+    So are the dampers of servos on joints, where the integrator is implicit.
+    """
+    damping, some = reals(model.dof_damping, model.nv), False
+    starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
+    inertia = reals(data.M, model.nC)
+    for i in range(model.nv):
+        inertia[starts[i] + lengths[i] - 1] += memory.dampers[0] * damping[i]
+        some = some or damping[i] != 0
+    bias, kind = (
+        integers(model.actuator_biastype, model.nu),
+        integers(model.actuator_trntype, model.nu),
+    )
+    target, gear = (
+        integers(model.actuator_trnid, (model.nu, 2)),
+        reals(model.actuator_gear, (model.nu, 6)),
+    )
+    numbers = reals(model.actuator_biasprm, (model.nu, BIASES))
+    types, dofs = integers(model.jnt_type, model.njnt), integers(model.jnt_dofadr, model.njnt)
+    for k in range(model.nu):
+        joint = target[k, 0]
+        if bias[k] == AFFINE and kind[k] == JOINT and types[joint] >= SLIDE:
+            i = dofs[joint]
+            servo = -numbers[k, 2] * gear[k, 0] ** 2
+            inertia[starts[i] + lengths[i] - 1] += memory.dampers[1] * servo
+            some = some or servo != 0
+    if some:
+        mj_factorM(memory.model, memory.data)
 
 
 # -- vectors ---------------------------------------------------------------------------------------

@@ -32,6 +32,7 @@ from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
 from .parameters import EXACT, FALLING, NEXT, OVER, SOFTER
 from .rigid import (
+    add_dampers,
     add_gyroscopic_moments,
     oppose_slip_at_mid_step,
     stiffen,
@@ -50,6 +51,8 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     if data.ncon == 0 and not memory.law.rigid:  # nothing touches: all is MuJoCo's own
         forget(memory)
         return
+    if memory.law.rigid:
+        add_dampers(model, data, memory)
     still = known and nothing_moved(model, data, memory)
     if still:
         keep_forces(memory, over)

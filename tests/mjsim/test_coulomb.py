@@ -5,6 +5,7 @@ Closed forms are of one rigid body. MuJoCo's step is of first order: what moves 
 times its speed. That rigid contacts roll, turn, land and bounce as they should exact cases show, in
 tests/compare/test_engines.py."""
 
+import contextlib
 import math
 from pathlib import Path
 
@@ -407,7 +408,7 @@ def test_a_damped_finger_lands_in_a_step(integrator):
         "</body></worldbody></mujoco>"
     )
     data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
-    data.qvel[0] = -40.6
+    data.qvel[0] = -24.0  # it comes into sight of the floor before it touches it
     speeds = []
     for _ in range(300):
         law.step(data)
@@ -459,3 +460,26 @@ def test_piles_come_to_rest(seeds, rigid):
     )
     assert (drift < friction.STILL).sum() >= 0.95 * len(models)
     assert rise.max() <= max(friction.RISES[0], *plain)
+
+
+@pytest.mark.parametrize("installed", [False, True])
+@pytest.mark.parametrize(
+    "joint",
+    [
+        '<joint axis="0 1 0" damping=".01"/><geom size=".02" pos=".3 0 0" mass=".2"/>',
+        '<joint type="slide" damping=".01"/><geom size=".05" mass=".1"/>',  # "simple" to MuJoCo
+        '<freejoint/><geom size=".05" mass=".1"/>',
+    ],
+)
+def test_rigid_contacts_know_of_dampers_that_are_changed_while_it_runs(joint, installed):
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option gravity="0 0 0"/><worldbody><body>{joint}</body></worldbody></mujoco>'
+    )
+    law, data, plain = Coulomb(model, rigid=True), *(mujoco.MjData(model) for _ in range(2))
+    data.qvel[0] = plain.qvel[0] = 1.0
+    for damping in (0.01, 200.0, 3.0):
+        model.dof_damping[:] = damping
+        mujoco.mj_step(model, plain, 5)
+        with law.installed() if installed else contextlib.nullcontext():
+            mujoco.mj_step(model, data, 5) if installed else law.step(data, 5)
+        assert data.qvel == pytest.approx(plain.qvel, rel=1e-9, abs=1e-15)
