@@ -27,6 +27,8 @@ _SCALARS = {
     **{"mjtByte": np.uint8, "mjtBool": np.bool_},
     **dict.fromkeys(("mjtSize", "size_t", "uintptr_t", "uint64_t"), np.int64),
 }
+_OLDER = {"efc_diagA": "efc_diagApprox"}
+"""Names that MuJoCo has for the same before 3.10."""
 
 
 def structure(name: str) -> np.dtype[Any]:
@@ -43,7 +45,8 @@ def structure(name: str) -> np.dtype[Any]:
 
     def fields(declared: Any) -> np.dtype[Any]:
         named: Any = [(field.name, kind(field.type)) for field in declared]
-        return np.dtype(named, align=True)
+        whole: np.dtype[Any] = np.dtype(named, align=True)
+        return whole
 
     whole: Any = structs.STRUCTS[name]
     return fields(whole.fields)
@@ -54,14 +57,16 @@ def _only(whole: np.dtype[Any], *names: str, **parts: np.dtype[Any]) -> np.dtype
     assert whole.fields is not None
     places, formats, offsets = dict(whole.fields), [], []
     for name in (*names, *parts):
-        if name not in places:
+        known = name if name in places else _OLDER.get(name, name)
+        if known not in places:
             version = mujoco.__version__
             raise ImportError(f"Coulomb's law doesn't know MuJoCo {version}, which has no {name}")
-        formats.append(parts.get(name, places[name][0]))
-        offsets.append(places[name][1])
+        formats.append(parts.get(name, places[known][0]))
+        offsets.append(places[known][1])
     layout = {"names": [*names, *parts], "formats": formats, "offsets": offsets}
     kind: Any = {**layout, "itemsize": whole.itemsize}
-    return np.dtype(kind)
+    part: np.dtype[Any] = np.dtype(kind)
+    return part
 
 
 MJ_CONTACT = _only(
