@@ -10,9 +10,10 @@ from __future__ import annotations
 import ctypes
 import functools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from .compiling import c_address
@@ -20,6 +21,7 @@ from .engine import LIBRARY
 from .memory import Simulation
 from .step import TABLE, serve, table
 
+_ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
 
@@ -29,6 +31,8 @@ class Callback:
     def __init__(self) -> None:
         self._lock, self._users = threading.RLock(), 0
         self._before: int | None = None  # the callback that was there, by its address
+        # by model: its users, and what puts its options back
+        self._options: dict[int, tuple[int, Callable[[], None]]] = {}
         self._simulations: dict[int, Simulation] = {}
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
@@ -64,40 +68,67 @@ class Callback:
             return simulation.address
 
     def know(self, data: int, simulation: Simulation) -> None:
-        """Tell the callback of a simulation, by the address of its data."""
-        if self._simulations.get(data) is not simulation:
-            with self._lock:
-                self._simulations[data] = simulation
-                self._publish()
+        """Tell the callback of a simulation, by the address of its data.
 
-    def remove(self, data: int) -> None:
-        """Forget a simulation."""
+        Raises
+        ------
+        ValueError
+            If another law acts on them just now.
+        """
+        known = self._simulations.get(data)
+        if known is simulation:
+            return
+        if known and known.active[0]:
+            raise ValueError("these data are under the law of another Coulomb, by installed()")
         with self._lock:
-            if self._simulations.pop(data, None):
-                self._publish()
-
-    def install(self, model: int, adopt: Callable[[int], Simulation] | None) -> None:
-        """Let `adopt` make the memory of all simulations of a model that are new, by their data."""
-        with self._lock:
-            self._installed.pop(model, None)
-            if adopt:
-                self._installed[model] = adopt
+            self._simulations[data] = simulation
             self._publish()
 
-    def set(self) -> None:
-        """Set MuJoCo's callback, if this is its first user."""
+    def remove(self, data: int, simulation: Simulation | None) -> None:
+        """Forget a simulation."""
         with self._lock:
-            if not self._users:
-                before = _SLOT.value
+            if simulation and self._simulations.get(data) is simulation:
+                del self._simulations[data]
+                self._publish()
+
+    def install(
+        self, model: int, adopt: Callable[[int], Simulation], simulations: Mapping[int, Simulation]
+    ) -> None:
+        """Have all simulations of a model under one law: these, and new ones, which `adopt` makes."""
+        with self._lock:
+            others = {k: s for k, s in self._simulations.items() if s.record["model"][0] != model}
+            self._simulations = others | dict(simulations)
+            self._installed[model] = adopt
+            self._publish()
+
+    def uninstall(self, model: int) -> bool:
+        """Let new simulations of a model be; whether the callback was in force until now."""
+        with self._lock:
+            del self._installed[model]
+            self._publish()
+            return bool(_SLOT.value == _served())
+
+    def set(self, model: Any, switch: Callable[[], Callable[[], None]]) -> None:
+        """Set MuJoCo's callback, unless it is set, and let the first user `switch` the options."""
+        with self._lock:
+            users, back = self._options.get(model._address) or (0, switch())
+            self._options[model._address] = users + 1, back
+            self._users += 1
+            before = _SLOT.value
+            if before != _served():
                 if before != self._before:
                     self._before = before
                     self._publish()
                 _SLOT.value = _served()
-            self._users += 1
 
-    def unset(self) -> None:
-        """Put the callback before back, if this is the last user, unless another one was set."""
+    def unset(self, model: Any) -> None:
+        """Put back options after their last user, and the callback, unless another one was set."""
         with self._lock:
+            users, back = self._options.pop(model._address)
+            if users > 1:
+                self._options[model._address] = users - 1, back
+            else:
+                back()
             self._users -= 1
             if not self._users and _SLOT.value == _served():
                 _SLOT.value = self._before

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import math
+import sys
+import warnings
 import weakref
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
 from .callback import CALLBACK
-from .memory import Simulation, check_state
+from .memory import Simulation, check_state, sizes
 from .parameters import Law
 from .step import settle
 
@@ -22,19 +24,11 @@ _INTEGRATORS = {
     *(_RK4, _EULER, int(mujoco.mjtIntegrator.mjINT_IMPLICIT)),
     int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
 }
+_PYRAMID = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL)
+_MOST_STEPS, _LARGEST = 2**31 - 1, sys.float_info.max
 _ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 _NO_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
-
-
-class _Options(NamedTuple):
-    """Of a model, as they are without the law."""
-
-    cone: int
-    integrator: int
-    disableflags: int
-    tendon_armature: npt.NDArray[np.float64] | None
-    rigid: bool = False
 
 
 class Coulomb:
@@ -43,7 +37,7 @@ class Coulomb:
 
     Parameters
     ----------
-    model : any `mujoco.MjModel`, of MuJoCo 3.3 or later; condim 1, 3, 4 and 6. Coulomb's law has no
+    model : any `mujoco.MjModel`, of MuJoCo 3.3.6 or later; condim 1, 3, 4 and 6. Coulomb's law has no
         pyramid: the cone is elliptic while the law acts, and then again what it was
     rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say.
         True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
@@ -60,7 +54,7 @@ class Coulomb:
 
     Each `MjData` has a memory of its own. It takes part in the state of the simulation, so save and
     restore both. Contacts of flexes are left as they are; so is all in a soft simulation in which
-    nothing touches. A copy, also by pickle, has the memory of the only `MjData` that there was.
+    nothing touches. A copy, also by pickle, has the memory of the only `MjData` that there was; of several none.
 
     Raises
     ------
@@ -80,14 +74,14 @@ class Coulomb:
         if not isinstance(model, mujoco.MjModel):
             raise ValueError(f"model is a {type(model).__name__}; a mujoco.MjModel is needed")
         if not isinstance(rigid, (bool, np.bool_)):
-            raise ValueError(f"rigid = {rigid!r} must be True or False")
+            raise ValueError(f"rigid = {_shown(rigid)} must be True or False")
         _check_number("restitution", restitution, "", 0.0, 1.0)
         if restitution and not rigid:
             raise ValueError(
                 f"restitution = {restitution} needs rigid=True: solref says how soft contacts bounce"
             )
         if servo is not None:
-            _check_number("servo", servo, " s", float(model.opt.timestep), math.inf)
+            _check_number("servo", servo, " s", float(model.opt.timestep), _LARGEST)
             if rigid:
                 raise ValueError("servo is for soft contacts: rigid ones have no depth")
         _check_number("share", share, "", 1e-9, 1.0)
@@ -109,8 +103,10 @@ class Coulomb:
         weakref.finalize(self, _remove_all, self._simulations)
 
     def __reduce__(self) -> Any:
-        alone = len(self._simulations) == 1
-        state = self.state() if alone else self._restored
+        try:
+            state = self.state() if len(self._simulations) == 1 else self._restored
+        except ValueError as error:
+            raise TypeError(f"a Coulomb can't be copied now: {error}, or reset()") from error
         return _copy, (self.model, self._law, self._step, state)
 
     def _check(self) -> None:
@@ -152,12 +148,12 @@ class Coulomb:
         address = data._address
         simulation = self._simulations.get(address)
         if simulation is None or simulation.data() is not data:
-            if data.signature != self.model.signature:
+            if not np.array_equal(sizes(data.model), sizes(self.model)):
                 raise ValueError("data belong to another MjModel than this Coulomb")
             if simulation is None or simulation.data() is not None:
                 simulation = self._adopt(address)
-            simulation.data = weakref.ref(data)
-            weakref.finalize(data, _remove, self._simulations, address)
+            simulations = self._simulations
+            simulation.data = weakref.ref(data, lambda _: _remove(simulations, address))
         CALLBACK.know(address, simulation)
         return simulation
 
@@ -167,7 +163,7 @@ class Coulomb:
         if self._restored is not None:
             simulation.restore(self._restored)
             self._restored = None
-        simulation.dampers[0] = self._dampers or (0.0, 0.0)
+        simulation.dampers[0] = self._dampers
         simulation.active[0] = CALLBACK.installed(self.model._address)
         return simulation
 
@@ -238,16 +234,19 @@ class Coulomb:
             If the data belong to another model, an option was changed to one that is refused, or
             `nstep` isn't a whole number.
         """
-        if isinstance(nstep, bool) or not isinstance(nstep, (int, np.integer)) or nstep < 0:
-            raise ValueError(f"nstep = {nstep!r} must be a whole number, at least 0")
-        simulation, active, options = self._enter(data)  # `acting` in fewer microseconds
+        whole = isinstance(nstep, (int, np.integer)) and not isinstance(nstep, bool)
+        if not whole or not 0 <= nstep <= _MOST_STEPS:
+            raise ValueError(
+                f"nstep = {_shown(nstep)} must be a whole number from 0 to {_MOST_STEPS}"
+            )
+        simulation, active = self._enter(data)  # `acting` in fewer microseconds
         try:
             mujoco.mj_step(self.model, data, nstep)
         except BaseException:
             simulation.reset()
             raise
         finally:
-            self._leave(simulation, active, options)
+            self._leave(simulation, active)
 
     def forward(self, data: Any) -> None:
         """Compute forces, accelerations and sensors under the law, as `mujoco.mj_forward` does."""
@@ -257,7 +256,11 @@ class Coulomb:
     def step1(self, data: Any) -> None:
         """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
         self._check_halves(data)
-        mujoco.mj_step1(self.model, data)
+        CALLBACK.set(self.model)
+        try:
+            mujoco.mj_step1(self.model, data)
+        finally:
+            CALLBACK.unset(self.model)
 
     def step2(self, data: Any) -> None:
         """Second half of a step, as `mujoco.mj_step2`."""
@@ -265,8 +268,10 @@ class Coulomb:
         if CALLBACK.installed(self.model._address):
             mujoco.mj_step2(self.model, data)
             return
+        stage = mujoco.mjtStage
+        done = stage.mjSTAGE_NONE if (data.efc_type == _PYRAMID).any() else stage.mjSTAGE_VEL
         with self.acting(data):
-            mujoco.mj_forwardSkip(self.model, data, mujoco.mjtStage.mjSTAGE_VEL, 0)
+            mujoco.mj_forwardSkip(self.model, data, done, 0)
             mujoco.mj_checkAcc(self.model, data)
             euler = self.model.opt.integrator == _EULER
             (mujoco.mj_Euler if euler else mujoco.mj_implicit)(self.model, data)
@@ -280,61 +285,50 @@ class Coulomb:
     @contextlib.contextmanager
     def acting(self, data: Any) -> Iterator[None]:
         """Within this MuJoCo's own functions, called with these data, obey the law."""
-        simulation, active, options = self._enter(data)
+        simulation, active = self._enter(data)
         try:
             yield
         except BaseException:
             simulation.reset()  # the step was left in its middle
             raise
         finally:
-            self._leave(simulation, active, options)
+            self._leave(simulation, active)
 
-    def _enter(self, data: Any) -> tuple[Simulation, int, _Options]:
-        """Let the law act; return whose memory it has, whether it acted before, and the options."""
+    def _enter(self, data: Any) -> tuple[Simulation, int]:
+        """Let the law act; return whose memory it has, and whether it acted before."""
         simulation = self._simulation(data)
         self._check()
-        options, active = self._switch(), simulation.active[0]
-        CALLBACK.set()
-        simulation.active[0] = 1
-        return simulation, active, options
+        active = simulation.active[0]
+        CALLBACK.set(self.model, self._switch)
+        simulation.active[0], simulation.dampers[0] = 1, self._dampers
+        return simulation, active
 
-    def _leave(self, simulation: Simulation, active: int, options: _Options) -> None:
-        CALLBACK.unset()
+    def _leave(self, simulation: Simulation, active: int) -> None:
         simulation.active[0] = active
-        self._switch_back(options)
+        CALLBACK.unset(self.model)
 
-    def _switch(self) -> _Options:
-        """Switch the model to options under which the law acts; return those before.
+    def _switch(self) -> Callable[[], None]:
+        """Switch the model to options under which the law acts; return what puts them back.
 
         Rigid contacts ask for velocities after a step, so they must know of dampers: `add_dampers`
         makes these inertia, and Euler's method leaves them alone. MuJoCo's integrators take them into
         account, too, but only after contacts have been solved for.
         """
-        option, h = self.model.opt, self.model.opt.timestep
-        before = _Options(option.cone, option.integrator, option.disableflags, None)
-        option.cone = _ELLIPTIC
-        if not self._law.rigid or self._dampers is not None:
-            return before
-        implicit = before.integrator != _EULER
-        damped = implicit or not before.disableflags & _NO_DAMPING
-        self._dampers = h * damped, h * implicit
-        option.integrator, option.disableflags = _EULER, before.disableflags | _NO_DAMPING
-        armature = None
-        if implicit and self.model.ntendon:
-            armature = self.model.tendon_armature.copy()
-            self.model.tendon_armature += _tendon_inertia(self.model)
-        for simulation in self._simulations.values():
-            simulation.dampers[0] = self._dampers
-        return before._replace(tendon_armature=armature, rigid=True)
+        option, h, model = self.model.opt, self.model.opt.timestep, self.model
+        cone, integrator, flags = option.cone, option.integrator, option.disableflags
+        armature = model.tendon_armature.copy()
+        option.cone, implicit = _ELLIPTIC, integrator != _EULER
+        if self._law.rigid:
+            self._dampers = h * (implicit or not flags & _NO_DAMPING), h * implicit
+            option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
+            if implicit and model.ntendon:
+                model.tendon_armature += _tendon_inertia(model)
 
-    def _switch_back(self, options: _Options) -> None:
-        option = self.model.opt
-        option.cone = options.cone
-        if options.rigid:
-            option.integrator, option.disableflags = options.integrator, options.disableflags
-            self._dampers = None
-            if options.tendon_armature is not None:
-                self.model.tendon_armature[:] = options.tendon_armature
+        def back() -> None:
+            option.cone, option.integrator, option.disableflags = cone, integrator, flags
+            model.tendon_armature[:] = armature
+
+        return back
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[Coulomb]:
@@ -353,19 +347,24 @@ class Coulomb:
         self._check()
         if CALLBACK.installed(address):
             raise ValueError("this model is under installed() already")
-        options = self._switch()
-        CALLBACK.install(address, self._adopt)
+        CALLBACK.install(address, self._adopt, self._simulations)
         for simulation in self._simulations.values():
             simulation.active[0] = 1
-        CALLBACK.set()
+        CALLBACK.set(self.model, self._switch)
+        acted = True
         try:
             yield self
         finally:
-            CALLBACK.unset()
-            CALLBACK.install(address, None)
-            self._switch_back(options)
+            acted = CALLBACK.uninstall(address)
+            CALLBACK.unset(self.model)
             for simulation in self._simulations.values():
                 simulation.active[0] = 0
+        if not acted:
+            warnings.warn(
+                "another mjcb_control was set under installed(): the law doesn't act since then",
+                RuntimeWarning,
+                stacklevel=3,
+            )
 
 
 def _copy(
@@ -380,8 +379,7 @@ def _copy(
 
 def _remove(simulations: dict[int, Simulation], address: int) -> None:
     """Forget the simulation of data that are gone."""
-    simulations.pop(address, None)
-    CALLBACK.remove(address)
+    CALLBACK.remove(address, simulations.pop(address, None))
 
 
 def _remove_all(simulations: dict[int, Simulation]) -> None:
@@ -394,8 +392,15 @@ def _check_number(name: str, value: float, unit: str, least: float, most: float)
     """Raise `ValueError`, with name, value, unit and range, unless a number is in the range."""
     number = isinstance(value, (int, float, np.integer, np.floating)) and value is not True
     if not number or isinstance(value, bool) or not least <= value <= most:
-        allowed = f"from {least:g} to {most:g}" if most < math.inf else f"at least {least:g}"
-        raise ValueError(f"{name} = {value!r}{unit if number else ''} must be {allowed}{unit}")
+        allowed = f"from {least:g} to {most:g}" if most < _LARGEST else f"at least {least:g}"
+        given = f"{_shown(value)}{unit if number else ''}"
+        raise ValueError(f"{name} = {given} must be {allowed}{unit}")
+
+
+def _shown(value: Any) -> str:
+    """What was given, in a few words of one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 40 else f"{text[:40]}…"
 
 
 def _check_friction(model: Any) -> None:

@@ -162,6 +162,15 @@ def dry_of(memory: Any, count: int) -> Any:
 # -- the arrays, which Python owns -----------------------------------------------------------------
 
 
+_SIZES = ("nq", "nv", "nu", "na", "nbody", "njnt", "ngeom", "ntendon", "neq", "nsensordata")
+_NAMES = ", ".join(_SIZES)
+
+
+def sizes(model: Any) -> npt.NDArray[np.int64]:
+    """By what a model is known: its signature is gone once it was pickled, and MuJoCo 3.3 has none."""
+    return np.array([getattr(model, name) for name in _SIZES], np.int64)
+
+
 def free_bodies(model: Any) -> npt.NDArray[np.void]:
     """Bodies that nothing joins to others, as items of `FREE_BODY`."""
     last = model.jnt_dofadr[model.jnt_type == 0] + 5
@@ -181,6 +190,7 @@ class Simulation:
         record, radius = self.record, model.geom_rbound
         record["law"], record["address"] = law.record(), self.address
         record["model"] = model._address
+        self._sizes = sizes(model)
         record["least"] = law.near * radius.min(where=radius > 0, initial=1e9)
         self.bodies = self._own("body", free_bodies(model) if law.rigid else np.zeros(0, FREE_BODY))
         record["free_bodies"] = len(self.bodies)
@@ -248,6 +258,7 @@ class Simulation:
             "joints": dry.copy(),
             "spins": spins if self.knows else np.zeros_like(spins),
             "time": np.array([record["time"], record["timestep"]]),
+            "sizes": self._sizes,
         }
 
     def restore(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -267,27 +278,35 @@ class Simulation:
 
 def check_state(state: Mapping[str, npt.NDArray[Any]], model: Any, law: Law) -> None:
     """Raise `ValueError` unless it is a state of a simulation of this model."""
-    kinds = {"contacts": REMEMBERED_CONTACT, "joints": _f8, "spins": _f8, "time": _f8}
     free = len(free_bodies(model)) if law.rigid else 0
-    shapes = {"contacts": (None,), "joints": (None,), "spins": (free, 6), "time": (2,)}
-    for name, kind in kinds.items():
+    wanted: dict[str, tuple[Any, tuple[int | None, ...]]] = {
+        "contacts": (REMEMBERED_CONTACT, (None,)),
+        "joints": (_f8, (None,)),
+        "spins": (_f8, (free, 6)),
+        "time": (_f8, (2,)),
+        "sizes": (_i8, (len(_SIZES),)),
+    }
+    for name, (kind, shape) in wanted.items():
         try:
             values: Any = np.asarray(state[name])
-        except (KeyError, TypeError, IndexError) as error:
-            raise ValueError(f"not a state of Coulomb: it has no {name}") from error
+        except (KeyError, TypeError, IndexError, ValueError) as error:
+            raise ValueError(f"not a state of Coulomb: it has no array {name}") from error
         if values.dtype != kind:
-            raise ValueError(f"not a state of Coulomb: {name} of type {values.dtype}")
-        shape = shapes[name]
-        if (
-            len(shape) != values.ndim
-            or shape[0] not in (None, len(values))
-            or (values.shape[1:] != shape[1:])
+            given = values.dtype if values.dtype.names is None else "a structure"
+            raise ValueError(f"not a state of Coulomb: {name} of type {given}")
+        if len(shape) != values.ndim or any(
+            count not in (None, there) for count, there in zip(shape, values.shape, strict=True)
         ):
             raise ValueError(f"not a state of Coulomb: {name} of shape {values.shape}")
         fields = values.dtype.names or ()
         for each in [values[field] for field in fields if field != "speed"] or [values]:
             if name != "time" and not np.isfinite(each).all():
                 raise ValueError(f"not a state of Coulomb: {name} must be finite")
+    if not np.array_equal(state["sizes"], sizes(model)):
+        raise ValueError(
+            f"not a state of this model, whose {_NAMES} are {sizes(model).tolist()}, "
+            f"but of one with {np.asarray(state['sizes']).tolist()}"
+        )
     geoms = state["contacts"]["geoms"]
     if geoms.size and not 0 <= geoms.min() <= geoms.max() < model.ngeom:
         raise ValueError(
