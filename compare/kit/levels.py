@@ -104,7 +104,7 @@ class Effort:
 
     # Parts of a step of `trials.REFINED`. Contacts with much friction answer more slowly: with
     # whole steps the slope of gamma was too coarse on 11 of the 24 sets of the default level.
-    bounds_refined: int = 1
+    bounds_refined: int = 2
     growth_more: int = 1  # multiples of the numbers of directions in growth.PUSHES
     steepest_states: int = 1  # random states of every set out of which slip is pushed all round
     field_starts: int = 4  # random starts for every case and set
@@ -173,6 +173,7 @@ WITNESS = replace(
     pulsation_octaves=(3,), pulsation_steps=256, pulsation_samples=512, pulsation_refine=1, pulsation_reach=1.5,
     pulsation_width=2e-3,
     rates_refined=(16, 16), rates_leaning=(16, 16), rates_more=0.5,
+    bounds_refined=1,
     laws_refined=(4, 4),
     field_starts=2, field_kept=2,
 )

@@ -234,7 +234,7 @@ def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
         (Case.RS, (0, 1, 0), "held", (slow, 3 * slow)),
         (Case.RS, (0, 1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing)),
         (Case.RS, (0, -1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing)),
-        (Case.SR, (-1, 0, 0), "held", (fast, 1.75 * fast)),
+        (Case.SR, (-1, 0, 0), "held", (fast, 1.5 * fast)),
         (Case.SR, (1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning)),
         (Case.SR, (-1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning)),
         (Case.SS, (0, 0, 1), "stationary", (0.4 * hanging, 0.8 * hanging)),
