@@ -13,7 +13,6 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from .compiling import c_address
@@ -21,7 +20,6 @@ from .engine import LIBRARY
 from .memory import Simulation
 from .step import TABLE, serve, table
 
-_ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
 
@@ -31,8 +29,8 @@ class Callback:
     def __init__(self) -> None:
         self._lock, self._users = threading.RLock(), 0
         self._before: int | None = None  # the callback that was there, by its address
-        # by model: its users, and what puts its options back
-        self._options: dict[int, tuple[int, Callable[[], None]]] = {}
+        # by model: its users, times that make its dampers inertia, and what puts its options back
+        self._options: dict[int, tuple[int, tuple[float, float], Callable[[], None]]] = {}
         self._simulations: dict[int, Simulation] = {}
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
@@ -108,11 +106,16 @@ class Callback:
             self._publish()
             return bool(_SLOT.value == _served())
 
-    def set(self, model: Any, switch: Callable[[], Callable[[], None]]) -> None:
-        """Set MuJoCo's callback, unless it is set, and let the first user `switch` the options."""
+    def set(
+        self, model: Any, switch: Callable[[], tuple[tuple[float, float], Callable[[], None]]]
+    ) -> tuple[float, float]:
+        """Set MuJoCo's callback, unless it is set; the first user of a model `switch`es its options.
+
+        Returns the times that make its dampers inertia, s.
+        """
         with self._lock:
-            users, back = self._options.get(model._address) or (0, switch())
-            self._options[model._address] = users + 1, back
+            users, times, back = self._options.get(model._address) or (0, *switch())
+            self._options[model._address] = users + 1, times, back
             self._users += 1
             before = _SLOT.value
             if before != _served():
@@ -120,13 +123,18 @@ class Callback:
                     self._before = before
                     self._publish()
                 _SLOT.value = _served()
+            return times
+
+    def dampers(self, model: int) -> tuple[float, float]:
+        """Times that make the dampers of a model inertia, s."""
+        return self._options[model][1] if model in self._options else (0.0, 0.0)
 
     def unset(self, model: Any) -> None:
         """Put back options after their last user, and the callback, unless another one was set."""
         with self._lock:
-            users, back = self._options.pop(model._address)
+            users, times, back = self._options.pop(model._address)
             if users > 1:
-                self._options[model._address] = users - 1, back
+                self._options[model._address] = users - 1, times, back
             else:
                 back()
             self._users -= 1

@@ -95,9 +95,6 @@ class Coulomb:
     def _begin(self, model: Any, law: Law, step: float) -> None:
         """Set what belongs to the model; nothing is remembered."""
         self.model, self._law, self._step = model, law, step
-        self._dampers: tuple[float, float] | None = (
-            None  # of joints, of servos: times for inertia, s
-        )
         self._simulations: dict[int, Simulation] = {}
         self._restored: Mapping[str, npt.NDArray[Any]] | None = None
         weakref.finalize(self, _remove_all, self._simulations)
@@ -163,7 +160,7 @@ class Coulomb:
         if self._restored is not None:
             simulation.restore(self._restored)
             self._restored = None
-        simulation.dampers[0] = self._dampers
+        simulation.dampers[0] = CALLBACK.dampers(self.model._address)
         simulation.active[0] = CALLBACK.installed(self.model._address)
         return simulation
 
@@ -256,7 +253,7 @@ class Coulomb:
     def step1(self, data: Any) -> None:
         """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
         self._check_halves(data)
-        CALLBACK.set(self.model)
+        CALLBACK.set(self.model, self._switch)
         try:
             mujoco.mj_step1(self.model, data)
         finally:
@@ -299,27 +296,31 @@ class Coulomb:
         simulation = self._simulation(data)
         self._check()
         active = simulation.active[0]
-        CALLBACK.set(self.model, self._switch)
-        simulation.active[0], simulation.dampers[0] = 1, self._dampers
+        simulation.dampers[0] = CALLBACK.set(self.model, self._switch)
+        simulation.active[0] = 1
         return simulation, active
 
     def _leave(self, simulation: Simulation, active: int) -> None:
         simulation.active[0] = active
         CALLBACK.unset(self.model)
 
-    def _switch(self) -> Callable[[], None]:
-        """Switch the model to options under which the law acts; return what puts them back.
+    def _switch(self) -> tuple[tuple[float, float], Callable[[], None]]:
+        """Switch the model to options under which the law acts.
 
         Rigid contacts ask for velocities after a step, so they must know of dampers: `add_dampers`
         makes these inertia, and Euler's method leaves them alone. MuJoCo's integrators take them into
         account, too, but only after contacts have been solved for.
+
+        Returns
+        -------
+        times that make dampers of joints, and servos on them, inertia, s; what puts options back
         """
         option, h, model = self.model.opt, self.model.opt.timestep, self.model
         cone, integrator, flags = option.cone, option.integrator, option.disableflags
-        armature = model.tendon_armature.copy()
+        armature, times = model.tendon_armature.copy(), (0.0, 0.0)
         option.cone, implicit = _ELLIPTIC, integrator != _EULER
         if self._law.rigid:
-            self._dampers = h * (implicit or not flags & _NO_DAMPING), h * implicit
+            times = h * (implicit or not flags & _NO_DAMPING), h * implicit
             option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
             if implicit and model.ntendon:
                 model.tendon_armature += _tendon_inertia(model)
@@ -328,7 +329,7 @@ class Coulomb:
             option.cone, option.integrator, option.disableflags = cone, integrator, flags
             model.tendon_armature[:] = armature
 
-        return back
+        return times, back
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[Coulomb]:
@@ -348,9 +349,9 @@ class Coulomb:
         if CALLBACK.installed(address):
             raise ValueError("this model is under installed() already")
         CALLBACK.install(address, self._adopt, self._simulations)
+        times = CALLBACK.set(self.model, self._switch)
         for simulation in self._simulations.values():
-            simulation.active[0] = 1
-        CALLBACK.set(self.model, self._switch)
+            simulation.active[0], simulation.dampers[0] = 1, times
         acted = True
         try:
             yield self

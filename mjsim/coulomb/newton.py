@@ -174,7 +174,7 @@ def add_unit(
         place[c] = -1
     units.contact[n], units.address[n], units.dim[n] = contact, address, dim
     units.first[n + 1], units.begin[n + 1] = end, units.begin[n] + dim * (end - begin)
-    return n + (end > begin)
+    return int(n + (end > begin))
 
 
 @kernel
