@@ -29,8 +29,9 @@ class Callback:
     def __init__(self) -> None:
         self._lock, self._users = threading.RLock(), 0
         self._before: int | None = None  # the callback that was there, by its address
-        # by model: its users, times that make its dampers inertia, and what puts its options back
-        self._options: dict[int, tuple[int, tuple[float, float], Callable[[], None]]] = {}
+        # by model: its users, what switched its options, times that make its dampers inertia, and
+        # what puts its options back
+        self._options: dict[int, tuple[int, Any, tuple[float, float], Callable[[], None]]] = {}
         self._simulations: dict[int, Simulation] = {}
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
@@ -112,10 +113,17 @@ class Callback:
         """Set MuJoCo's callback, unless it is set; the first user of a model `switch`es its options.
 
         Returns the times that make its dampers inertia, s.
+
+        Raises
+        ------
+        ValueError
+            If another law acts on the model just now: its options may be others.
         """
         with self._lock:
-            users, times, back = self._options.get(model._address) or (0, *switch())
-            self._options[model._address] = users + 1, times, back
+            users, by, times, back = self._options.get(model._address) or (0, switch, *switch())
+            if by != switch:
+                raise ValueError("this model is under the law of another Coulomb just now")
+            self._options[model._address] = users + 1, by, times, back
             self._users += 1
             before = _SLOT.value
             if before != _served():
@@ -132,9 +140,9 @@ class Callback:
     def unset(self, model: Any) -> None:
         """Put back options after their last user, and the callback, unless another one was set."""
         with self._lock:
-            users, times, back = self._options.pop(model._address)
+            users, by, times, back = self._options.pop(model._address)
             if users > 1:
-                self._options[model._address] = users - 1, times, back
+                self._options[model._address] = users - 1, by, times, back
             else:
                 back()
             self._users -= 1

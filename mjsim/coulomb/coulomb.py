@@ -348,8 +348,8 @@ class Coulomb:
         self._check()
         if CALLBACK.installed(address):
             raise ValueError("this model is under installed() already")
-        CALLBACK.install(address, self._adopt, self._simulations)
         times = CALLBACK.set(self.model, self._switch)
+        CALLBACK.install(address, self._adopt, self._simulations)
         for simulation in self._simulations.values():
             simulation.active[0], simulation.dampers[0] = 1, times
         acted = True

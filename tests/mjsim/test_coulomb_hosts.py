@@ -583,7 +583,9 @@ def test_one_law_at_a_time():
         mujoco.mj_step(model, data, 40)
         with pytest.raises(ValueError, match="these data are under the law of another Coulomb"):
             two.step(data)
-        two.restore(two.state())  # and it forgets its own alone
+        with pytest.raises(ValueError, match="this model is under the law of another Coulomb"):
+            two.step(mujoco.MjData(model))
+        two.restore(Coulomb(model).state())  # and it forgets its own alone
         mujoco.mj_step(model, data, 40)
     assert (data.qpos == expected.qpos).all()
 
