@@ -135,7 +135,7 @@ class Callback:
 
     def dampers(self, model: int) -> tuple[float, float]:
         """Times that make the dampers of a model inertia, s."""
-        return self._options[model][1] if model in self._options else (0.0, 0.0)
+        return self._options[model][2] if model in self._options else (0.0, 0.0)
 
     def unset(self, model: Any) -> None:
         """Put back options after their last user, and the callback, unless another one was set."""
