@@ -22,6 +22,9 @@ from .step import TABLE, serve, table
 
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
+_Switched = tuple[tuple[float, float], Callable[[], None]]
+"""Times that make dampers inertia, s; what puts a model's options back."""
+
 
 class Callback:
     """Who is under the law: one for the process."""
@@ -29,9 +32,8 @@ class Callback:
     def __init__(self) -> None:
         self._lock, self._users = threading.RLock(), 0
         self._before: int | None = None  # the callback that was there, by its address
-        # by model: its users, what switched its options, times that make its dampers inertia, and
-        # what puts its options back
-        self._options: dict[int, tuple[int, Any, tuple[float, float], Callable[[], None]]] = {}
+        # by model: its users, whether they are rigid, and what `set` was given
+        self._options: dict[int, tuple[int, bool, tuple[float, float], Callable[[], None]]] = {}
         self._simulations: dict[int, Simulation] = {}
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
@@ -107,9 +109,7 @@ class Callback:
             self._publish()
             return bool(_SLOT.value == _served())
 
-    def set(
-        self, model: Any, switch: Callable[[], tuple[tuple[float, float], Callable[[], None]]]
-    ) -> tuple[float, float]:
+    def set(self, model: Any, rigid: bool, switch: Callable[[], _Switched]) -> tuple[float, float]:
         """Set MuJoCo's callback, unless it is set; the first user of a model `switch`es its options.
 
         Returns the times that make its dampers inertia, s.
@@ -117,13 +117,15 @@ class Callback:
         Raises
         ------
         ValueError
-            If another law acts on the model just now: its options may be others.
+            If a law of the other kind, soft or rigid, acts on the model just now.
         """
         with self._lock:
-            users, by, times, back = self._options.get(model._address) or (0, switch, *switch())
-            if by != switch:
-                raise ValueError("this model is under the law of another Coulomb just now")
-            self._options[model._address] = users + 1, by, times, back
+            known = self._options.get(model._address) or (0, rigid, *switch())
+            users, as_rigid, times, back = known
+            if as_rigid != rigid:
+                kinds = "rigid and soft Coulombs need different options"
+                raise ValueError(f"{kinds}: one at a time for a model")
+            self._options[model._address] = users + 1, rigid, times, back
             self._users += 1
             before = _SLOT.value
             if before != _served():
@@ -140,9 +142,9 @@ class Callback:
     def unset(self, model: Any) -> None:
         """Put back options after their last user, and the callback, unless another one was set."""
         with self._lock:
-            users, by, times, back = self._options.pop(model._address)
+            users, rigid, times, back = self._options.pop(model._address)
             if users > 1:
-                self._options[model._address] = users - 1, by, times, back
+                self._options[model._address] = users - 1, rigid, times, back
             else:
                 back()
             self._users -= 1

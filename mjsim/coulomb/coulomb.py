@@ -253,7 +253,7 @@ class Coulomb:
     def step1(self, data: Any) -> None:
         """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
         self._check_halves(data)
-        CALLBACK.set(self.model, self._switch)
+        CALLBACK.set(self.model, self._law.rigid, self._switch)
         try:
             mujoco.mj_step1(self.model, data)
         finally:
@@ -296,7 +296,7 @@ class Coulomb:
         simulation = self._simulation(data)
         self._check()
         active = simulation.active[0]
-        simulation.dampers[0] = CALLBACK.set(self.model, self._switch)
+        simulation.dampers[0] = CALLBACK.set(self.model, self._law.rigid, self._switch)
         simulation.active[0] = 1
         return simulation, active
 
@@ -348,7 +348,7 @@ class Coulomb:
         self._check()
         if CALLBACK.installed(address):
             raise ValueError("this model is under installed() already")
-        times = CALLBACK.set(self.model, self._switch)
+        times = CALLBACK.set(self.model, self._law.rigid, self._switch)
         CALLBACK.install(address, self._adopt, self._simulations)
         for simulation in self._simulations.values():
             simulation.active[0], simulation.dampers[0] = 1, times

@@ -583,11 +583,13 @@ def test_one_law_at_a_time():
         mujoco.mj_step(model, data, 40)
         with pytest.raises(ValueError, match="these data are under the law of another Coulomb"):
             two.step(data)
-        with pytest.raises(ValueError, match="this model is under the law of another Coulomb"):
-            two.step(mujoco.MjData(model))
         two.restore(Coulomb(model).state())  # and it forgets its own alone
         mujoco.mj_step(model, data, 40)
     assert (data.qpos == expected.qpos).all()
+    stiff = Coulomb(model, rigid=True)
+    with one.installed(), pytest.raises(ValueError, match=r"rigid and soft .* one at a time"):
+        stiff.step(mujoco.MjData(model))
+    stiff.step(mujoco.MjData(model))
 
 
 def test_a_callback_set_under_installed_is_told_of():
