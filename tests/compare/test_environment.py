@@ -35,7 +35,6 @@ def dualball(where, *words, before="", **environment):
     shell = ["bash", "-c", f'"$@" {before}', "bash", sys.executable, "-m", "compare", *words]
     own = {
         "PYTHONPATH": str(ROOT),
-        "NUMBA_DISABLE_JIT": "1",
     } | environment  # to load what is compiled takes longer
     done = subprocess.run(shell, cwd=where, env=kept | own, capture_output=True, timeout=120)
     assert b"Traceback" not in done.stdout + done.stderr, done.stderr
@@ -72,7 +71,7 @@ def test_no_place_for_what_is_compiled(here):
         "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator",
         "NUMBA_CACHE_DIR": "/proc/nowhere",
     }
-    done = dualball(here, "simulate", "--time", "0.05", NUMBA_DISABLE_JIT="0", **nowhere)
+    done = dualball(here, "simulate", "--time", "0.05", **nowhere)
     assert (done.returncode, done.stderr) == (0, b"")
 
 

@@ -385,7 +385,8 @@ def test_what_has_no_forecast_gets_one_line(text, forecasts, tmp_path):
     code, said = REFUSED[text]
     error = forecasts(text, "--settle", "2", code=code)
     assert re.search(said, error)
-    assert error.count("\n") == 1
+    said = [line for line in error.splitlines() if not re.match(r"(\d+ s: )?forecast", line)]
+    assert len(said) == 1  # beside how long it has been at it
     assert [each.name for each in tmp_path.iterdir()] == ["scene.xml"]
 
 
