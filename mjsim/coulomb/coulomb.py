@@ -17,7 +17,7 @@ import numpy.typing as npt
 from .callback import CALLBACK
 from .memory import Simulation, check_state, sizes
 from .parameters import Law
-from .step import settle
+from .step import finish, settle
 
 _RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
 _INTEGRATORS = {
@@ -243,7 +243,7 @@ class Coulomb:
             simulation.reset()
             raise
         finally:
-            self._leave(simulation, active)
+            self._leave(data, simulation, active)
 
     def forward(self, data: Any) -> None:
         """Compute forces, accelerations and sensors under the law, as `mujoco.mj_forward` does."""
@@ -289,7 +289,7 @@ class Coulomb:
             simulation.reset()  # the step was left in its middle
             raise
         finally:
-            self._leave(simulation, active)
+            self._leave(data, simulation, active)
 
     def _enter(self, data: Any) -> tuple[Simulation, int]:
         """Let the law act; return whose memory it has, and whether it acted before."""
@@ -300,7 +300,8 @@ class Coulomb:
         simulation.active[0] = 1
         return simulation, active
 
-    def _leave(self, simulation: Simulation, active: int) -> None:
+    def _leave(self, data: Any, simulation: Simulation, active: int) -> None:
+        finish(self.model._address, data._address, simulation.address)
         simulation.active[0] = active
         CALLBACK.unset(self.model)
 

@@ -483,3 +483,21 @@ def test_rigid_contacts_know_of_dampers_that_are_changed_while_it_runs(joint, in
         with law.installed() if installed else contextlib.nullcontext():
             mujoco.mj_step(model, data, 5) if installed else law.step(data, 5)
         assert data.qvel == pytest.approx(plain.qvel, rel=1e-9, abs=1e-15)
+
+
+@WAYS
+def test_what_is_computed_between_steps_changes_nothing(rigid):
+    """A viewer or logger calls `mj_forward`, which is plain MuJoCo's, pyramid and all."""
+    model, data = scene(np.radians(15), cone="pyramidal", option='tolerance="1e-14"')
+    law, other = Coulomb(model, rigid=rigid), mujoco.MjData(model)
+    seen = Coulomb(model, rigid=rigid)
+    for _ in range(300):
+        law.step(data)
+        seen.step(other)
+        mujoco.mj_forward(model, other)
+    law.step(data, 500)
+    place = other.qpos.copy()
+    for _ in range(500):
+        seen.step(other)
+        mujoco.mj_forward(model, other)
+    assert other.qpos == pytest.approx(place, abs=1e-11)
