@@ -244,7 +244,8 @@ def assert_tracks(
     ------
     AssertionError
         If it does.
-    InputError For fewer than `FEWEST` samples, a reference that ends earlier, samples too far apart
+    InputError
+        For fewer than `FEWEST` samples, a reference that ends earlier, samples too far apart
         to be interpolated.
     """
     check_number("rms", rms, "1", POSITIVE)
@@ -295,7 +296,8 @@ def assert_settles(
     ------
     AssertionError
         If it doesn't.
-    InputError If there is no such state, or the motion is too short to judge: before its last
+    InputError
+        If there is no such state, or the motion is too short to judge: before its last
         quarter three of the slowest time constants must pass, or a ball that started in theory's
         state might not have left it yet. They are those of a disturbance of the state and of a ball
         that is taken along from rest, (1 + 2 j)/c with the c of its lag in the state, and no less

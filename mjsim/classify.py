@@ -63,7 +63,7 @@ class Classifier:
     timestep : s
     midpoint : where in a step forces are found, in steps after its beginning
     dead_band : slip speeds, m s-1, below which contacts roll, of their friction forces divided by
-    the mass, m s-2"""
+        the mass, m s-2"""
 
     def __init__(
         self,

@@ -59,13 +59,14 @@ class Run:
     theta_0 : azimuth at the start, rad
     state : `state()` of an earlier process, from which to go on
     progress : called with the fraction done, from time to time; an error that it raises ends the
-    run
+        run
 
     A run that diverges yields what it has, and its header says why.
 
     Raises
     ------
-    InputError If an argument is of another type or out of range, or the time step is too large for
+    InputError
+        If an argument is of another type or out of range, or the time step is too large for
         the problem.
     """
 

@@ -140,7 +140,8 @@ class Parameters:
 
     Raises
     ------
-    InputError If a value is not a finite number in its range, or the law of drag lacks the fluid's
+    InputError
+        If a value is not a finite number in its range, or the law of drag lacks the fluid's
         viscosity; the message names field, value, unit and range.
     """
 

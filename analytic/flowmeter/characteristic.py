@@ -87,7 +87,7 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
     Parameters
     ----------
     case : which attractor; needed between omega_02 and omega_04 only, where SS lags and SR and NR
-    don't
+        don't
 
     Raises `InputError` if there is no attractor (of that case), or if `case` is needed.
     """

@@ -129,9 +129,8 @@ def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity:
     """Terminal speed v in m/s of a sphere in a fluid at rest: weight less buoyancy is 6 pi rho_f
     nu_f r v.
 
-    nu_f : kinematic viscosity of the fluid, m2 s-1; rho_f, rho_b : densities of fluid and sphere,
-    kg m-3;
-    r : radius, m; gravity : m s-2, in vacuum
+    nu_f is the kinematic viscosity of the fluid, m2 s-1; rho_f and rho_b are densities of fluid and
+    sphere, kg m-3; r is the radius, m; gravity is in vacuum, m s-2.
     """
     heavier = 4 / 3 * math.pi * r**3 * (rho_b - rho_f) * gravity
     return heavier / (6 * math.pi * rho_f * nu_f * r)

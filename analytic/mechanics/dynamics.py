@@ -42,11 +42,12 @@ def vector_field(
     ----------
     x : states, shape (..., 6) or (..., 8), see `model.kinematics`
     omega_0 : angular velocity of the fluid in rad s-1 if it isn't ``p.omega_0``; broadcast against
-    (...)
+        (...)
 
     Returns
     -------
-    Array dx/dt, shape of x. Whether the contact forces are admissible is not checked, see
+    Array
+        dx/dt, shape of x. Whether the contact forces are admissible is not checked, see
         `contact_forces`.
 
     Raises `InputError` if x isn't a state of the case (`check_state`).

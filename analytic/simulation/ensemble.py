@@ -69,7 +69,7 @@ def simulate_many(
     t_end, sample_interval : s; a thousandth of t_end if None
     settings : `Settings` if None; one timestep for all where it is given
     quiet : end a run in which nothing has landed for that long, s; its last state stands for the
-    rest
+        rest
     threads : number of threads, that of the cores if None
 
     Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't

@@ -40,20 +40,22 @@ def simulate(
     t_end : duration, s
     settings : `Settings` if None
     sample_interval : time between samples, s; a thousandth of t_end if None. The end is always a
-    sample.
+        sample.
     theta_0 : azimuth at the start, rad
     progress : called with the fraction done, from time to time; ends the run where it raises
-    `InterruptedError`
+        `InterruptedError`
     changes : any field of `Settings` by name, in place of that in `settings`
 
     Returns
     -------
-    Trajectory Its header has the largest error of the energy balance (``energy_residual`` in J,
+    Trajectory
+        Its header has the largest error of the energy balance (``energy_residual`` in J,
         beside ``energy_scale``, the largest energy in play).
 
     Raises
     ------
-    InputError If an argument is of another type or out of range, or the ball starts inside floor or
+    InputError
+        If an argument is of another type or out of range, or the ball starts inside floor or
         wall, or with a speed into one it touches (unless ``initial_impact``).
     SimulationError
         If the run can't go on, or `progress` ends it; it carries the samples so far.

@@ -103,7 +103,8 @@ def simulate(
 
     Raises
     ------
-    InputError If the library is not installed, an argument out of range, or the time step too large
+    InputError
+        If the library is not installed, an argument out of range, or the time step too large
         for the problem.
     """
     p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep

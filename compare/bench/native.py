@@ -89,7 +89,8 @@ def read(path: Path) -> Native:
     ------
     StorageError
         If the file can't be read.
-    InputError If it is no MJCF, lacks a ball or anything for it to pair, or has an option that is
+    InputError
+        If it is no MJCF, lacks a ball or anything for it to pair, or has an option that is
         out of range.
     """
     model, _ = load(path)

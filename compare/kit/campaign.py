@@ -104,7 +104,7 @@ class Campaign:
     label : what the names of new files begin with, see `reduce`
     save : writes the whole runs of a batch, by key, to a file
     passing : whether `reduce` removes most: batches of less than `SOON_DONE` are then stored only
-    if memory is short"""
+        if memory is short"""
 
     directory: Path
     workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)

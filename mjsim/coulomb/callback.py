@@ -110,7 +110,7 @@ class Callback:
             return bool(_SLOT.value == _served())
 
     def set(self, model: Any, rigid: bool, switch: Callable[[], _Switched]) -> tuple[float, float]:
-        """Set MuJoCo's callback, unless it is set; the first user of a model `switch`es its options.
+        """Set MuJoCo's callback, unless it is set; the first user of a model switches its options.
 
         Returns the times that make its dampers inertia, s.
 

@@ -198,7 +198,7 @@ def test_an_interrupted_run_is_kept_and_goes_on_to_the_same_bits(tmp_path, monke
     here.mkdir()
     line = f"simulate --time 90 --sample-interval 0.004 -o {here / 'run.h5'}"
 
-    def pressing(task, path, stop):
+    def pressing(task, path, stop, **given):
         blocks, last = itertools.count(1), presses.pop(0)
 
         def pressed():
@@ -206,7 +206,7 @@ def test_an_interrupted_run_is_kept_and_goes_on_to_the_same_bits(tmp_path, monke
                 signal.raise_signal(signal.SIGINT)
             return stop()
 
-        return store(task, path, stop=pressed)
+        return store(task, path, stop=pressed, **given)
 
     monkeypatch.setattr(simulate, "store", pressing)
     code, _, said = carried_out(capsys, line)

@@ -12,7 +12,7 @@ others do.
   slower.
 * Balls in strong drag are run for 60/c, long enough for drag to act: do they go on hopping?
 * On floors so rough (mu > 1) that forces allow rolling and slipping both: what does the ball settle
-to?"""
+  to?"""
 
 from __future__ import annotations
 
