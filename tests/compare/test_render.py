@@ -353,13 +353,15 @@ def test_pages_of_other_sites_are_not_answered(address, path):
             got = urllib.request.urlopen(asked, timeout=10)
         except urllib.error.HTTPError as error:
             got = error
-        assert got.status == answer, origin
-        assert answer == 200 or "access-control-allow-origin" not in got.headers
+        with got:
+            assert got.status == answer, origin
+            assert answer == 200 or "access-control-allow-origin" not in got.headers
     upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Origin": "http://example.org"}
     upgrade |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="}
     url = f"{address}_nicegui_ws/socket.io/?EIO=4&transport=websocket"
-    with pytest.raises(urllib.error.HTTPError, match="403"):
+    with pytest.raises(urllib.error.HTTPError, match="403") as refusal:
         urllib.request.urlopen(urllib.request.Request(url, headers=upgrade), timeout=10)
+    refusal.value.close()
 
 
 @pytest.mark.slow
