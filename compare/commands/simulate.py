@@ -12,7 +12,7 @@ from pathlib import Path
 
 from compare.commands import options, running, signals
 from compare.kit import collection, steady, sweep
-from compare.kit.tasks import failed_path, journal_path, store
+from compare.kit.tasks import failed_path, store
 from compare.view import motions
 from mjsim import ContactSettings
 from model import Flow, InputError, storage
@@ -52,12 +52,7 @@ def run(args: argparse.Namespace) -> int:
         if failure:
             kept = "nothing is kept without --output"
             if args.output:
-                kept, journal = (
-                    f"its samples so far are kept in {failed_path(path)}",
-                    journal_path(task, path),
-                )
-                if journal.exists():
-                    kept += f", and the same command goes on from what {journal} holds"
+                kept = f"its samples so far are kept in {failed_path(path)}"
             print(f"dualball: the simulation {failure}; {kept}", file=sys.stderr)
         return 128 + heard[0] if heard else 1 if failure else 0
 

@@ -69,7 +69,7 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
             ) as before:  # what is to be overwritten must be the collection of the last time
                 if before.attrs.get("schema") != SCHEMA:
                     raise StorageError("it holds runs to be gathered, and can't be the output, too")
-        elif file.parent.suffix != ".journal":  # of a run that goes on
+        else:
             files.append(file)
     shares = [files[k : k + SHARE] for k in range(0, len(files), SHARE)]
     parts, problems = [], list[str]()

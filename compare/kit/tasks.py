@@ -21,7 +21,6 @@ import numpy.typing as npt
 import mjsim
 from compare.kit import engines
 from compare.kit.engines import Engine
-from compare.kit.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
 
 # MuJoCo would print each of its warnings, and write them to MUJOCO_LOG.TXT in the current
@@ -29,8 +28,7 @@ from model import Flow, InputError, Parameters, State, Trajectory, storage
 mujoco.set_mju_user_warning(lambda text: None)
 
 LONG = 1e6
-"""Steps from which on a run that hands out its samples keeps a journal and is simulated alone,
-outside a batch."""
+"""Steps from which on a run that hands out its samples is simulated alone, outside a batch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,9 +135,8 @@ def store(
     """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 
     A run that breaks down is kept under `failed_path`, until one into the same file is whole.
-    Samples of MuJoCo go to the file as they come, and a run of more than `LONG` steps keeps a
-    journal, from which it goes on after having been killed. Once `stop` says so, a run ends as if
-    it had broken down, but MuJoCo's keeps its journal. `tell` is called with the fraction done.
+    Samples of MuJoCo go to the file as they come. Once `stop` says so, a run ends as if it had
+    broken down. `tell` is called with the fraction done.
 
     Raises
     ------
@@ -161,30 +158,16 @@ def store(
         failure = run.header.failure
         storage.save(run, failed_path(path) if failure else path)
     else:
-        journal = Journal(journal_path(task, path)) if task.long else None
-        earlier, state = journal.recall() if journal else (iter(()), {})
-        try:
-            under_way = _start_stream(task, state=state, progress=tell)
-        except InputError:  # there is nothing to go on with
-            if journal:
-                journal.discard()
-            raise
-        stopped = ""
+        under_way, stopped = _start_stream(task, progress=tell), ""
         with storage.TrajectoryWriter(path, under_way.header) as writer:
-            for block in earlier:
-                writer.append(block)
             for block in under_way:
                 check(0.0)
                 writer.append(block)
-                if journal:
-                    journal.note(block, under_way.state())
                 if stop():
                     stopped = f"was stopped at t = {block['time'].max(initial=0.0):g} s"
                     break
             failure = under_way.header.failure or stopped
             writer.end(under_way.events, failure, failed_path(path) if failure else path)
-        if journal and not stopped:
-            journal.discard()
     if not failure:
         failed_path(path).unlink(missing_ok=True)
     return failure
@@ -193,12 +176,6 @@ def store(
 def failed_path(path: Path) -> Path:
     """The path at which a run that broke down is kept, by that of a whole run."""
     return path.with_suffix(".failed.h5")
-
-
-def journal_path(task: Task, path: Path) -> Path:
-    """Where a long run into a file keeps its journal, under its `Task.key`, since the file may have
-    any name."""
-    return path.with_name(f"{task.key}.journal")
 
 
 def _start_stream(task: Task, **more: Any) -> mjsim.Run:

@@ -133,9 +133,7 @@ def test_the_same_run_is_taken_once_and_refused_by_name_where_its_numbers_differ
 
 
 def test_what_is_no_run_is_left_out(runs):
-    """The collection of the last time, and the journal of a run that goes on."""
-    (runs / "x.journal").mkdir()
-    (runs / "x.journal" / "000000.h5").touch()
+    """The collection of the last time."""
     assert collection.collect(runs, runs / "all.h5") == 6
     assert collection.collect(runs, runs / "all.h5") == 6
 
