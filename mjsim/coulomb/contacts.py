@@ -42,7 +42,7 @@ from .memory import (
     poses_at,
     rows_of,
 )
-from .parameters import CORNER, FLUSH, STILL, UNMOVED
+from .parameters import AT_MOST, CORNER, FLUSH, STILL, UNMOVED
 
 SIZE = MJ_CONTACT.itemsize
 
@@ -386,11 +386,43 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
             add_point(data, memory, old)
             added += 1
     if added:
-        mj_makeConstraint(memory.model, memory.data)
-        mj_island(memory.model, memory.data)
-        mj_projectConstraint(memory.model, memory.data)
-        mj_fwdVelocity(memory.model, memory.data)
+        make_rows_anew(memory)
     return added > 0
+
+
+@kernel
+def leave_added_points_out(model: Any, data: Any, memory: Any) -> bool:
+    """Leave out points that the collider adds to a patch whose points are all where they were.
+
+    They are deeper than the bodies can have come in a step: their springs would throw these apart.
+    Returns whether there were any: the constraint rows are then made anew.
+    """
+    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
+    before, left_out = contacts_at(memory.before_at, memory.contacts_before), False
+    velocity = reals(data.efc_vel, data.nefc)
+    for i in range(memory.contacts):
+        new = contacts[i]
+        closing = max(-velocity[new.address], 0.0) * model.opt.timestep
+        if new.state != NEW or -new.gap <= UNMOVED + AT_MOST * closing:
+            continue
+        had, kept = 0, True
+        for k in range(len(before)):
+            if same_geoms(before[k].geoms, new.geoms):
+                had, kept = had + 1, kept and before[k].moved < UNMOVED**2
+        if kept and had > 2:
+            found[new.index].exclude, found[new.index].efc_address, left_out = 1, -1, True
+    if left_out:
+        make_rows_anew(memory)
+    return left_out
+
+
+@kernel
+def make_rows_anew(memory: Any) -> None:
+    """Let MuJoCo make the constraint rows of the contacts that there are now."""
+    mj_makeConstraint(memory.model, memory.data)
+    mj_island(memory.model, memory.data)
+    mj_projectConstraint(memory.model, memory.data)
+    mj_fwdVelocity(memory.model, memory.data)
 
 
 @kernel

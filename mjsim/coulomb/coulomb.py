@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from .callback import CALLBACK
 from .memory import Simulation, check_state, sizes
-from .parameters import Law
+from .parameters import CCD_TOLERANCE, Law
 from .step import finish, settle
 
 _RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
@@ -38,7 +38,9 @@ class Coulomb:
     Parameters
     ----------
     model : any `mujoco.MjModel`, of MuJoCo 3.3.6 or later; condim 1, 3, 4 and 6. Coulomb's law has no
-        pyramid: the cone is elliptic while the law acts, and then again what it was
+        pyramid: the cone is elliptic while the law acts, and then again what it was. So give a model
+        whose forces you read by `mj_contactForce` the elliptic cone, or read them in `acting`:
+        MuJoCo would take the rows for a pyramid's
     rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say.
         True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
         within one step. Geoms get a `margin` in which contacts are seen ahead, but bear nothing: at
@@ -318,16 +320,20 @@ class Coulomb:
         """
         option, h, model = self.model.opt, self.model.opt.timestep, self.model
         cone, integrator, flags = option.cone, option.integrator, option.disableflags
+        accuracy = option.ccd_tolerance
         armature, times = model.tendon_armature.copy(), (0.0, 0.0)
         option.cone, implicit = _ELLIPTIC, integrator != _EULER
         if self._law.rigid:
             times = h * (implicit or not flags & _NO_DAMPING), h * implicit
             option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
+            # what lies on a smooth side rolls off if its point is a micrometre beside it
+            option.ccd_tolerance = min(accuracy, CCD_TOLERANCE)
             if implicit and model.ntendon:
                 model.tendon_armature += _tendon_inertia(model)
 
         def back() -> None:
             option.cone, option.integrator, option.disableflags = cone, integrator, flags
+            option.ccd_tolerance = accuracy
             model.tendon_armature[:] = armature
 
         return times, back

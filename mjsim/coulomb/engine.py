@@ -71,7 +71,18 @@ def _only(whole: np.dtype[Any], *names: str, **parts: np.dtype[Any]) -> np.dtype
 
 MJ_CONTACT = _only(
     structure("mjContact"),
-    *("dist", "pos", "frame", "includemargin", "friction", "mu", "dim", "geom", "efc_address"),
+    *(
+        "dist",
+        "pos",
+        "frame",
+        "includemargin",
+        "friction",
+        "mu",
+        "dim",
+        "geom",
+        "exclude",
+        "efc_address",
+    ),
 )
 MJ_WARNING = _only(structure("mjWarningStat"), "number")
 MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver")

@@ -52,8 +52,13 @@ LAW = np.dtype(
     [(each.name, _KINDS[str(each.type)]) for each in dataclasses.fields(Law)], align=True
 )
 
+CCD_TOLERANCE = 1e-10
+"""To which colliders find the points of rigid contacts; MuJoCo's own is 1e-6."""
 UNMOVED = 1e-6
 """Distance below which a contact is the one of the same number in the last step, m."""
+AT_MOST = 2.0
+"""Depth that a contact has at most when it is new, in units of the way that its bodies close in a
+step."""
 STILL = 1e-9
 """Most that contacts and bodies may move, m or rad, for their Jacobians to stay as they are."""
 FLUSH = 1e-3

@@ -11,6 +11,7 @@ from .compiling import address_of, call, entry, kernel
 from .contacts import (
     copy_jacobians,
     find,
+    leave_added_points_out,
     match,
     nothing_moved,
     put_points_back,
@@ -59,7 +60,8 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     else:
         hand_on(model, data, memory, known, over)
         find(model, data, memory)
-        if match(model, data, memory) > memory.least and put_points_back(model, data, memory):
+        lost = match(model, data, memory) > memory.least and put_points_back(model, data, memory)
+        if lost or leave_added_points_out(model, data, memory):
             find(model, data, memory)
             match(model, data, memory)
         copy_jacobians(model, data, memory)
@@ -74,6 +76,9 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     multiply(model, data, memory)
     if memory.law.rigid:
         stiffen(model, data, memory, gravity)
+        if data.nefc != memory.rows:  # MuJoCo's memory was too small, and it has dropped all rows
+            forget(memory)
+            return
     elif memory.law.servo:
         take_depth_away(model, data, memory)
     if since > 0 and known and not still:

@@ -501,3 +501,38 @@ def test_what_is_computed_between_steps_changes_nothing(rigid):
         seen.step(other)
         mujoco.mj_forward(model, other)
     assert other.qpos == pytest.approx(place, abs=1e-11)
+
+
+@WAYS
+@pytest.mark.parametrize("apart", [0.0, 0.013], ids=["stack", "steps"])
+def test_points_that_the_collider_adds_for_a_step_jolt_nothing(rigid, apart):
+    """Of boxes of one size: flush, and each a little further down the slope than the one below."""
+    bodies = "".join(
+        f'<body pos="{apart * k} 0 {0.0508 + 0.1 * k}"><freejoint/>{BOX}</body>' for k in range(3)
+    )
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option cone="elliptic" gravity="1.2 0 -9.7"/><default><geom friction=".6"/>'
+        f'</default><worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+    )
+    data, law, counts, fastest = mujoco.MjData(model), Coulomb(model, rigid=rigid), set(), 0.0
+    law.step(data, 1000)
+    for _ in range(4000):
+        law.step(data)
+        counts.add(int(data.ncon))
+        fastest = max(fastest, np.abs(data.qvel).max())
+    assert fastest < 1e-9
+    assert rigid or apart or len(counts) > 1  # the collider does add points
+
+
+@pytest.mark.parametrize("shape", ['"cylinder" size=".009 .03"', '"capsule" size=".009 .03"'])
+def test_what_lies_on_its_smooth_side_stays(shape):
+    """Under rigid contacts, whose points colliders must not find a micrometre beside."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="box" size=".2 .2 .03" pos="0 0 .03"/><body '
+        f'pos=".003 .002 .069" euler="90 0 0"><freejoint/><geom type={shape} mass=".05"/></body>'
+        "</worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    Coulomb(model, rigid=True).step(data, 1000)
+    assert np.abs(data.qvel).max() < 1e-6
+    assert model.opt.ccd_tolerance == 1e-6

@@ -251,17 +251,11 @@ def small_arenas(rigid, solver, door):
     print(f"{same} of {tried} as plain")
 
 
-FULL_ARENA = pytest.mark.xfail(
-    reason="mj_projectConstraint, asked again, takes the rows away where the arena is full",
-    strict=False,
-)
-
-
 @pytest.mark.parametrize(
     ("rigid", "solver", "door"),
     [
         *((False, "Newton", "step"), (True, "Newton", "step"), (False, "PGS", "installed")),
-        pytest.param(True, "PGS", "installed", marks=FULL_ARENA),
+        (True, "PGS", "installed"),
     ],
 )
 def test_memory_that_is_too_small(alone, rigid, solver, door):
