@@ -53,6 +53,9 @@ class Coulomb:
         notice; and it must be slower than the contact, best five times the time constant of `solref`
     share : share of gravity to which a step must know beforehand how contacts slip, and what rigid
         ones bear; if it doesn't, it is solved again
+    depth : depth that rigid contacts keep at a time step of 2 ms, in units of the smaller radius; it
+        falls with the square of the step. 0 is for colliders that see all points within the margin,
+        as spheres on planes
 
     Each `MjData` has a memory of its own. It takes part in the state of the simulation, so save and
     restore both. Contacts of flexes are left as they are; so is all in a soft simulation in which
@@ -72,6 +75,7 @@ class Coulomb:
         restitution: float = 0.0,
         servo: float | None = None,
         share: float = Law.share,
+        depth: float = Law.depth,
     ) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ValueError(f"model is a {type(model).__name__}; a mujoco.MjModel is needed")
@@ -87,7 +91,14 @@ class Coulomb:
             if rigid:
                 raise ValueError("servo is for soft contacts: rigid ones have no depth")
         _check_number("share", share, "", 1e-9, 1.0)
-        law = Law(bool(rigid), float(restitution), float(servo or 0.0), float(share))
+        _check_number("depth", depth, "", 0.0, 0.1)
+        law = Law(
+            bool(rigid),
+            float(restitution),
+            float(servo or 0.0),
+            float(share),
+            depth=float(depth),
+        )
         self._begin(model, law, float(model.opt.timestep))
         self._check()
         _check_friction(model)
