@@ -18,3 +18,6 @@ def test_a_settled_state_is_that_of_the_closed_form(case, omega_0, eta):
     found, _ = joints.advance(exact, p, 8.0, 1e-3)
     # What the first step's places leave decays as slowly as RR does: exp(-8 c / (1 + 2 j)).
     assert found.omega_c == pytest.approx(exact.omega_c, rel=1e-9)
+    # The depth that rigid contacts keep by default is a lever: RR would seem to slip by 1e-6 rad/s.
+    for slip in ("slip_x", "slip_y", "slip_z"):
+        assert getattr(found, slip) == pytest.approx(getattr(exact, slip), abs=1e-7)
