@@ -29,7 +29,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -320,20 +320,16 @@ def serve_engine(handle: int) -> None:
 
     threading.Thread(target=end_with_parent, daemon=True).start()
     pipe = Connection(handle)
-    try:
-        adapter, about = _load(pipe.recv())
-        pipe.send(about)
-    except (InputError, TypeError) as error:
-        pipe.send(f"can't be used: {error}")
-        return
-    if about.missing:
-        return
-    while True:
+    with suppress(EOFError, BrokenPipeError):  # there are no more cases, or nobody waits any more
         try:
-            case, step = pipe.recv()
-        except EOFError:  # there are no more
+            adapter, about = _load(pipe.recv())
+        except (InputError, TypeError) as error:
+            pipe.send(f"can't be used: {error}")
             return
-        pipe.send(_attempt(adapter, case, step))
+        pipe.send(about)
+        while not about.missing:
+            case, step = pipe.recv()
+            pipe.send(_attempt(adapter, case, step))
 
 
 def _attempt(engine: Any, case: Case, step: float) -> Any:
