@@ -20,7 +20,7 @@ NEEDED = {
     "design": "meter.toml",
     "forecast": "scene.xml",
     "inspect": "run.h5",
-    "render": "run.h5 -o film.gif",
+    "render": "run.h5 -o run.html",
     "sweep": "--vary eta=0.1,0.2 --time 0.01 --workers 0",
 }
 """What a command can't do without."""

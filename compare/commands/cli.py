@@ -36,11 +36,8 @@ def program() -> NoReturn:
     os.environ["MPLBACKEND"] = (
         "agg"  # figures go into files: that of a notebook would be looked for here, too
     )
-    if "--view" not in sys.argv and (sys.platform == "linux" or "render" not in sys.argv):
-        # MuJoCo would load a window library, by way of a Python of its own; `render` draws by what
-        # was chosen.
-        os.environ["DUALBALL_GL"] = os.environ.get("MUJOCO_GL", "")
-        os.environ["MUJOCO_GL"] = "disable"
+    if "--view" not in sys.argv:
+        os.environ["MUJOCO_GL"] = "disable"  # nothing else draws with OpenGL
     with signals.on_first_signal(signals.end):
         try:
             code = main()

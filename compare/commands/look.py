@@ -66,16 +66,14 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def render(args: argparse.Namespace) -> int:
-    """Draw a picture, a film, or a page to look round in."""
-    from compare.view import render  # here, because drawing takes a second to load
+    """Write the motion in 3-D as a page."""
+    from compare.view import page  # here, because drawing takes a second to load
 
-    asked = {name: getattr(args, name) for name in ("at", "time", "width", "speed", "rate")}
+    asked = {name: getattr(args, name) for name in ("at", "time", "speed", "rate")}
+    asked = {name: value for name, value in asked.items() if value is not None}
     force, slip = args.arrows
-    print(
-        render.write(
-            storage.load(args.file), args.output, **asked, force_arrow=force, slip_arrow=slip
-        )
-    )
+    run = storage.load(args.file)
+    print(page.save(run, args.output, **asked, force_arrow=force, slip_arrow=slip))
     return 0
 
 

@@ -166,8 +166,7 @@ MARKDOWN = Output("Markdown", (".md",))
 PAGE = Output("an HTML page", (".html", ".htm"))
 FIGURE = Output("a figure", (".png", ".svg", ".pdf"))
 MAP = Output("a map", (*FIGURE.suffixes, ".json"))
-FILM = Output("a picture, a film or a page", (".png", ".gif", ".mp4", ".html"))
-ENDINGS = {suffix for each in (HDF5, TABLE, MARKDOWN, PAGE, MAP, FILM) for suffix in each.suffixes}
+ENDINGS = {suffix for each in (HDF5, TABLE, MARKDOWN, PAGE, MAP) for suffix in each.suffixes}
 """Names of files end in these."""
 
 

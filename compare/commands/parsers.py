@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from compare.commands import options
-from compare.commands.options import FILM, HDF5, MAP, MARKDOWN, PAGE, TABLE, Number, Parser
+from compare.commands.options import HDF5, MAP, MARKDOWN, PAGE, TABLE, Number, Parser
 from model import InputError
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range
@@ -297,31 +297,17 @@ def design(parser: Parser) -> None:
     options.add_json(parser, "print JSON instead of tables")
 
 
-@command("the ball", "look.render", "run.h5 -o film.gif --at 1 --time 10")
+@command("the ball", "look.render", "run.h5 -o run.html --at 1 --time 10")
 def render(parser: Parser) -> None:
-    """A picture or film of a run: the scene, contact forces, slip, case."""
+    """A run as a page: the motion in 3-D, contact forces, slip, case."""
     parser.add_argument("file", type=Path, help="a run")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=FILM,
-        required=True,
-        help="picture.png, film.gif, film.mp4 or page.html",
-    )
-    pixels, rates = (
-        Number(allowed=Range(160, 1920, whole=True)),
-        Number(allowed=Range(1, 1000, whole=True)),
-    )
-    at = "time of the run: of a picture (default: the end), where a film or page begins"
+    parser.add_argument("-o", "--output", type=PAGE, required=True, help="HTML page to write")
+    at = "time of the run at which the page begins (default: 0)"
     parser.add_argument("--at", type=options.moment, help=at)
-    lasts = "duration of a film, at most (default: 6, of a page 60)"
-    parser.add_argument("--time", type=options.seconds, help=lasts)
-    speed = "speed of a film or page (default 0.25; 1 is real time)"
-    parser.add_argument("--speed", type=options.speed, help=speed)
-    parser.add_argument("--rate", type=rates, help="frames a second (default: 20, of a page 60)")
-    parser.add_argument(
-        "--width", type=pixels, help="pixels of a picture (default: 960) or film (640)"
-    )
+    parser.add_argument("--time", type=options.seconds, help="duration, at most (default: 60)")
+    parser.add_argument("--speed", type=options.speed, help="default: 0.25; 1 is real time")
+    rates = Number(allowed=Range(1, 1000, whole=True))
+    parser.add_argument("--rate", type=rates, help="frames a second (default: 60)")
     radii, names = Number("radii", NOT_NEGATIVE), ("FORCE", "SLIP")
     lengths = "lengths of the arrows of a force m g and of the fastest slip (default 3 3)"
     parser.add_argument(

@@ -39,8 +39,8 @@ COLOURS = {
 apart in print."""
 HOPPING = "#7B3294"
 """Of a ball that hops for ever, a motion of several cases."""
-FORCE, SLIP, BALL, INK = "#b3261e", "#6a3d9a", "#f5cc6b", "#1c2430"
-"""Of pictures and films: arrows of force and slip, the ball, text."""
+FORCE, SLIP, BALL = "#b3261e", "#6a3d9a", "#f5cc6b"
+"""On pages of motions: arrows of force and slip, the ball."""
 Line = str | tuple[object, ...]
 """A line style of matplotlib."""
 STABLE, UNSTABLE = "-", (0, (5, 2.5))

@@ -16,7 +16,7 @@ from model.kinematics import frame, slip_velocities, to_world
 from model.trajectory import columns
 
 STEP = 5e-3
-"""Longest time between points of the trail and of the rotation, s."""
+"""Longest time between points of the rotation, s."""
 ARROW = 3.0
 """Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball,
 unless said."""
@@ -26,13 +26,10 @@ unless said."""
 class Geometry:
     """What is seen at n times; of floor and wall, in this order, arrays (2, n, 3)."""
 
-    past: Trajectory
-    """The whole run, finely."""
     turns: Rotation
     """How the ball is turned, (n,)."""
     centres: Array
     """(n, 3), m."""
-    normals: Array
     contacts: Array
     """Points of contact, m."""
     forces: Array
@@ -61,10 +58,8 @@ def geometry(
         slip_arrow * p.r / fastest if fastest > 0 else 0.0
     )
     return Geometry(
-        past=past,
         turns=orientations(past)[np.searchsorted(past.time, now.time).clip(max=steps)],
         centres=centres,
-        normals=normals,
         contacts=centres - p.r * normals,
         forces=forces * (force_arrow * p.r / (p.m * p.g)),
         slips=slips,

@@ -35,7 +35,7 @@ def view(
     ):
         raise InputError(
             "there is no display for a window; 'dualball simulate' and 'dualball render' make a "
-            "film instead"
+            "page instead"
         )
     from mujoco import viewer  # here, because it needs a window system
 

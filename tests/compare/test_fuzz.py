@@ -123,7 +123,7 @@ def test_all_damage_is_noticed(tmp_path, files, kind, read, count):
         ("theory", "inspect FILE"),
         ("theory", "inspect FILE --plot DIRECTORY/plot.png"),
         ("theory", "compare FILE FILE"),
-        ("theory", "render FILE -o DIRECTORY/picture.png"),
+        ("theory", "render FILE -o DIRECTORY/page.html"),
         ("theory", "collect RUNS -o DIRECTORY/all.h5"),
         ("batch", "inspect FILE"),
         ("batch", "inspect FILE/a"),

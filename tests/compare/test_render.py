@@ -1,8 +1,7 @@
-"""Pictures, films, pages, the viewer and the page to play with show the ball where it is, or say
+"""Pages, the viewer and the page to play with show the ball where it is, or say
 why they can't."""
 
 import base64
-import dataclasses
 import io
 import signal
 import socket
@@ -19,14 +18,13 @@ from PIL import Image
 
 import analytic
 import mjsim
-from compare.kit import style
-from compare.view import explore, geometry, render, viewer
+from compare.view import explore, geometry, page, viewer
 from mjsim import ContactSettings, recorder
 from model import Case, Flow, InputError, Parameters, State, storage
 from model.kinematics import rotated
 from tests.commands import refused, started, told
 
-WIDTH, P, SETTINGS = 320, Parameters.named("reference"), ContactSettings()
+P, SETTINGS = Parameters.named("reference"), ContactSettings()
 
 
 @pytest.fixture(scope="module")
@@ -35,76 +33,14 @@ def run():
     return mjsim.simulate(P.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0], 0.8, sample_interval=0.01)
 
 
-@pytest.fixture
-def draws():
-    try:
-        render.choose_opengl()
-    except InputError as error:
-        pytest.skip(str(error))
-
-
-def test_a_picture_shows_the_case_and_the_ball_moves(run, draws, tmp_path):
-    def picture(run, at, **arrows):
-        render.write(run, tmp_path / "p.png", at, WIDTH, **arrows)
-        return Image.open(tmp_path / "p.png").convert("RGB")
-
-    early, late, unit = picture(run, 0.1), picture(run, None), WIDTH / 960
-    assert early.size == (WIDTH, WIDTH * 10 // 16)
-    for image, k in ((early, np.searchsorted(run.time, 0.1)), (late, -1)):
-        beside_letters = image.getpixel((round(27 * unit), round(50 * unit)))
-        assert (
-            "#{:02x}{:02x}{:02x}".format(*beside_letters)
-            == style.COLOURS[Case(run.case[k])].lower()
-        )
-    assert np.mean(np.asarray(early) != np.asarray(late)) > 0.01
-    assert picture(run, None, force_arrow=0.0, slip_arrow=0.0) != late
-    # A run of another engine is shown in the scene of its parameters.
-    event = analytic.simulate(run.header.parameters, run.x[0], 0.3)
-    assert event.header.mjcf == ""
-    assert picture(event, 0.3).size == early.size
-
-
-def test_the_command_writes_pictures_and_films(run, draws, tmp_path, capsys):
-    file, film, picture = tmp_path / "run.h5", tmp_path / "film.gif", tmp_path / "p.png"
-    storage.save(run, file)
-    told(
-        capsys, f"render {file} -o {film} --at 0.2 --time 0.4 --speed 0.5 --rate 10 --width {WIDTH}"
-    )
-    with Image.open(film) as frames:
-        assert frames.n_frames == 5  # both ends of 0.4 s at 10 a second
-        assert frames.info["duration"] == 100
-    assert "320 × 200" in told(capsys, f"render {file} -o {picture} --at 0.5 --width {WIDTH}")
-
-
-def test_a_film_as_mp4(run, draws, tmp_path, monkeypatch):
-    """Of even size, as its standard wants it: 330 × 206 of 331 × 206."""
-    av, film = pytest.importorskip("av"), tmp_path / "film.mp4"
-    assert (
-        render.write(run, film, at=0.2, time=0.4, speed=0.5, rate=10, width=331)
-        == f"{film}: 5 frames"
-    )
-    with av.open(film) as read:
-        shown = [frame.to_image() for frame in read.decode(video=0)]
-        assert read.streams.video[0].average_rate == 10
-    assert [image.size for image in shown] == 5 * [(330, 206)]
-    assert (
-        np.mean(np.abs(np.asarray(shown[0], float) - np.asarray(shown[-1], float)) > 20) > 0.01
-    )  # it moves
-    film.unlink()
-    monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(InputError, match=r"an mp4 needs PyAV: pip install 'dualball\[film\]'"):
-        render.write(run, film)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
+def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path, capsys):
     """Frames, numbers and the case follow the slider; where a contact is open there is no slip to
     tell."""
     pytest.importorskip("nicegui")
-    file = tmp_path / "run.html"
-    assert render.write(run, file, at=0.1, speed=0.5, rate=50).endswith(
-        ": 71 frames"
-    )  # ends of 0.7 s of the run
+    stored, file = tmp_path / "run.h5", tmp_path / "run.html"
+    storage.save(run, stored)
+    said = told(capsys, f"render {stored} -o {file} --at 0.1 --speed 0.5 --rate 50")
+    assert said.endswith(": 71 frames")  # ends of 0.7 s of the run
     assert file.stat().st_size < 3e6
     tab.goto(file.as_uri())
     tab.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
@@ -119,7 +55,7 @@ def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path):
     assert tab.locator("#play").inner_text() == "Play"
     # All of the vessel is seen, however high the ball flies: above it the picture is white.
     flies = analytic.simulate(P, [0.05, 0, 8.0, 0, 0, 0, 0.03, -0.3], 0.05)
-    render.write(flies, file)
+    page.save(flies, file)
     tab.goto(file.as_uri())
     tab.wait_for_function(
         "document.querySelector('#numbers').innerText.includes('slip: floor –, wall –')"
@@ -155,29 +91,19 @@ def test_a_run_is_shown_between_its_samples(run):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
+        ("nowhere/p.html", {}, "there is no directory nowhere"),
         (
-            "film.avi",
-            {},
-            r"cannot write film\.avi: a picture is a \.png, a film a \.gif or \.mp4, a page",
-        ),
-        ("nowhere/p.png", {}, "there is no directory nowhere"),
-        ("p.png", {"rate": 5}, "a picture has no rate"),
-        ("p.html", {"width": 640}, "a page has no width"),
-        (
-            "p.png",
+            "p.html",
             {"at": 9.0},
             r"at = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$",
         ),
-        ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
-        ("p.gif", {"at": 2.0}, "at = 2 s is out of range"),
-        ("p.gif", {"speed": 0.0}, "speed = 0 is out of range"),
+        ("p.html", {"speed": 0.0}, "speed = 0 is out of range"),
+        ("p.html", {"slip_arrow": -1.0}, "slip_arrow = -1 radii is out of range"),
         (
             "p.html",
             {"speed": 0.05, "rate": 1000},
             r"1\.6e\+04 frames are more than 8000: choose a shorter time, or",
         ),
-        ("p.png", {"mjcf": "<mujoco/>"}, "no geom named 'ball'"),
-        ("p.png", {"mjcf": "<mujoco"}, "no valid MJCF"),
         (
             "p.html",
             {"rate": 10},
@@ -188,19 +114,9 @@ def test_a_run_is_shown_between_its_samples(run):
 def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name, options, message):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    header = dataclasses.replace(run.header, mjcf=options.pop("mjcf", run.header.mjcf))
     with pytest.raises(InputError, match=message):
-        render.write(dataclasses.replace(run, header=header), Path(name), **options)
+        page.save(run, Path(name), **options)
     assert not list(tmp_path.iterdir())
-
-
-def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch):
-    monkeypatch.setattr(render, "works", lambda name: False)
-    monkeypatch.setattr("platform.system", lambda: "Linux")
-    for chosen, message in (("", "apt-get install libegl1"), ("glfw", "unset MUJOCO_GL = 'glfw'")):
-        monkeypatch.setenv("MUJOCO_GL", chosen)
-        with pytest.raises(InputError, match=message):
-            render.choose_opengl.__wrapped__()  # which remembers nothing
 
 
 def viewed(monkeypatch, x0, flow, pictures, takes=1 / 64):

@@ -27,7 +27,7 @@ LONG = {
     "attractors": "--set hopping --random 1000",
     "basins": "--across omega_c=0:150:201 --up slip_x=-900:900:201 --workers 2",
     "design": "meter.toml -o new.html",
-    "render": "run.h5 -o new.gif",
+    "render": "run.h5 -o new.html",
     "explore": "--no-browser --port 8099",
     "forecast": "scene.xml --try",
     "cases": "-o cases",
