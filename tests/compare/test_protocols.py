@@ -115,7 +115,7 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
     """It doesn't change, yet a 1e-4 of it turns its friction so far that the rates are others."""
     time = np.linspace(0.0, 1e-3, 5)
     # A sphere's contact point feels friction f as an acceleration f/m (1 + 1/j).
-    friction = P.m * motions.Windows.turn / (time[-1] * (1 + 1 / P.j)) * share
+    friction = P.m * motions.MOST_TURN / (time[-1] * (1 + 1 / P.j)) * share
     x = np.tile([0, 0, 1.0, 0, 1.0 / P.r, 0, 0, 0], (5, 1))
     forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / P.eta)}
     run = SimpleNamespace(header=SimpleNamespace(parameters=P), time=time, x=x, **forces)

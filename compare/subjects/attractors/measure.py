@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -42,22 +42,26 @@ TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)
 """A state near the top of a hop of the set."""
 
 
-@dataclass(frozen=True)
-class Hopping:
-    """How balls that hop, or swing, are run; times in s."""
-
-    hold: float = 12.0  # how long each flow is held
-    last: float = 3.0  # the last part of it that is measured
-    later: float = 2.0  # the first part, in which disturbances are not yet linear
-    refined: tuple[int, int] = (8, 16)  # time steps in a coarse one, of hops that attract
-    marginal: tuple[int, int] = (16, 32)  # and of those that hardly do
-    sample: float = (
-        1e-3  # s: a parabola through three samples then gives a top to 1e-6 of the height
-    )
-    followed: float = 10.0  # how long a hop is followed at a wall
-    alone: float = 60.0  # and then left alone
-    swinging: float = 24.0  # how long a ball swings
-    swung: float = 4.0  # the last part of it that is measured
+HOLD = 12.0
+"""How long each flow is held, s."""
+MEASURED = 3.0
+"""The last part of a held flow that is measured, s."""
+DISTURBED = 2.0
+"""The first part of it, in which disturbances are not yet linear, s."""
+REFINED_HOPS = (8, 16)
+"""Time steps in a coarse one, of hops that attract."""
+REFINED_MARGINAL = (16, 32)
+"""Time steps in a coarse one, of hops that hardly attract."""
+SAMPLE = 1e-3
+"""Time between samples, s: a parabola through three samples then gives a top to 1e-6 of the height."""
+FOLLOWED = 10.0
+"""How long a hop is followed at a wall, s."""
+LEFT_ALONE = 60.0
+"""How long it is then left alone, s."""
+SWINGING = 24.0
+"""How long a ball swings, s."""
+SWUNG = 4.0
+"""The last part of a swing that is measured, s."""
 
 
 def hopping(
@@ -65,7 +69,7 @@ def hopping(
     sets: Mapping[str, Parameters],
     records: Records,
     protocol: str = "recurrent",
-    refine: tuple[int, int] = Hopping.refined,
+    refine: tuple[int, int] = REFINED_HOPS,
 ) -> Iterator[Measurement | Missing]:
     """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would
     begin.
@@ -77,18 +81,16 @@ def hopping(
         share * p.omega_0
         for share in (lab.effort.recurrent_flows if protocol == "recurrent" else (1.0,))
     ]
-    lasts, flow = Hopping.hold * len(flows), Flow.staircase(flows, Hopping.hold)
-    trial = Trial(
-        SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / Hopping.sample), flow=flow
-    )
+    lasts, flow = HOLD * len(flows), Flow.staircase(flows, HOLD)
+    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / SAMPLE), flow=flow)
     (result,) = carry_out(lab, protocol, [trial])
     if isinstance(result, Missing):
         yield result
         return
     heights = []
     for k, omega_0 in enumerate(flows):
-        q, end = p.replace(omega_0=omega_0), (k + 1) * Hopping.hold
-        coarse, fine = (tops(run, end - Hopping.last, end) for run in (result.coarse, result.fine))
+        q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
+        coarse, fine = (tops(run, end - MEASURED, end) for run in (result.coarse, result.fine))
         if min(len(coarse.time), len(fine.time)) < 6:
             yield Missing(
                 protocol, SET, f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more"
@@ -101,11 +103,11 @@ def hopping(
             )
         if k:
             parts = (
-                (result.coarse, Hopping.later),
-                (result.fine, Hopping.later),
-                (result.fine, 2 * Hopping.later),
+                (result.coarse, DISTURBED),
+                (result.fine, DISTURBED),
+                (result.fine, 2 * DISTURBED),
             )
-            begin, last = k * Hopping.hold, end - Hopping.last
+            begin, last = k * HOLD, end - MEASURED
             slow, fast, later = (
                 hop_map(tops(run, begin + after, last).x, q)[0] for run, after in parts
             )
@@ -218,9 +220,7 @@ def followed(
     etas = [q.eta for q in walls]
 
     def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
-        return lab.task(
-            q, x, lasts, coarse_step(q) / refined, samples=round(lasts / Hopping.sample)
-        )
+        return lab.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / SAMPLE))
 
     steady = [
         np.array([TOP.stacked()] * 2)
@@ -232,22 +232,15 @@ def followed(
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (
                 steady[-1] - steady[-2]
             )
-        both = zip(ahead, Hopping.marginal, strict=True)
-        tasks.append([task(q, x, Hopping.followed, refined) for x, refined in both])
+        both = zip(ahead, REFINED_MARGINAL, strict=True)
+        tasks.append([task(q, x, FOLLOWED, refined) for x, refined in both])
         (runs,) = lab.groups(tasks[-1:])
-        parts = (
-            []
-            if isinstance(runs, str)
-            else [tops(run, Hopping.later, Hopping.followed) for run in runs]
-        )
+        parts = [] if isinstance(runs, str) else [tops(run, DISTURBED, FOLLOWED) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [
-            hop_map(each.x, q)
-            for each in (*parts, tops(runs[1], 2 * Hopping.later, Hopping.followed))
-        ]
+        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * DISTURBED, FOLLOWED))]
         factors.append([factor for factor, _ in maps])
         steady.append(np.array([state for _, state in maps[:2]]))
         if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
@@ -255,8 +248,7 @@ def followed(
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
     again = [
-        task(walls[k], np.array(tasks[k][1].x0), Hopping.alone, Hopping.marginal[0])
-        for k in (-4, -1)
+        task(walls[k], np.array(tasks[k][1].x0), LEFT_ALONE, REFINED_MARGINAL[0]) for k in (-4, -1)
     ]
     yield from _hops_at_end(lab, "followed", SET, again)
 
@@ -283,13 +275,13 @@ def rebounding(
         step = coarse_step(p) / refine
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
         return replace(
-            lab.task(p, x, lasts, step, samples=round(lasts / Hopping.sample)), settings=settings
+            lab.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings
         )
 
     for e in RESTITUTIONS:
-        (run,) = lab.campaign.run([task(x, Hopping.last, e)])
+        (run,) = lab.campaign.run([task(x, MEASURED, e)])
         if hops(run):
-            last = tops(run, 0.0, Hopping.last)
+            last = tops(run, 0.0, MEASURED)
             x = last.x[-8:].mean(
                 axis=0
             )  # the hops swing about their mean, and attract from nearby only
@@ -332,16 +324,16 @@ def swing(
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
     (result,) = carry_out(
-        lab, "swing", [Trial("reference", p, "swing", x0, Hopping.swinging, (60, 80), 12_000)]
+        lab, "swing", [Trial("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)]
     )
-    end = Hopping.swinging - Hopping.swung
+    end = SWINGING - SWUNG
     if isinstance(result, Missing):
         yield result
         return
     if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
         yield Missing("swing", "reference", "the ball does not slip at both points for ever")
         return
-    begun = (result.coarse, end), (result.fine, end), (result.fine, end - Hopping.swung)
+    begun = (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG)
     parts = [_swing(run, start) for run, start in begun]
     conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
     for name, coarse, fine, before in zip(
@@ -354,7 +346,7 @@ def swing(
 
 def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
     """Period, mean and size of the swing of omega_c in the part of a run after a time."""
-    inside = (run.time > start) & (run.time <= start + Hopping.swung)
+    inside = (run.time > start) & (run.time <= start + SWUNG)
     time, omega_c = run.time[inside], run.omega_c[inside]
     (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
     at = time[k] + late * (time[1] - time[0])

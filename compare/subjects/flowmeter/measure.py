@@ -43,26 +43,10 @@ from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 
-
-@dataclass(frozen=True)
-class Slopes:
-    """Flows at which states settle for a slope, as relative distances."""
-
-    across: tuple[float, ...] = (
-        -1e-3,
-        -5e-4,
-        5e-4,
-        1e-3,
-        2e-3,
-        4e-3,
-        8e-3,
-    )  # from where slipping sets in
-    neighbours: tuple[float, ...] = (
-        -1e-3,
-        -5e-4,
-        5e-4,
-        1e-3,
-    )  # the nearer ones show the effect of curvature
+ACROSS_ONSET = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
+"""Flows at which states settle for a slope, as relative distances from where slipping sets in."""
+NEIGHBOURS = (-1e-3, -5e-4, 5e-4, 1e-3)
+"""The same from a settled state; the nearer ones show the effect of curvature."""
 
 
 def slope(
@@ -134,12 +118,12 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
                 0.0,
                 0.0,
             )
-            flows = tuple(omega_0 * (1 + d) for d in Slopes.neighbours)
+            flows = tuple(omega_0 * (1 + d) for d in NEIGHBOURS)
             yield Curve("neighbours", name, q, flows, x0)
     slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
     if slips is not None:
         q, x0 = p.replace(omega_0=slips.value), (0.0, 0.0, slips.value, 0.0, 0.0, 0.0, 0.0, 0.0)
-        around = tuple(slips.value * (1 + d) for d in Slopes.across)
+        around = tuple(slips.value * (1 + d) for d in ACROSS_ONSET)
         yield Curve("jump", name, q, around, x0, slips.uncertainty)
         if holds is not None and holds.value > slips.value:
             noise = math.hypot(slips.uncertainty, holds.uncertainty)
@@ -284,13 +268,12 @@ LANDING, UNLOADED, UPWARDS, BY_SPIN = (
 """Names of the trials."""
 
 
-@dataclass(frozen=True)
-class Falls:
-    """How a ball on the wall is unloaded, or pushed."""
-
-    above: float = 1.02  # flow before the unloading, in units of the measured omega_02
-    below: float = 0.95  # and after it
-    push: float = 1e-2  # speed in units of sqrt(g R), or more spin in units of its spin on the wall
+UNLOADED_FROM = 1.02
+"""Flow before the unloading, in units of the measured omega_02."""
+UNLOADED_TO = 0.95
+"""The flow after it, in the same unit."""
+WALL_PUSH = 1e-2
+"""Speed of a push on the wall in units of sqrt(g R), or more spin in units of its spin on the wall."""
 
 
 def unloading(
@@ -310,7 +293,7 @@ def unloading(
         # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by
         # lifting, too.
         lifts = records.threshold(name, "omega_03") or limit
-        flows = Falls.above * limit.value, 1.1 * max(limit.value, lifts.value)
+        flows = UNLOADED_FROM * limit.value, 1.1 * max(limit.value, lifts.value)
         starts.append(
             [settling.named_start(name, p.replace(omega_0=omega), "on the wall") for omega in flows]
         )
@@ -361,11 +344,11 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
     p, x = state.start.p, State.of(state.mean)
     x0 = State(omega_c=x.omega_c, slip_x=x.slip_x)
     if name in (LANDING, UNLOADED):
-        p, x0 = p.replace(omega_0=p.omega_0 * Falls.below / Falls.above), x0._replace(y=0.2 * p.R)
+        p, x0 = p.replace(omega_0=p.omega_0 * UNLOADED_TO / UNLOADED_FROM), x0._replace(y=0.2 * p.R)
     elif name == UPWARDS:
-        x0 = x0._replace(v_y=Falls.push * math.sqrt(p.g * p.R))
+        x0 = x0._replace(v_y=WALL_PUSH * math.sqrt(p.g * p.R))
     else:
-        x0 = x0._replace(slip_x=x.slip_x + Falls.push * (x.slip_x + p.R / p.r * x.omega_c))
+        x0 = x0._replace(slip_x=x.slip_x + WALL_PUSH * (x.slip_x + p.R / p.r * x.omega_c))
     coarse, fine = (
         times if name == LANDING else times // 4 for times in lab.effort.unloading_refine
     )

@@ -41,25 +41,18 @@ from model.kinematics import SLIP_XYZ, VARIABLES, slip_speeds, state_units
 PROTOCOL = "rates"
 
 
-@dataclass(frozen=True)
-class Pushes:
-    """How settled states are pushed."""
-
-    record: tuple[int, int] = (
-        64,
-        256,
-    )  # its length in coarse steps, about 3 sqrt(R/g), and samples
-    # Size of a push that isn't extrapolated to zero, under Stokes' law of drag and under others:
-    # theirs is in proportion to a lag only far below a Reynolds number of 1. The run with the
-    # coarser step has half of it, and shows that it doesn't matter.
-    usual: float = 2e-4
-    slight: float = 2e-6
-    slowest: float = (
-        0.04  # least slip speed of a state divided by sqrt(g R): a push is to be small beside it
-    )
-    zero_rate: float = (
-        0.05  # measured rates below this share of the drag coefficient c count as zero
-    )
+PUSH_RECORD = (64, 256)
+"""Of what follows a push: its length in coarse steps, about 3 sqrt(R/g), and samples."""
+USUAL_PUSH = 2e-4
+"""Size of a push that isn't extrapolated to zero, under Stokes' law of drag. The run with the
+coarser step has half of it, and shows that it doesn't matter."""
+SLIGHT_PUSH = 2e-6
+"""The same under other laws of drag: theirs is in proportion to a lag only far below a Reynolds
+number of 1."""
+SLOWEST_SLIP = 0.04
+"""Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
+ZERO_RATE = 0.05
+"""Measured rates below this share of the drag coefficient c count as zero."""
 
 
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
@@ -129,7 +122,7 @@ class Pushed:
     def record(self) -> tuple[int, int]:
         """Length of a run after a push, in coarse steps, and its samples; short for RS, which a
         large push changes."""
-        return (2, 16) if self.case is Case.RS else Pushes.record
+        return (2, 16) if self.case is Case.RS else PUSH_RECORD
 
     @property
     def order(self) -> int:
@@ -141,7 +134,7 @@ class Pushed:
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, the others with the finer one, the
         largest first."""
-        size = PUSH.get(self.case, Pushes.usual if self.start.p.drag == STOKES else Pushes.slight)
+        size = PUSH.get(self.case, USUAL_PUSH if self.start.p.drag == STOKES else SLIGHT_PUSH)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
     def steps(self, lab: Lab) -> tuple[float, float]:
@@ -169,7 +162,7 @@ class Pushed:
         a faster decay is not resolved; nor at half the speed, divided by what `STUDY_SLIP` allows
         for the load, at which they hover."""
         p, x = self.start.p, self.start.x0
-        turned = math.sqrt(p.g * p.R) * max(Pushes.slowest, 2 * PUSH.get(self.case, 0.0))
+        turned = math.sqrt(p.g * p.R) * max(SLOWEST_SLIP, 2 * PUSH.get(self.case, 0.0))
         loads = (p.mu, p.g), (p.eta, p.R * State.of(x).omega_c ** 2)
         return all(
             max(turned, 4 * coarse_step(p) * friction * load) < speed
@@ -349,9 +342,7 @@ def _modes(
     # They come from one propagator: where one is too vague for a check, the others aren't to be
     # trusted more.
     vague = max(COVERAGE * sure / size / quantity(name).resolves for name, *_, size, sure in parts)
-    decays = [
-        part for part in parts if part[0] == "decay_rate" and part[2] > Pushes.zero_rate * p.c
-    ]
+    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > ZERO_RATE * p.c]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
     for name, mode, value, size, sure in parts:
@@ -394,7 +385,7 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     Its own, or that of the exponent if it is none, or else that of free fall.
     """
     for size in (abs(rate), math.hypot(rate, other)):
-        if size > Pushes.zero_rate * p.c:
+        if size > ZERO_RATE * p.c:
             return size
     return 1 / time_unit(p)
 

@@ -18,14 +18,14 @@ from compare.branches import check_thresholds, slipping, stable_ends
 from compare.kit import style
 from compare.kit.drawing import Diagram, Evidence, GapError, diagram, only_where
 from compare.kit.record import Measurement
-from compare.subjects.unsteady.measure import Changes, caught_up, odd_part
+from compare.subjects.unsteady.measure import RAMP, ROLLS_AT, caught_up, odd_part
 from model import Case, Flow, Parameters
 
 _LASTS = 4.0, 56.0
 """Times shown after a jump: in units of 1/c, and of sqrt(R/g), whichever is shorter."""
 FREQUENCIES = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
-SHARES = 0.2, 0.4, Changes.ramp[0]
+SHARES = 0.2, 0.4, RAMP[0]
 """Flows about which the jumps of a ball that slips are shown, as parts of the way from omega_01 to
 where it ends."""
 
@@ -45,7 +45,7 @@ def _slipping(p: Parameters, share: float) -> Parameters:
 
 def _rolling(of: Diagram) -> Parameters:
     """The set of a figure with the mean flow of its pulsations."""
-    usual = of.p.replace(omega_0=Changes.rolls_at * stable_ends(of.p)[0])
+    usual = of.p.replace(omega_0=ROLLS_AT * stable_ends(of.p)[0])
     return next((m.parameters for m in of.states if m.quantity == "gain"), usual)
 
 
@@ -159,7 +159,7 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         [],
         analytic.solution(p, Case.SS),
     )
-    last = _slipping(of.p, Changes.ramp[1]).omega_0
+    last = _slipping(of.p, RAMP[1]).omega_0
     for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
         lasts = (last - p.omega_0) / rate
         flow = Flow.ramp(p.omega_0, last, lasts)

@@ -45,43 +45,34 @@ from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
-
-@dataclass(frozen=True)
-class Changes:
-    """Flows, and how they change."""
-
-    rolls_at: float = 0.85  # flow of rolling, in units of that at which it ends
-    slips_at: float = (
-        0.3  # of slipping, as a part of the way from there to where the wall carries the ball
-    )
-    ramp: tuple[float, float] = (
-        0.75,
-        1.35,
-    )  # its ends, as parts of the way to where slipping ends in a jump
-    # Size of a jump from rolling divided by the flow, and from slipping by a third of the range of
-    # flows in which it is: the response to a small jump is wanted, and near the ends of that range
-    # it is far from linear.
-    jump: float = 1e-3
+ROLLS_AT = 0.85
+"""Flow of rolling, in units of that at which it ends."""
+SLIPS_AT = 0.3
+"""Flow of slipping, as a part of the way from there to where the wall carries the ball."""
+RAMP = (0.75, 1.35)
+"""Ends of a ramp of the flow, as parts of the way to where slipping ends in a jump."""
+JUMP = 1e-3
+"""Size of a jump from rolling divided by the flow, and from slipping by a third of the range of
+flows in which it is: the response to a small jump is wanted, and near the ends of that range it is
+far from linear."""
 
 
-@dataclass(frozen=True)
-class Driving:
-    """How balls are driven by a pulsation."""
-
-    raised: float = (
-        1.5  # factor by which the amplitude is raised at a time where the law of drag isn't Stokes'
-    )
-    periods: int = 3  # in a run
-    rounds: int = 5  # successive runs until it is settled, the last with half the step
-    lasting: int = (
-        5  # samples for which slip must last to count: friction may be full for a moment before
-    )
-    phases: int = 8  # of a period at which the motion is started anew from its state
-    # Flows, in units of that at which rolling ends, about which the ball is driven by an amplitude
-    # in units of the flow: it slips at the wall alone about the slow ones, at both points about the
-    # others. In steps of a period so long that the ball forgets its start.
-    strong: tuple[tuple[float, float], ...] = ((0.25, 4.0), (0.4, 4.0), (0.6, 5.5), (0.75, 4.0))
-    octave: int = 3
+RAISED = 1.5
+"""Factor by which the amplitude is raised at a time where the law of drag isn't Stokes'."""
+PERIODS = 3
+"""Of a pulsation in a run."""
+ROUNDS = 5
+"""Successive runs of a driven ball until it is settled, the last with half the step."""
+LASTING = 5
+"""Samples for which slip must last to count: friction may be full for a moment before."""
+PHASES = 8
+"""Phases of a period at which the motion is started anew from its state."""
+STRONG = ((0.25, 4.0), (0.4, 4.0), (0.6, 5.5), (0.75, 4.0))
+"""Flows, in units of that at which rolling ends, about which the ball is driven by an amplitude in
+units of the flow: it slips at the wall alone about the slow ones, at both points about the
+others."""
+OCTAVE = 3
+"""Octaves above the lowest frequency at which it is driven so."""
 
 
 def pulsation(
@@ -97,7 +88,7 @@ def pulsation(
                 "no flow was measured at which two-point rolling ends by slipping",
             )
             continue
-        q = p.replace(omega_0=Changes.rolls_at * end)
+        q = p.replace(omega_0=ROLLS_AT * end)
         room, lowest = end - q.omega_0, _lowest(p)
         octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach * room
         small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
@@ -142,8 +133,8 @@ def _strong(name: str, p: Parameters, records: Records) -> Iterator[tuple[Pulsat
     amplitudes."""
     end = _threshold(records, name, "omega_01")
     if end is not None and p.drag == STOKES:
-        frequency = _lowest(p) * 2.0**Driving.octave
-        for share, times in Driving.strong:
+        frequency = _lowest(p) * 2.0**OCTAVE
+        for share, times in STRONG:
             q = p.replace(omega_0=share * end)
             amplitude = times * q.omega_0
             yield Pulsation(name, q, frequency, amplitude, amplitude), amplitude
@@ -224,7 +215,7 @@ def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing
             f"in {at} one contact slips before both do, too little to tell when",
         )
     # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-    unseen = (math.pi * Driving.lasting / lab.effort.pulsation_samples) ** 2 / 2 * place.value
+    unseen = (math.pi * LASTING / lab.effort.pulsation_samples) ** 2 / 2 * place.value
     return each.row(
         lab,
         "slip_amplitude",
@@ -251,11 +242,9 @@ def _settled_rounds(
         [each.start(a) for each, a in driven],
         list[list[Round] | str]([[]] * len(driven)),
     )
-    for n in range(Driving.rounds):
-        last = n == Driving.rounds - 1
-        timing = Timing(
-            Driving.periods, samples, refine * (lab.effort.pulsation_refine if last else 1)
-        )
+    for n in range(ROUNDS):
+        last = n == ROUNDS - 1
+        timing = Timing(PERIODS, samples, refine * (lab.effort.pulsation_refine if last else 1))
         todo = [
             (k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)
         ]
@@ -319,8 +308,8 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
         higher = [
             replace(
                 each,
-                amplitude=Driving.raised * each.amplitude,
-                lead=each.lead * Driving.raised**each.power,
+                amplitude=RAISED * each.amplitude,
+                lead=each.lead * RAISED**each.power,
             )
             for each in (raised[k] for k in todo)
         ]
@@ -330,7 +319,7 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
             if not each.failure
         ]
         for k, each in still:
-            raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, Driving.raised))
+            raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, RAISED))
         todo = [k for k, _ in still]
     return raised
 
@@ -350,7 +339,7 @@ def _search(lab: Lab, each: Pulsation) -> Search:
         first, size = Bracket(0.0, largest), largest / 2
     else:
         first, size = (
-            Bracket(0.99 * each.amplitude, Driving.raised * each.amplitude),
+            Bracket(0.99 * each.amplitude, RAISED * each.amplitude),
             each.amplitude,
         )
     return Search(first, task, rolls_on, lab.effort.pulsation_width * size)
@@ -363,7 +352,7 @@ def rolls_on(run: Trajectory) -> bool:
         run.case[run.time > run.time[-1] / 6],
         [Case.SS, *(case for case in Case if case.A is Contact.N)],
     )
-    return bool(np.convolve(gone, np.ones(Driving.lasting)).max() < Driving.lasting)
+    return bool(np.convolve(gone, np.ones(LASTING)).max() < LASTING)
 
 
 def mean_errors(
@@ -376,7 +365,7 @@ def mean_errors(
     against each other. How much the mean depends on it is seen in periods that start anew from
     states of the last one."""
 
-    phases = Driving.phases
+    phases = PHASES
     samples = 8 * phases
     rounds = _settled_rounds(lab, slipping, 1, samples, slips=True)
     anew = [
@@ -404,7 +393,7 @@ def mean_errors(
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
         # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by
         # half of that part.
-        within = abs(value) / round(task.steps / Driving.periods) if task.settings.timestep else 0.0
+        within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
         error = Measured(value, drift + within)
         slips = _slips(halved.case[-samples:])
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude, slips=slips)
@@ -452,10 +441,10 @@ def jumps(
             continue
         flows[name] = begins, holds, ends or math.nan
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
-            q = p.replace(omega_0=Changes.rolls_at * begins)
+            q = p.replace(omega_0=ROLLS_AT * begins)
             rolls = Start(name, q, "RR", State(omega_c=q.omega_0).stacked())
-            trials.append(_jump(lab, rolls, Changes.jump * q.omega_0))
-        q = p.replace(omega_0=begins + Changes.slips_at * (holds - begins))
+            trials.append(_jump(lab, rolls, JUMP * q.omega_0))
+        q = p.replace(omega_0=begins + SLIPS_AT * (holds - begins))
         starts.append(Start(name, q, "jump", np.zeros(8)))
         if ends is None:
             yield Missing(
@@ -464,7 +453,7 @@ def jumps(
                 "no flow was measured at which slipping at both points ends in a jump",
             )
         else:
-            q = p.replace(omega_0=begins + Changes.ramp[0] * (ends - begins))
+            q = p.replace(omega_0=begins + RAMP[0] * (ends - begins))
             starts.append(Start(name, q, "ramp", np.zeros(8)))
     for start, state in zip(starts, settle(lab, starts), strict=True):
         if state.failure or state.case is not Case.SS:
@@ -477,9 +466,7 @@ def jumps(
             start, x0=State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
         )
         if start.name == "jump":
-            trials.append(
-                _jump(lab, replace(begun, name="SS"), Changes.jump / 3 * (holds - begins))
-            )
+            trials.append(_jump(lab, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
         else:
             trials += _ramps(lab, begun, begins, ends)
     for result in carry_out(lab, "unsteady", trials):
@@ -528,7 +515,7 @@ def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial
     """Trials of ramps of the flow at several rates, rad s-2, from settled SS, which is between two
     flows."""
     p, span = start.p, ends - begins
-    last = begins + Changes.ramp[1] * span
+    last = begins + RAMP[1] * span
     for rate in lab.effort.unsteady_rates:
         rise = rate * p.c * span
         t_end, at = (last - p.omega_0) / rise, {"rate": rise, **state_of(start.x0[:6])}

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -45,17 +45,15 @@ from model.cases import TRAITS
 from model.drag import STOKES
 from model.kinematics import TURNING, VARIABLES, slip_velocities, state_units
 
-
-@dataclass(frozen=True)
-class Windows:
-    """In which equations of motion are looked at; in steps of the coarser run."""
-
-    seed: int = 53  # of the random states
-    centres: tuple[int, ...] = (16, 40, 64)
-    around: int = 4  # steps in which the case doesn't change, either: friction has built up
-    # Largest change of a slip, and of that which friction alone would make, divided by the slip:
-    # where slip is about to vanish, or very small, friction turns too fast.
-    turn: float = 0.5
+STATES_SEED = 53
+"""Of the random states of the field of motion."""
+WINDOW_CENTRES = (16, 40, 64)
+"""Of the windows in which equations of motion are looked at; in steps of the coarser run."""
+AROUND_WINDOW = 4
+"""Steps in which the case doesn't change, either: friction has built up."""
+MOST_TURN = 0.5
+"""Largest change of a slip, and of that which friction alone would make, divided by the slip: where
+slip is about to vanish, or very small, friction turns too fast."""
 
 
 MOVING = {
@@ -75,7 +73,7 @@ def field(
     """Rates of change and contact forces, each with the state they belong to."""
     refine, trials = (REFINED * lab.effort.halves[0], REFINED * lab.effort.halves[1]), []
     for name, p in sets.items():
-        rng = np.random.default_rng([Windows.seed, *name.encode()])
+        rng = np.random.default_rng([STATES_SEED, *name.encode()])
         for case, k in product(Case, range(lab.effort.field_starts)):
             x, unit = random_state(case, p, rng), time_unit(p)
             # Friction at two rolling contacts can balance only a slight lag.
@@ -86,7 +84,7 @@ def field(
                 else rng.uniform(0.3, 2.5) / unit
             )
             q = p.replace(omega_0=omega_0)
-            t_end = (Windows.centres[-1] + HALF_WINDOW + Windows.around) * coarse_step(q) / REFINED
+            t_end = (WINDOW_CENTRES[-1] + HALF_WINDOW + AROUND_WINDOW) * coarse_step(q) / REFINED
             trials.append(Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0))
             if (
                 p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2
@@ -102,7 +100,7 @@ def field(
         else:
             results.append(result)
     kept = Counter[tuple[str, float, Case]]()
-    for centre, result in product(Windows.centres, results):
+    for centre, result in product(WINDOW_CENTRES, results):
         set, p, case = (
             result.trial.set,
             result.trial.p,
@@ -133,7 +131,7 @@ def _values(
     p, read = result.trial.p, []
     for run, times in zip((result.coarse, result.fine), lab.effort.halves, strict=True):
         near, half, middle = (
-            (HALF_WINDOW + Windows.around) * times,
+            (HALF_WINDOW + AROUND_WINDOW) * times,
             HALF_WINDOW * times,
             centre * times,
         )
@@ -198,7 +196,7 @@ def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
         )
         hovers = load.min() < PRESSES * p.m * p.g
         if contact is Contact.S and (
-            hovers or change > Windows.turn * np.linalg.norm(v, axis=1).min()
+            hovers or change > MOST_TURN * np.linalg.norm(v, axis=1).min()
         ):
             return True
     return False
@@ -230,14 +228,12 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
 """omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """Of motions, in samples."""
-
-    length: int = 40
-    # Between the ends of a piece and any change of case: three until a force has built up, three
-    # until the case is taken to have changed, and a few by which a change comes too early or late.
-    apart: int = 10
+PIECE = 40
+"""Of a motion, in samples."""
+APART = 10
+"""Samples between the ends of a piece and any change of case: three until a force has built up,
+three until the case is taken to have changed, and a few by which a change comes too early or
+late."""
 
 
 def motions(
@@ -262,7 +258,7 @@ def motions(
         if lacking := count - len(chosen):
             why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips by a trace"
             yield Missing("motions", name, why, lacking * (1 + len(VARIABLES[TURNING])))
-        for first, last in ((first, first + Pieces.length) for first in chosen):
+        for first, last in ((first, first + PIECE) for first in chosen):
             case = Case(int(run.case[last]))
             seen[name].add(case)
             x = constrained(Case(int(run.case[first])), run.x[first], p)
@@ -314,14 +310,12 @@ def pieces(run: Trajectory, count: int) -> list[int]:
         plain &= (contact != "N") | (gap > 1e-4 * p.R)
         plain &= (contact != "S") | (speed > 2 * p.g * coarse_step(p) / REFINED)
     changes = np.flatnonzero(np.diff(run.case)) + 1
-    firsts = np.arange(Pieces.apart, len(run.time) - Pieces.length - Pieces.apart)
-    for end in (0, Pieces.length):
+    firsts = np.arange(APART, len(run.time) - PIECE - APART)
+    for end in (0, PIECE):
         near = np.min(np.abs((firsts + end)[:, None] - changes), axis=1, initial=len(run.time))
-        firsts = firsts[(near >= Pieces.apart) & plain[firsts + end]]
+        firsts = firsts[(near >= APART) & plain[firsts + end]]
     # As many pieces with a change of case in them as without, as far as there are.
-    inside = np.any(
-        (changes > firsts[:, None]) & (changes < firsts[:, None] + Pieces.length), axis=1
-    )
+    inside = np.any((changes > firsts[:, None]) & (changes < firsts[:, None] + PIECE), axis=1)
     chosen: set[int] = set()
     for some in (firsts[inside], firsts[~inside]):
         if len(some):

@@ -42,29 +42,25 @@ SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 """Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
 
 
-@dataclass(frozen=True)
-class Record:
-    """How a slip is recorded."""
-
-    steps: int = 20
-    skipped: int = 6  # at its start, in which contact forces build up
-    settled: int = (
-        6  # at its end, in which the case must be the same for a slip to have passed into it
-    )
-    degrees: tuple[int, int] = (
-        4,
-        3,
-    )  # of the polynomials; the lower one shows what the degree changes
-    # Slips at the start in units of `start_unit`, each half of the one before: so large that they
-    # neither end nor turn much in a record; small where one contact has to hold; and three beside a
-    # slip that is there already, where the direction depends on the size.
-    large: tuple[float, ...] = (3.0, 1.5)
-    small: tuple[float, ...] = (0.3, 0.15)
-    beside: tuple[float, ...] = (1.2, 0.6, 0.3)
+RECORD_STEPS = 20
+"""Of a record of slip."""
+RECORD_SKIPPED = 6
+"""At its start, in which contact forces build up."""
+RECORD_SETTLED = 6
+"""At its end, in which the case must be the same for a slip to have passed into it."""
+RECORD_DEGREES = (4, 3)
+"""Of the polynomials; the lower one shows what the degree changes."""
+LARGE_SLIPS = (3.0, 1.5)
+"""Slips at the start, in units of `start_unit`, each half of the one before: so large that they
+neither end nor turn much in a record."""
+SMALL_SLIPS = (0.3, 0.15)
+"""Those where one contact has to hold."""
+SLIPS_BESIDE = (1.2, 0.6, 0.3)
+"""Those beside a slip that is there already, where the direction depends on the size."""
 
 
 AT_START = slope_error(
-    np.arange(Record.skipped, Record.steps + 1.0), Record.degrees[0]
+    np.arange(RECORD_SKIPPED, RECORD_STEPS + 1.0), RECORD_DEGREES[0]
 ) / slope_error(np.arange(-trials.HALF_WINDOW, trials.HALF_WINDOW + 1.0), trials.WINDOW_DEGREES[0])
 """Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a
 window."""
@@ -140,15 +136,15 @@ class Push:
     def sizes(self) -> tuple[float, ...]:
         """Sizes of slip, in units of `start_unit`."""
         if self.inner in (Case.RS, Case.SR):
-            return Record.beside
-        return Record.small if self.outer in (Case.RS, Case.SR) else Record.large
+            return SLIPS_BESIDE
+        return SMALL_SLIPS if self.outer in (Case.RS, Case.SR) else LARGE_SLIPS
 
     def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
         """Tasks with one size of slip, in units of `start_unit`, with both time steps, divided by
         `refine`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        steps, step = Record.steps * refine, coarse_step(p) / (trials.REFINED * refine)
+        steps, step = RECORD_STEPS * refine, coarse_step(p) / (trials.REFINED * refine)
         return [
             lab.task(p, x, steps * step, step / n, samples=steps * n) for n in lab.effort.halves
         ]
@@ -160,13 +156,13 @@ class Push:
     def rates(self, run: Trajectory) -> Array:
         """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in
         another case."""
-        record = slice(Record.skipped * (len(run.time) // Record.steps), None)
+        record = slice(RECORD_SKIPPED * (len(run.time) // RECORD_STEPS), None)
         # The wall carries nothing beside a ball at rest: that contact is not detected.
         alike = [self.outer, Case.RN] if self.start.name == "rest" else [self.outer]
         if not np.isin(run.case[record], alike).all():
             return np.full(2, np.nan)
         return trials.polynomials(
-            run.time[record], run.x[record, SLIP_XYZ] @ self.n, Record.degrees
+            run.time[record], run.x[record, SLIP_XYZ] @ self.n, RECORD_DEGREES
         )[1]
 
     def row(
@@ -199,7 +195,7 @@ class Push:
         steps disagree."""
         fine = runs[1]
         ended = int(fine.case[-1])
-        if ended == self.outer or any(np.any(run.case[-Record.settled :] != ended) for run in runs):
+        if ended == self.outer or any(np.any(run.case[-RECORD_SETTLED:] != ended) for run in runs):
             return None
         at = {"slip": size * start_unit(self.start.p, self.start.x0), "time": float(fine.time[-1])}
         return self.row(lab, protocol, "case", ended, tasks, **at)

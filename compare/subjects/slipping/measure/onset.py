@@ -38,29 +38,18 @@ from model.arrays import Array
 from model.drag import STOKES
 from model.kinematics import state_units
 
-
-@dataclass(frozen=True)
-class Bounds:
-    """How the bounds of growing slip are looked for."""
-
-    around: tuple[float, float] = (
-        0.7,
-        1.3,
-    )  # second two flows, divided by the zero that the first two show
-    around_bent: tuple[float, float] = (0.8, 1.1)  # where the law of drag bends the line
-    slips: tuple[float, float] = (
-        1.0,
-        0.5,
-    )  # as `Push.sizes`, of a ball that hangs on a smooth wall, and so goes fast
-    beyond: float = (
-        2.1  # largest zero recorded, divided by the largest value at which slip stayed in its case
-    )
-    followed: float = 100.0  # largest zero followed, divided by the largest of the first flows
-    hanging: tuple[float, ...] = (
-        1.05,
-        1.6,
-        1.3,
-    )  # flows, divided by the one at which a ball ceases to hang
+AROUND = (0.7, 1.3)
+"""The second two flows, divided by the zero that the first two show."""
+AROUND_BENT = (0.8, 1.1)
+"""The same where the law of drag bends the line."""
+FAST_SLIPS = (1.0, 0.5)
+"""As `Push.sizes`, of a ball that hangs on a smooth wall, and so goes fast."""
+MOST_BEYOND = 2.1
+"""Largest zero recorded, divided by the largest value at which slip stayed in its case."""
+MOST_FOLLOWED = 100.0
+"""Largest zero followed, divided by the largest of the first flows."""
+HANGING = (1.05, 1.6, 1.3)
+"""Flows at which balls hang on a smooth wall, in units of the least that holds them."""
 
 
 def bounds(
@@ -77,7 +66,7 @@ def bounds(
     starts = [
         [
             named_start(name, sets[name].replace(omega_0=end * factor), "on the wall")
-            for factor in Bounds.hanging
+            for factor in HANGING
         ]
         for name, end in ends.items()
     ]
@@ -124,7 +113,7 @@ def bounds(
         else:  # the points share causes of error: more of them don't reduce the uncertainty
             zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
         growth = f"growth of slip {slips}, {push.start.name},"
-        if abs(zero.value) <= Bounds.beyond * np.abs(q).max():
+        if abs(zero.value) <= MOST_BEYOND * np.abs(q).max():
             yield if_found(
                 push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero"
             )
@@ -165,11 +154,11 @@ class Crossing:
         q = flows**self.power
         slope = np.diff(gammas)[0] / np.diff(q)[0]
         zero = float(q[0] - gammas[0] / slope) if slope else math.inf
-        if not 0 < zero < (Bounds.followed * max(flows)) ** self.power:  # or nan
+        if not 0 < zero < (MOST_FOLLOWED * max(flows)) ** self.power:  # or nan
             return ()
         least, first = flows[0] if self.power == 1 else 0.0, self.pushes[0]
         pushes = []
-        for factor in Bounds.around_bent if self.is_curved else Bounds.around:
+        for factor in AROUND_BENT if self.is_curved else AROUND:
             omega_0 = float(least + (zero ** (1 / self.power) - least) * factor)
             orbit = State.of(first.start.x0).omega_c if self.power == 1 else omega_0
             p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
@@ -196,7 +185,7 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
     """
     tasks, refine = [], lab.effort.bounds_refined
     for push in (push for pushes in rows for push in pushes):
-        large, small = push.sizes if push.inner is not Case.NR else Bounds.slips
+        large, small = push.sizes if push.inner is not Case.NR else FAST_SLIPS
         tasks.append([*push.pair(lab, large, refine), push.pair(lab, small, refine)[1]])
     results, found = zip(tasks, lab.groups(tasks), strict=True), []
     for pushes in rows:
@@ -210,7 +199,7 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
                 )
                 points.append((p.omega_0, math.nan, math.nan))
                 continue
-            size = push.sizes[0] if push.inner is not Case.NR else Bounds.slips[0]
+            size = push.sizes[0] if push.inner is not Case.NR else FAST_SLIPS[0]
             if stray := push.following_case(lab, "bounds", size, own[:2], runs[:2]):
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
@@ -258,33 +247,20 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
 omega_c."""
 
 
-@dataclass(frozen=True)
-class Lifts:
-    """How it is looked for where a ball leaves the floor."""
-
-    leads: float = 1.5  # how much faster than the ball the fluid goes round where a contact slips
-    orbits: tuple[float, ...] = (
-        0.5,
-        1.0,
-        1.5,
-        2.0,
-        2.5,
-        3.0,
-        3.5,
-    )  # the first ones, omega_c sqrt(R/g)
-    later: tuple[float, ...] = (
-        0.05,
-        0.08,
-        0.12,
-        0.17,
-    )  # relative distances of others below that at which it leaves
-    steps: int = 16  # of a run
-    skipped: int = 4  # at its start, in which contact forces build up
-    fewest: int = 5  # that must be left
-    degrees: tuple[int, int] = (
-        3,
-        2,
-    )  # of the polynomials; the lower one shows what the degree changes
+LEAD = 1.5
+"""How much faster than the ball the fluid goes round where a contact slips."""
+FIRST_ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
+"""Orbits at which the force on the floor is measured first, omega_c sqrt(R/g)."""
+LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
+"""Relative distances of others below that at which the ball leaves the floor."""
+LIFT_STEPS = 16
+"""Of a run in which the force on the floor is measured."""
+LIFT_SKIPPED = 4
+"""At its start, in which contact forces build up."""
+FEWEST_PRESSED = 5
+"""Samples on the floor that must be left."""
+LIFT_DEGREES = (3, 2)
+"""Of the polynomials; the lower one shows what the degree changes."""
 
 
 def lift(
@@ -294,7 +270,7 @@ def lift(
     fastest orbit."""
     arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
     orbits = [
-        [arrow.task(Omega / time_unit(arrow.p)) for Omega in Lifts.orbits] for arrow in arrows
+        [arrow.task(Omega / time_unit(arrow.p)) for Omega in FIRST_ORBITS] for arrow in arrows
     ]
     first = list(lab.groups(orbits))
     kept = [
@@ -348,7 +324,7 @@ class Arrow:
         unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
         leads = (
-            1.0 if self.inner is Case.RR else Lifts.leads
+            1.0 if self.inner is Case.RR else LEAD
         )  # a ball that rolls at both points can hardly lag
         return self.p.replace(omega_0=leads * omega_c), np.array(
             [0.0, 0.0, omega_c, *slips, 0.0, 0.0]
@@ -358,13 +334,13 @@ class Arrow:
         """A short run from the orbit at omega_c, with steps half as long as those of `REFINED`,
         divided by `times`."""
         step = coarse_step(self.p) / (2 * REFINED * times)
-        return self.lab.task(*self.start(omega_c), Lifts.steps * step, step, samples=Lifts.steps)
+        return self.lab.task(*self.start(omega_c), LIFT_STEPS * step, step, samples=LIFT_STEPS)
 
     def staying(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
         """The first runs in succession, in the order of their orbits, that stay in the two cases of
         the arrow."""
         strays = [
-            not np.isin(run.case[Lifts.skipped :], [self.inner, self.outer]).all() for run in runs
+            not np.isin(run.case[LIFT_SKIPPED:], [self.inner, self.outer]).all() for run in runs
         ]
         first = [*strays, False].index(False)
         return runs[first : [*strays, True].index(True, first)]
@@ -380,7 +356,7 @@ class Arrow:
             return []
         (a, high), (b, low) = pressed[-2:]
         where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
-        orbits = [where * (1 - part) for part in Lifts.later if where]
+        orbits = [where * (1 - part) for part in LATER_ORBITS if where]
         return [self.task(orbit, times) for orbit in orbits for times in self.lab.effort.halves]
 
     def row(
@@ -395,15 +371,15 @@ class Arrow:
 def _force(run: Trajectory) -> Measured | None:
     """Force of the floor at the beginning divided by the weight; None where it doesn't press for
     long enough."""
-    p, force = run.header.parameters, run.force_A[Lifts.skipped :, 1]
+    p, force = run.header.parameters, run.force_A[LIFT_SKIPPED:, 1]
     pressed = int(np.argmax(np.append(force <= 0, True)))
-    if pressed < Lifts.fewest:
+    if pressed < FEWEST_PRESSED:
         return None
-    time = run.time[Lifts.skipped :][:pressed]
+    time = run.time[LIFT_SKIPPED:][:pressed]
     # The force of a sample acts from then on for a step: it belongs to the middle of it.
     begin = -(time[1] - time[0]) / 2
     value, lower = (
-        polynomials(time, force[:pressed], Lifts.degrees, begin)[0] / (p.m * p.g)
+        polynomials(time, force[:pressed], LIFT_DEGREES, begin)[0] / (p.m * p.g)
     ).tolist()
     return Measured(value, abs(value - lower))
 

@@ -126,17 +126,13 @@ def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     return [(places[a] + places[b]) / 2 for _, a, b in turns]
 
 
-@dataclass(frozen=True)
-class Borders:
-    """How the border between two basins is followed."""
-
-    far: float = (
-        0.1  # a long way, in two fifths of a run, divided by the distance of the attractors
-    )
-    arrived: float = 0.01  # distance at which a ball has arrived, divided likewise
-    # Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where
-    # it begins.
-    closing: tuple[float, ...] = (0.1, 0.17, 0.26, 0.38)
+FAR_FROM_EDGE = 0.1
+"""A long way, in two fifths of a run, divided by the distance of the attractors."""
+ARRIVED = 0.01
+"""Distance at which a ball has arrived, divided likewise."""
+CLOSING = (0.1, 0.17, 0.26, 0.38)
+"""Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it
+begins."""
 
 
 def borders(
@@ -165,7 +161,7 @@ def borders(
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
-        for part in (Borders.closing if name == soonest else lab.effort.edge_flows)
+        for part in (CLOSING if name == soonest else lab.effort.edge_flows)
     ]
     starts = [
         [named_start(name, p, "rest"), named_start(name, p, "on the wall")] for name, p in flows
@@ -198,10 +194,10 @@ def borders(
     for edge in edges:
         yield from _edge_rows(lab, edge)
     for name, (low, high) in limits.items():
-        last = low + (max(Borders.closing) + 1e-6) * (high - low)
+        last = low + (max(CLOSING) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
         if len(near) >= len(
-            Borders.closing
+            CLOSING
         ):  # the edge meets the lifted ball where both have the same omega_c
             noise = max(float(_uncertainty(edge)[2]) for edge in near)
             apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
@@ -291,14 +287,14 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
         float(taper(len(part)) @ part / taper(len(part)).sum()) for part in parts
     )
     before, now, way = second - first, last - third, abs(lifted - slipping)
-    if abs(last - first) > Borders.far * way or (
+    if abs(last - first) > FAR_FROM_EDGE * way or (
         before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)
     ):
         return (last - first) * (slipping - lifted) > 0
     end = last + now * abs(now) / max(
         abs(before) - abs(now), abs(now), 1e-300
     )  # by a geometric series
-    rests = [abs(end - each) < Borders.arrived * way for each in (slipping, lifted)]
+    rests = [abs(end - each) < ARRIVED * way for each in (slipping, lifted)]
     return rests[0] if any(rests) else None
 
 

@@ -19,23 +19,12 @@ from compare.kit.statistics import Measured, initial_slope, straight_line
 from compare.kit.tasks import Task
 from model import Case, Parameters
 
-
-@dataclass(frozen=True)
-class Births:
-    """Where the birth of a fold is looked for."""
-
-    first: tuple[float, float] = (2.0, 4.0)  # values of c sqrt(R/g)
-    nearer: tuple[float, float] = (
-        1.6,
-        2.6,
-    )  # of the drag extrapolated from those: far off, where states settle soon
-    before: tuple[float, ...] = (
-        0.02,
-        0.035,
-        0.055,
-        0.08,
-        0.12,
-    )  # omega_02, in parts of the range of slipping
+FIRST_DRAGS = (2.0, 4.0)
+"""Drag at which the range of slipping is measured first, c sqrt(R/g)."""
+NEARER_DRAGS = (1.6, 2.6)
+"""Drag measured then, in units of that extrapolated from those: far off, where states settle soon."""
+BEFORE_FOLD = (0.02, 0.035, 0.055, 0.08, 0.12)
+"""Distances of flows below omega_02, in parts of the range of slipping."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +51,14 @@ def birth(
             ranges[name] = begins.value, ends.value
     found: dict[str, list[BranchEnd]] = {name: [] for name in ranges}
     lags: dict[str, Measured] = {}
-    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in Births.first]
-    for _ in (Births.first, Births.nearer):
+    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
+    for _ in (FIRST_DRAGS, NEARER_DRAGS):
         starts = [
             [
                 named_start(
                     name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest"
                 )
-                for part in Births.before
+                for part in BEFORE_FOLD
             ]
             for name, c in drags
             for low, high in [ranges[name]]
@@ -80,7 +69,7 @@ def birth(
                 slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
                 found[name].append(BranchEnd(1 / c, slope, [state.task for state in states]))
         for name, own in found.items():
-            if len(own) >= len(Births.first):
+            if len(own) >= len(FIRST_DRAGS):
                 values, noise = zip(
                     *((end.slope.value, end.slope.uncertainty) for end in own), strict=True
                 )
@@ -89,14 +78,14 @@ def birth(
             (name, 1 / lag.value * k)
             for name, lag in lags.items()
             if lag.value > 0
-            for k in Births.nearer
+            for k in NEARER_DRAGS
         ]
     for name, p in sets.items():
         if name not in ranges:
             yield Missing(
                 "birth", name, "there is no range of slipping at both points that ends at the wall"
             )
-        elif len(found[name]) < len(Births.first) + len(Births.nearer):
+        elif len(found[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
             yield Missing(
                 "birth",
                 name,

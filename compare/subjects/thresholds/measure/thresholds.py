@@ -38,21 +38,18 @@ from compare.subjects.thresholds.measure.answers import ASKED, lifts, slip
 from model import Case, Parameters, State
 from model.arrays import Array
 
-
-@dataclass(frozen=True)
-class Distances:
-    """Relative distances of flows."""
-
-    coarse: float = 1e-2  # width of a bracket where only the neighbourhood is wanted
-    away: float = (
-        0.03  # from a known end of rolling, where an engine beside the one on trial looks for it
-    )
-    # Of settled states from where something vanishes; below a fold, where slip goes like the root
-    # of the distance, in parts of the range of slipping; and from where a ball rides the wall as
-    # slowly as it can.
-    settled: tuple[float, ...] = (0.005, 0.01, 0.02, 0.03, 0.05)
-    turning: tuple[float, ...] = (0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15)
-    riding: tuple[float, ...] = (0.002, 0.008, 0.02, 0.035, 0.05)
+COARSE = 1e-2
+"""Relative width of a bracket where only the neighbourhood is wanted."""
+AWAY = 0.03
+"""Relative distance from a known end of rolling, where an engine beside the one on trial looks for
+it."""
+DISTANCES = (0.005, 0.01, 0.02, 0.03, 0.05)
+"""Relative distances of settled states from where something vanishes."""
+DISTANCES_BELOW_FOLD = (0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15)
+"""The same below a fold, where slip goes like the root of the distance, in parts of the range of
+slipping."""
+DISTANCES_RIDING = (0.002, 0.008, 0.02, 0.035, 0.05)
+"""The same from where a ball rides the wall as slowly as it can."""
 
 
 FOUND = {"rolling": ("omega_01", "omega_03"), "sinking": ("omega_02",), "slipping": ("omega_04",)}
@@ -200,7 +197,7 @@ def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) ->
             for known in filter(
                 None, (records.threshold(name, quantity) for quantity in quantities)
             ):
-                away = Distances.away if kind == "rolling" else Distances.coarse / 3
+                away = AWAY if kind == "rolling" else COARSE / 3
                 changes[kind] = Bracket(known.value * (1 - away), known.value * (1 + away))
     return Findings(lab, name, p, cases, changes)
 
@@ -229,11 +226,11 @@ def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
     """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles
     on the floor."""
     if change := each.changes.get("sinking"):
-        yield each.search("sinking", change, Distances.coarse * change.low)
+        yield each.search("sinking", change, COARSE * change.low)
     change, end = each.changes.get("slipping"), each.brackets.get("rolling")
     if change and end and not lifts(end) and end.high < change.high:
         change = replace(change, low=max(change.low, end.high))
-        yield each.search("slipping", change, Distances.coarse * change.low)
+        yield each.search("slipping", change, COARSE * change.low)
 
 
 def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
@@ -254,7 +251,7 @@ def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
         for kind in unseen if not lab.effort.granted else ():
             del each.brackets[kind]
         settled, turning, riding = (
-            np.array(row) for row in (Distances.settled, Distances.turning, Distances.riding)
+            np.array(row) for row in (DISTANCES, DISTANCES_BELOW_FOLD, DISTANCES_RIDING)
         )
         if carried := each.brackets.get("sinking"):
             beside.append((each, "riding", "on the wall", carried.high * (1 + riding)))
@@ -293,12 +290,12 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
     spin on the wall."""
     width = each.lab.effort.thresholds_width
     begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
-    if begins and len(riding) == len(Distances.riding):
+    if begins and len(riding) == len(DISTANCES_RIDING):
         ride = riding_start(riding, height=settling.safe_height(each.p))
         yield each.search("riding", begins, width * begins.high, ride)
     end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
-    if end and len(lifted) == len(Distances.riding):
-        change = Bracket(end.low * (1 - Distances.coarse), end.high * (1 + Distances.coarse))
+    if end and len(lifted) == len(DISTANCES_RIDING):
+        change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
         yield each.search(
             "leaning", change, width * end.high, riding_start(lifted, height=0.0, less=1e-3)
         )
