@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,11 @@ from compare.kit.drawing import Evidence
 from compare.kit.engines import WITNESSES, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.programme import Job
+from compare.kit.plan import planned
+from compare.kit.programme import Job, Protocol
 from compare.kit.progress import Show, ValidationProgress, show_nothing
 from compare.kit.record import Missing, Records, RecordsByEngine
-from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes, threads
+from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes
 from compare.report import results
 from compare.report.results import Summary
 from compare.witnesses import full_verdict
@@ -72,104 +73,147 @@ def validate(
     StorageError
         If the directory can't be written or holds results of another version.
     """
+    forget()
+    study = plan(Path(output), level, claims, sets, engine)
+    far = ValidationProgress(progress, len(study.claims))
+    runs = study.output / results.RUNS
+    with Campaign(runs, workers, limit=limit, report=far.measuring, passing=True) as campaign:
+        verdicts = judge(study.claims, measure(study, campaign, far), announce, far)
+        files = study.files(campaign)
+    kept = results.load_measurements(study.output, level.name, files)
+    count = workers if isinstance(workers, int) else workers.count
+    with processes(min(count, os.cpu_count() or 1)) as work:
+        draw = far.drawing(work.map) if report else None
+        write(study.output, level, files, kept, verdicts, draw)
+    return [verdicts[claim.id] for claim in study.claims]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a validation is to do."""
+
+    output: Path
+    level: Level
+    engines: Sequence[Engine]
+    """The one on trial first."""
+    claims: Sequence[Claim]
+    """Those that are to be judged."""
+    protocols: Sequence[Protocol]
+    """Those that they need, in the order in which they begin."""
+    sets: Mapping[str, Parameters] | None
+    """In the place of those that are planned."""
+
+    def jobs(self, campaign: Campaign, protocols: Sequence[Protocol] | None = None) -> list[Job]:
+        """Every protocol by every engine with every step that is planned."""
+        labs = [
+            Lab(campaign, each, self.level, divisor)
+            for each in self.engines
+            for divisor in each.refine
+        ]
+        return [
+            Job(protocol, lab, self.output, self.sets)
+            for lab in labs
+            for protocol in protocols or self.protocols
+            if planned(protocol.name, lab.engine, lab.refine, lab.level)
+        ]
+
+    def files(self, campaign: Campaign) -> results.Files:
+        """The files of all that is measured by this plan, for these claims or for others
+        before."""
+        files: dict[str, dict[int, list[str]]] = {
+            each.name: {n: [] for n in each.refine} for each in self.engines
+        }
+        for job in self.jobs(campaign, PROTOCOLS):
+            if job.file.exists():
+                name = job.file.relative_to(self.output).as_posix()
+                files[job.lab.engine.name][job.lab.refine].append(name)
+        return files
+
+
+def plan(
+    output: Path,
+    level: Level,
+    claims: Sequence[str] | None,
+    sets: Mapping[str, Parameters] | None,
+    engine: Engine | None,
+) -> Study:
+    """Check what is asked for, see `validate`, and open the directory of the results."""
     for p in (sets or {}).values():
         check_type("sets", p, Parameters)
     if engine:
         engine.check()
-    forget()
-    output, chosen = (
-        Path(output),
-        [each for each in select(CLAIMS, claims) if claims or each.level <= level],
-    )
+    chosen = [each for each in select(CLAIMS, claims) if claims or each.level <= level]
+    names = [name for each in chosen for name in each.protocols]
+    if claims is None:
+        names = [protocol.name for protocol in PROTOCOLS]
     results.open_directory(output)
-    names = (
-        [protocol.name for protocol in PROTOCOLS]
-        if claims is None
-        else [n for c in chosen for n in c.protocols]
-    )
-    todo = [
-        protocol
-        for protocol in programme.with_needed(PROTOCOLS, names)
-        if protocol.assignment.level <= level
-    ]
-    engines = [engine] if engine else [*WITNESSES]
-    far = ValidationProgress(progress, {}, len(chosen))
-    with (
-        threads(1) as bench,  # judges while the next protocols' runs are on their way
-        Campaign(
-            output / results.RUNS, workers, limit=limit, report=far.measuring, passing=True
-        ) as campaign,
-    ):
-        labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
-        known = [
-            Job(each, lab, output, sets) for lab in labs for each in PROTOCOLS if each.measures(lab)
-        ]
-        jobs = [job for job in known if job.protocol in todo]
-        far.costs = {job.name: job.cost for job in jobs}
-        judging = _Judging(
-            chosen, engines, lambda *of: bench.submit(_announced, announce, *of), far.judged
-        )
-        judging.judge(jobs)
-        for job, found in programme.run(tuple(jobs)):
-            jobs.remove(job)
-            far.measured(job.name)
-            judging.take(job, found)
-            judging.judge(jobs)
-    verdicts = {name: future.result() for name, future in judging.judged.items()}
-    files: dict[str, dict[int, list[str]]] = {
-        each.name: {n: [] for n in each.refine} for each in engines
-    }
-    for job in known:
-        if job.file.exists():
-            files[job.lab.engine.name][job.lab.refine].append(
-                job.file.relative_to(output).as_posix()
-            )
-    count = workers if isinstance(workers, int) else workers.count
-    with processes(min(count, os.cpu_count() or 1)) as work:
-        draw = far.drawing(work.map) if report else None
-        measured = results.load_measurements(output, level.name, files)
-        _write(output, level, files, measured, verdicts, draw)
-    return [verdicts[claim.id] for claim in chosen]
+    needed = programme.with_needed(PROTOCOLS, names)
+    return Study(output, level, [engine] if engine else [*WITNESSES], chosen, needed, sets)
 
 
 @dataclass
-class _Judging:
-    """Claims that are judged as soon as all that they need is measured."""
+class SoFar:
+    """What has been measured so far."""
 
-    claims: Sequence[Claim]
-    engines: Sequence[Engine]
-    """The one on trial first."""
-    submit: Callable[..., Future[Verdict]]
-    done: Callable[[], None]
-
-    def __post_init__(self) -> None:
-        self.measured = {each.name: dict.fromkeys(each.refine, Records()) for each in self.engines}
-        self.broken, self.judged = dict[str, str](), dict[str, Future[Verdict]]()
+    records: dict[str, dict[int, Records]]
+    """By engine, the one on trial first, and step divisor."""
+    waiting: Counter[str]
+    """How often a protocol is still to be carried out."""
+    broken: dict[str, str] = field(default_factory=dict)
+    """Errors of protocols of the engine on trial: each takes its own claims with it, and no
+    others."""
 
     def take(self, job: Job, found: Records | Exception) -> None:
-        """Take in what a protocol has measured, or its error, which takes its own claims with it,
-        and no others."""
-        if isinstance(found, Exception):
-            why = f"{type(found).__name__}: {found}"
-            name = job.protocol.name
-            if job.lab.engine is self.engines[0]:
-                self.broken[name] = f"{name}: {why}"
-                return
-            found = Records(
-                missing=tuple(Missing(name, each, f"{job.name}: {why}") for each in job.sets)
-            )
-        self.measured[job.lab.engine.name][job.lab.refine] += found
+        """Take in what a protocol has measured, or its error."""
+        name, engine = job.protocol.name, job.lab.engine.name
+        self.waiting[name] -= 1
+        if not isinstance(found, Exception):
+            self.records[engine][job.lab.refine] += found
+            return
+        why = f"{type(found).__name__}: {found}"
+        if engine == next(iter(self.records)):
+            self.broken[name] = f"{name}: {why}"
+        else:
+            rows = (Missing(name, each, f"{job.name}: {why}") for each in job.sets)
+            self.records[engine][job.lab.refine] += Records(missing=tuple(rows))
 
-    def judge(self, jobs: Sequence[Job]) -> None:
-        """Begin to judge all claims that wait for none of these protocols."""
-        waiting = {job.protocol.name for job in jobs}
-        for claim in self.claims:
+    def verdict(self, claim: Claim) -> Verdict:
+        """The verdict on a claim, an error if one of its protocols broke down."""
+        judged = full_verdict(claim, self.records)
+        errors = [why for name, why in self.broken.items() if name in claim.protocols]
+        return replace(judged, outcome=Outcome.ERROR, error="; ".join(errors)) if errors else judged
+
+
+def measure(study: Study, campaign: Campaign, far: ValidationProgress) -> Iterator[SoFar]:
+    """Carry out what is planned; yield all that is measured, at first and after each protocol."""
+    jobs = study.jobs(campaign)
+    far.costs = {job.name: job.cost for job in jobs}
+    records = {each.name: dict.fromkeys(each.refine, Records()) for each in study.engines}
+    measured = SoFar(records, Counter(job.protocol.name for job in jobs))
+    yield measured
+    for job, found in programme.run(jobs):
+        far.measured(job.name)
+        measured.take(job, found)
+        yield measured
+
+
+def judge(
+    claims: Sequence[Claim],
+    measured: Iterable[SoFar],
+    announce: Announce,
+    far: ValidationProgress,
+) -> dict[str, Verdict]:
+    """The verdicts by claim, each as soon as all that it needs is measured."""
+    verdicts: dict[str, Verdict] = {}
+    for so_far in measured:
+        for claim in claims:
             # Next to a threshold a settled state has no limit: see `witnesses.MARGIN`.
             needed = claim.protocols | ({"thresholds"} if "settled" in claim.protocols else set())
-            if claim.id not in self.judged and not waiting & needed:
-                heard = {name: dict(steps) for name, steps in self.measured.items()}
-                self.judged[claim.id] = self.submit(claim, heard, dict(self.broken))
-                self.judged[claim.id].add_done_callback(lambda _: self.done())
+            if claim.id not in verdicts and not any(so_far.waiting[name] for name in needed):
+                verdicts[claim.id] = so_far.verdict(claim)
+                announce(verdicts[claim.id])
+                far.judged()
+    return verdicts
 
 
 def judge_stored(
@@ -192,7 +236,7 @@ def judge_stored(
             claim.id: Verdict(claim=claim, **each)
             for claim, each in zip(CLAIMS[::-1], found, strict=True)
         }
-        written = _write(
+        written = write(
             directory, Level[summary.level], summary.measurements, testimony, verdicts, work.map
         )
     return [v for v in written if v.claim.id in chosen]
@@ -242,7 +286,7 @@ def stored_evidence(directory: Path) -> Evidence:
     return evidence(directory, [_in_time(claim, testimony) for claim in CLAIMS], testimony)
 
 
-def _write(
+def write(
     directory: Path,
     level: Level,
     files: results.Files,
@@ -264,15 +308,3 @@ def _write(
     else:
         results.save(summary, directory)
     return verdicts
-
-
-def _announced(
-    announce: Announce, claim: Claim, testimony: RecordsByEngine, broken: Mapping[str, str]
-) -> Verdict:
-    """Judge a claim, an error if one of its protocols broke down, and hand the verdict to whoever
-    wants to know."""
-    judged = full_verdict(claim, testimony)
-    if errors := [why for name, why in broken.items() if name in claim.protocols]:
-        judged = replace(judged, outcome=Outcome.ERROR, error="; ".join(errors))
-    announce(judged)
-    return judged

@@ -27,8 +27,7 @@ from model.versions import version
 
 
 class Role(Enum):
-    """How an engine is heard of a claim, and which sets it measures, see
-    `compare.kit.levels.ASSIGNMENTS`."""
+    """How an engine is heard of a claim, and which sets it measures, see `compare.kit.plan`."""
 
     ON_TRIAL = auto()
     IN_THE_LIMIT = auto()

@@ -1,5 +1,5 @@
-"""How much each level measures: which parameter sets, and of every protocol step counts, durations
-and grids; by whom.
+"""How much each level measures: which parameter sets there are, and of every protocol step counts,
+durations and grids.
 
 An engine other than the one on trial, with time steps of its own, measures as much as the quick
 level at every level, but for what `WITNESS` says, and looks where the one on trial found something.
@@ -285,75 +285,3 @@ def sets(level: Level) -> dict[str, Parameters]:
             c = kappa * math.sqrt(values["g"] / values["R"])
             sets[f"design-{k}"] = Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
     return sets
-
-
-ONE_BALL = ("reference",)
-"""For what one ball shows as well as many, or the paper draws for one."""
-ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
-"""One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
-DRAG_LAWS = (*ONE_BALL, "wake", "blunt")
-"""One for each law of drag."""
-WITNESSED = (*ENDS_OF_ROLLING, "rough-floor", "wake")
-"""Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at
-one flow, a law of drag."""
-VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
-"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride
-the wall at one flow; drag so strong that nothing folds; two other laws of drag; friction of the
-wall above that of the floor and the inertia. On them all wrong theories are noticed that are
-noticed on all nine sets chosen by hand."""
-MOST_WITNESSED = 12
-"""Sets, at most, that engines in the limit of no time step measure above the quick level."""
-
-
-@dataclass(frozen=True)
-class Assignment:
-    """Which sets a protocol measures, by which engine."""
-
-    quick: tuple[str, ...] = VARIED
-    """By the engine on trial at the quick level; at the others all of them."""
-    limit: tuple[str, ...] = ()
-    """By engines in the limit of no time step at the quick level. At the others these measure
-    `MOST_WITNESSED`, and `reference` where none is named here."""
-    steps: tuple[int, int] = (3, 3)
-    """With how many of their time steps, the coarsest first: at the quick level, and above."""
-    as_it_comes: tuple[str, ...] = ()
-    """By MuJoCo as it comes."""
-    level: Level = Level.QUICK
-    """The least level of which it is a part."""
-
-
-# fmt: off
-ASSIGNMENTS: dict[str, Assignment] = {
-    # protocol                 on trial, quick  in the limit     steps   as it comes
-    "settled":    Assignment(VARIED,          WITNESSED,       (4, 4), ONE_BALL),
-    "mirrored":   Assignment(ONE_BALL,        ONE_BALL),
-    "plane":      Assignment(ONE_BALL),
-    "thresholds": Assignment(VARIED,          WITNESSED,       (3, 4)),
-    "edge":       Assignment(("reference", "rough-floor")),
-    "birth":      Assignment(VARIED),
-    "rates":      Assignment((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL),
-    "growth":     Assignment(VARIED,          WITNESSED),
-    "steepest":   Assignment(VARIED,          WITNESSED),
-    "lift":       Assignment(VARIED,          ENDS_OF_ROLLING, (4, 4)),
-    "bounds":     Assignment(VARIED,          ONE_BALL),
-    "laws":       Assignment(VARIED,          ONE_BALL),
-    "field":      Assignment(VARIED,          WITNESSED),
-    "motions":    Assignment(ONE_BALL,        ONE_BALL),
-    "runs":       Assignment(DRAG_LAWS,       ONE_BALL),
-    "torque":     Assignment(ONE_BALL,        ONE_BALL,        (4, 4)),
-    "impacts":    Assignment(ENDS_OF_ROLLING, ONE_BALL),
-    "hysteresis": Assignment(ONE_BALL,        ONE_BALL,        (4, 4)),
-    "unloading":  Assignment(ENDS_OF_ROLLING),
-    "slope":      Assignment(VARIED,          ONE_BALL),
-    "pulsation":  Assignment(DRAG_LAWS,       ONE_BALL),
-    "unsteady":   Assignment(DRAG_LAWS,       ONE_BALL),
-    "recurrent":  Assignment(ONE_BALL),
-    "stepped":    Assignment(ONE_BALL),
-    "choice":     Assignment(ONE_BALL,        ONE_BALL,        (4, 4)),
-    "followed":   Assignment(ONE_BALL,        level=Level.DEFAULT),
-    "rebounding": Assignment(ONE_BALL,        level=Level.DEFAULT),
-    "swing":      Assignment(ONE_BALL,        level=Level.DEFAULT),
-    "calm":       Assignment(ONE_BALL,        level=Level.DEFAULT),
-}
-# fmt: on
-"""Who measures what, by protocol. One that isn't listed has the default."""

@@ -1,8 +1,8 @@
 """How protocols are carried out, and where their measurements are kept.
 
 A protocol is a function of a lab, the parameter sets, and what was measured before it; it yields
-measurements, and what it could not measure. To add one, write such a function and add a line to the
-`PROTOCOLS` of its subject."""
+measurements, and what it could not measure. To add one, write such a function, and add a line to
+the `PROTOCOLS` of its subject and one to `compare.kit.plan.PLAN`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import KW_ONLY, asdict, dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 from compare.kit import record
-from compare.kit.engines import Engine, Role
+from compare.kit.engines import Engine
 from compare.kit.lab import Lab, coarse_step
-from compare.kit.levels import ASSIGNMENTS, MOST_WITNESSED, Assignment, Level, sets
+from compare.kit.levels import Level
+from compare.kit.plan import PLAN, planned
 from compare.kit.record import Measurement, Missing, Origin, Planned, Records
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
@@ -43,47 +44,9 @@ class Protocol:
     measure: Measure
     needs: tuple[str, ...] = ()
     """Protocols whose measurements it goes out from."""
-    _: KW_ONLY
-    cost: float = 1.0
-    """Processor time at the quick level, s on some machine: its part of the whole, and the most
-    costly begin first."""
-    first: bool = False
-    """Whether it is a single long run, which begins first: beside it there is work for the other
-    workers."""
-    waits: bool = True
-    """Whether it waits for motions to settle."""
-    alone: str = ""
-    """Why it needs the set `reference`, and no other; empty if it takes all sets."""
-    engine: Engine | None = None
-    """Who measures, where it isn't the engine on trial."""
-    follows: bool = False
-    """Whether an engine beside the one on trial looks where that one found something."""
     drawn: Callable[[Measurement], bool] = lambda m: False
     """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is
     stored."""
-
-    @property
-    def assignment(self) -> Assignment:
-        """Who measures it on which sets."""
-        return ASSIGNMENTS.get(self.name, Assignment())
-
-    def measures(self, lab: Lab) -> dict[str, Parameters]:
-        """The parameter sets that it measures at the level and with the engine of a lab, by
-        name."""
-        known, assignment, above = sets(lab.level), self.assignment, lab.level > Level.QUICK
-        names: Iterable[str] = known if above else assignment.quick
-        if lab.engine.role is Role.AS_IT_COMES:
-            names = assignment.as_it_comes
-        elif lab.engine.role is Role.IN_THE_LIMIT:
-            most = MOST_WITNESSED if assignment.limit else 1
-            names = tuple(known)[:most] if above else assignment.limit
-            if lab.refine not in lab.engine.refine[: assignment.steps[above]]:
-                names = ()
-        return {
-            name: p
-            for name, p in known.items()
-            if name in names and not (lab.is_witness and self.engine)
-        }
 
 
 @dataclass(frozen=True)
@@ -110,37 +73,39 @@ class Job:
     @property
     def sets(self) -> Mapping[str, Parameters]:
         """What is measured, by name."""
-        return self.protocol.measures(self.lab) if self.chosen is None else self.chosen
+        if self.chosen is not None:
+            return self.chosen
+        return planned(self.protocol.name, self.lab.engine, self.lab.refine, self.lab.level)
+
+    @property
+    def by(self) -> Engine:
+        """Who measures."""
+        return PLAN[self.protocol.name].by or self.lab.engine
 
     @property
     def cost(self) -> float:
         """About its processor time at the quick level, relative to others."""
+        name, engine, divisor = self.protocol.name, self.lab.engine, self.lab.refine
         if not self.lab.is_witness:
-            return self.protocol.cost
-        asked = len(self.protocol.measures(replace(self.lab, level=Level.QUICK)))
-        return (
-            self.protocol.cost
-            * asked
-            / max(len(self.protocol.assignment.quick), 1)
-            * self.lab.refine
-        )
+            return PLAN[name].seconds
+        share = len(planned(name, engine, divisor, Level.QUICK)) / len(PLAN[name].trial)
+        return PLAN[name].seconds * share * divisor
 
     @cached_property
     def origin(self) -> Origin:
         """Who measures, and by which plan."""
-        engine = self.protocol.engine or self.lab.engine
         subject, measure, _ = self.protocol.measure.__module__.partition(".measure")
         plan = [
-            engine.name,
+            self.by.name,
             self.lab.refine,
             self.lab.level.name,
             {name: asdict(p) for name, p in self.sets.items()},
-            sources(*engine.sources, "compare.kit", *([subject + measure] if measure else [])),
+            sources(*self.by.sources, "compare.kit", *([subject + measure] if measure else [])),
         ]
         return Origin(
             protocol=self.protocol.name,
             engine=self.lab.engine.name,
-            by=engine.name,
+            by=self.by.name,
             step=self.lab.refine,
             level=self.lab.level.name,
             plan=hashlib.sha256(json.dumps(plan).encode()).hexdigest()[:16],
@@ -153,7 +118,8 @@ class Job:
 
 
 def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
-    """The protocols of these names and all those whose measurements they need, in order."""
+    """The protocols of these names and all those whose measurements they need, as `PLAN` orders
+    them."""
     known = {protocol.name: protocol for protocol in protocols}
     wanted, todo = set[str](), list(names)
     while todo:
@@ -161,12 +127,12 @@ def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Pro
         if name not in wanted:
             wanted.add(name)
             todo += known[name].needs
-    return [protocol for name, protocol in known.items() if name in wanted]
+    return [known[name] for name in PLAN if name in wanted]
 
 
 def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
-    """Carry out protocols, some at once if they need nothing of each other; yield each as it ends,
-    with its records.
+    """Carry out protocols, some at once if they need nothing of each other, those in front first;
+    yield each as it ends, with its records.
 
     A protocol that breaks down comes with its exception, and so do those that need it: what they
     measured without it would be kept, and taken for whole the next time. Raises `StorageError`
@@ -179,7 +145,8 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
         needs[name] = [
             other if other in known else job.beside(other) for other in job.protocol.needs
         ]
-        needs[name] += [job.protocol.name] * (job.protocol.follows and name != job.protocol.name)
+        if PLAN[job.protocol.name].seeded and name != job.protocol.name:
+            needs[name].append(job.protocol.name)
     order = TopologicalSorter(
         {name: [each for each in those if each in known] for name, those in needs.items()}
     )
@@ -192,8 +159,8 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
     with threads(workers.count + 2 if workers.count > 1 else 1) as pool:
         try:
             while order.is_active():
-                ready = [known[name] for name in order.get_ready()]
-                for job in sorted(ready, key=lambda job: (not job.protocol.first, -job.cost)):
+                ready = {*order.get_ready()}
+                for job in (each for each in jobs if each.name in ready):
                     if lost := [broken[other] for other in needs[job.name] if other in broken]:
                         future = Future[Records]()
                         future.set_exception(lost[0])
@@ -229,22 +196,22 @@ def carry_out(job: Job, before: Records) -> Records:
 
     Raises `StorageError` where measurements can't be read or written, or are another engine's.
     """
-    path, protocol = job.file, job.protocol
+    path, protocol, entry = job.file, job.protocol, PLAN[job.protocol.name]
     label = f"{protocol.name}-{path.parent.name}"
     campaign = job.lab.campaign.part(label, job.name)
     if not path.exists():
-        lab = replace(job.lab, engine=protocol.engine or job.lab.engine, campaign=campaign)
+        lab = replace(job.lab, engine=job.by, campaign=campaign)
         strong, rows = dict(job.sets), list[Measurement | Missing]()
         for name, p in job.sets.items():
             weak = UNDAMPED if p.c == 0 else ""
-            if p.c and protocol.waits and (steps := 1 / (p.c * coarse_step(p))) > LONGEST_WAIT:
+            if p.c and entry.settles and (steps := 1 / (p.c * coarse_step(p))) > LONGEST_WAIT:
                 weak = f"drag is so weak (1/c = {1 / p.c:.3g} s, {steps:.2g} time steps)"
                 weak += " that motions take too long to settle"
             if weak:
                 rows.append(Missing(protocol.name, name, weak))
                 del strong[name]
-        if protocol.alone and "reference" not in strong:
-            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone, 0))
+        if entry.only and "reference" not in strong:
+            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), entry.only, 0))
         else:
             rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(path.parent)

@@ -101,9 +101,9 @@ class ValidationProgress:
     """How far a validation is: claims judged, protocols measured, runs of those under way."""
 
     show: Show
-    costs: Mapping[str, float]
-    """Processor time of each protocol, in any unit."""
     claims: int
+    costs: Mapping[str, float] = field(default_factory=dict)
+    """Processor time of each protocol, in any unit."""
     _under_way: dict[str, tuple[int, int, int]] = field(default_factory=dict)
     _measured: float = 0.0
     _judged: int = 0

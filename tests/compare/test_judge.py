@@ -15,7 +15,8 @@ from compare import validation
 from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Bearing, Claim, Outcome, Text
 from compare.judge import judge, select, theory
-from compare.kit.levels import ASSIGNMENTS, Level, sets
+from compare.kit.levels import Level, sets
+from compare.kit.plan import PLAN
 from compare.kit.quantities import quantity
 from compare.kit.record import Missing, Planned, Records, Relation
 from compare.kit.statistics import COVERAGE, Measured
@@ -215,11 +216,9 @@ NAMES = {protocol.name for protocol in PROTOCOLS}
 def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols():
     assert len(NAMES) == len(PROTOCOLS)
     assert len({claim.id for claim in CLAIMS}) == len(CLAIMS)
-    assert {name for claim in CLAIMS for name in claim.protocols} == NAMES == ASSIGNMENTS.keys()
+    assert {name for claim in CLAIMS for name in claim.protocols} == NAMES == PLAN.keys()
     asked = {
-        name
-        for each in ASSIGNMENTS.values()
-        for name in (*each.quick, *each.limit, *each.as_it_comes)
+        name for each in PLAN.values() for name in (*each.trial, *each.limit, *each.as_it_comes)
     }
     assert asked <= sets(Level.QUICK).keys()
     said = [

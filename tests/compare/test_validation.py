@@ -11,6 +11,7 @@ from compare.claim import Bearing, Outcome, Verdict
 from compare.kit import programme, record
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
+from compare.kit.plan import PLAN, Entry
 from compare.kit.programme import UNDAMPED, Job, Protocol
 from compare.kit.record import Check, Missing, Records
 from compare.report import results
@@ -63,6 +64,7 @@ def counted(monkeypatch):
             done.append(name)
             yield from measure(lab, sets, records)
 
+        monkeypatch.setitem(PLAN, name, Entry())
         return Protocol(name, carried_out, NEEDS.get(name, ()))
 
     protocols = [counting(*each) for each in MEASURED.items()]
@@ -165,16 +167,16 @@ def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
         assert first.wait(30)
         yield from ()
 
-    monkeypatch.setattr(
-        validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("waiting", waiting))
-    )
+    monkeypatch.setitem(PLAN, "waiting", Entry())
+    protocols = *validation.PROTOCOLS, Protocol("waiting", waiting)
+    monkeypatch.setattr(validation, "PROTOCOLS", protocols)
     monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, about("waiting")))
     assert run(tmp_path, announce=announce)[-1].outcome == "not run"
     assert set(seen) == {each.id for each in validation.CLAIMS}
     assert seen[0] != "of-waiting"
 
 
-def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab):
+def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab, monkeypatch):
     seen = []
 
     def measure(lab, sets, before):
@@ -182,15 +184,17 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab):
         yield from ()
 
     named = {name: Parameters.named(name) for name in ("air", "steel-in-water")}
-    for waits in (True, False):
-        protocol = Protocol(f"waits-{waits}", measure, waits=waits)
+    for settles in (True, False):
+        protocol = Protocol(f"settles-{settles}", measure)
+        monkeypatch.setitem(PLAN, protocol.name, Entry(settles=settles))
         missing = programme.carry_out(Job(protocol, lab, tmp_path, named), Records()).missing
-        assert [m.set for m in missing] == ["air"] * waits
+        assert [m.set for m in missing] == ["air"] * settles
         assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
     assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
-def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, lab):
+def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, lab, monkeypatch):
+    monkeypatch.setitem(PLAN, "round", Entry())
     named = {name: Parameters.named("reference") for name in ("one", "other", "third")}
 
     def measure(lab, sets, before):
@@ -202,18 +206,18 @@ def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, lab):
 
 
 def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
-    tmp_path, lab
+    tmp_path, lab, monkeypatch
 ):
     for engine in (None, MUJOCO):  # what one measured is not taken for the other's
-        protocol = Protocol("round", going_round, engine=engine)
+        monkeypatch.setitem(PLAN, "round", Entry(by=engine))
+        protocol = Protocol("round", going_round)
         (row,) = programme.carry_out(
             Job(protocol, lab, tmp_path, {"mine": SETS["mine"]}), Records()
         ).measurements
         assert row.engine == (engine or EVENT).name
     for name, count in (("mine", 1), ("reference", 0)):
-        protocol = Protocol(
-            f"of-{name}", lambda lab, sets, records: (), alone="it is that of the reference"
-        )
+        protocol = Protocol(f"of-{name}", lambda lab, sets, records: ())
+        monkeypatch.setitem(PLAN, protocol.name, Entry(only="it is that of the reference"))
         missing = programme.carry_out(
             Job(protocol, lab, tmp_path, {name: SETS["mine"]}), Records()
         ).missing

@@ -420,19 +420,12 @@ def choice(
     yield from settled_readings(lab, "choice", starts[: lab.effort.choice_sets])
 
 
-_HOPS = "hops that last are those of the set hopping"
 PROTOCOLS = (
-    Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
-    Protocol(
-        "stepped",
-        partial(hopping, protocol="stepped", refine=(40, 80)),
-        engine=MOREAU,
-        alone=_HOPS,
-        first=True,
-    ),
-    Protocol("choice", choice, alone="it is one of balls with mu > 1", first=True),
-    Protocol("followed", followed, alone=_HOPS),
-    Protocol("rebounding", rebounding, engine=MOREAU, alone=_HOPS),
-    Protocol("swing", swing, alone="swings that last are those of reference on a very rough floor"),
-    Protocol("calm", calm, alone="strong drag is tried on sets of its own"),
+    Protocol("recurrent", hopping),
+    Protocol("stepped", partial(hopping, protocol="stepped", refine=(40, 80))),
+    Protocol("choice", choice),
+    Protocol("followed", followed),
+    Protocol("rebounding", rebounding),
+    Protocol("swing", swing),
+    Protocol("calm", calm),
 )

@@ -441,8 +441,7 @@ PROTOCOLS = (
         "unloading",
         unloading,
         ("thresholds",),
-        cost=4,
         drawn=lambda m: m.conditions["start"] == UNLOADED,
     ),
-    Protocol("slope", slope, ("settled", "thresholds"), cost=6),
+    Protocol("slope", slope, ("settled", "thresholds")),
 )

@@ -390,4 +390,4 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     return 1 / time_unit(p)
 
 
-PROTOCOLS = (Protocol("rates", measure, ("settled",), cost=7),)
+PROTOCOLS = (Protocol("rates", measure, ("settled",)),)

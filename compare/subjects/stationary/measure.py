@@ -170,6 +170,6 @@ def _row(
 
 
 PROTOCOLS = (
-    Protocol("settled", measure, cost=11),
+    Protocol("settled", measure),
     Protocol("mirrored", mirrored),
 )

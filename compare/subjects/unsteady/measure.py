@@ -561,8 +561,6 @@ def caught_up(run: Trajectory) -> float:
 
 
 PROTOCOLS = (
-    Protocol("pulsation", pulsation, ("thresholds",), cost=7),
-    Protocol(
-        "unsteady", jumps, ("thresholds",), drawn=lambda m: m.quantity == "jump_height", cost=5
-    ),
+    Protocol("pulsation", pulsation, ("thresholds",)),
+    Protocol("unsteady", jumps, ("thresholds",), drawn=lambda m: m.quantity == "jump_height"),
 )

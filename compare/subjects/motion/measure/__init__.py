@@ -6,10 +6,10 @@ from compare.kit.programme import Protocol
 from compare.subjects.motion.measure import laws, motions, runs
 
 PROTOCOLS = (
-    Protocol("laws", laws.measure, waits=False, cost=3),
-    Protocol("field", motions.field, waits=False),
-    Protocol("motions", motions.motions, waits=False),
-    Protocol("runs", runs.measure, waits=False),
+    Protocol("laws", laws.measure),
+    Protocol("field", motions.field),
+    Protocol("motions", motions.motions),
+    Protocol("runs", runs.measure),
     Protocol("torque", runs.torque),
-    Protocol("impacts", motions.impacts, waits=False),
+    Protocol("impacts", motions.impacts),
 )

@@ -7,8 +7,8 @@ from compare.kit.programme import Protocol
 from compare.subjects.slipping.measure import growth, onset
 
 PROTOCOLS = (
-    Protocol("growth", growth.measure, waits=False),
-    Protocol("steepest", growth.steepest, waits=False),
-    Protocol("lift", onset.lift, waits=False),
-    Protocol("bounds", onset.bounds, ("thresholds",), cost=2),
+    Protocol("growth", growth.measure),
+    Protocol("steepest", growth.steepest),
+    Protocol("lift", onset.lift),
+    Protocol("bounds", onset.bounds, ("thresholds",)),
 )

@@ -1,0 +1,117 @@
+"""What is measured, by whom, on which sets, and with which time steps: one table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import KW_ONLY, dataclass
+
+from compare.kit.engines import MOREAU, Engine, Role
+from compare.kit.levels import Level, sets
+from model import Parameters
+
+Names = tuple[str, ...]
+"""Of parameter sets."""
+ONE_BALL = ("reference",)
+"""For what one ball shows as well as many, or the paper draws for one."""
+ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
+"""One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
+DRAG_LAWS = (*ONE_BALL, "wake", "blunt")
+"""One for each law of drag."""
+WITNESSED = (*ENDS_OF_ROLLING, "rough-floor", "wake")
+"""Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at
+one flow, a law of drag."""
+VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
+"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride
+the wall at one flow; drag so strong that nothing folds; two other laws of drag; friction of the
+wall above that of the floor and the inertia. On them all wrong theories are noticed that are
+noticed on all nine sets chosen by hand."""
+MOST_WITNESSED = 12
+"""Sets, at most, that engines in the limit of no time step measure above the quick level."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The plan of a protocol."""
+
+    trial: Names = VARIED
+    """Sets that the engine on trial measures at the quick level; at the others all of them."""
+    limit: Names = ()
+    """Sets that an engine in the limit of no time step measures at the quick level. At the others
+    these are the first `MOST_WITNESSED`, and `reference` alone where none is named here."""
+    steps: tuple[int, int] = (3, 3)
+    """With how many of its time steps it does, the coarsest first: at the quick level, and
+    above."""
+    as_it_comes: Names = ()
+    """Sets that an engine with its own settings measures, at every level."""
+    _: KW_ONLY
+    level: Level = Level.QUICK
+    """The least level of which the protocol is a part."""
+    by: Engine | None = None
+    """Who measures, where it isn't the engine on trial; engines beside that one then don't."""
+    settles: bool = True
+    """Whether it needs motions that settle."""
+    seeded: bool = False
+    """Whether an engine beside the one on trial looks where that one found something."""
+    only: str = ""
+    """Why it needs the set `reference`, and no other; empty if it takes all sets."""
+    seconds: float = 1.0
+    """Processor time at the quick level on some machine: its part of the whole."""
+
+
+HOPS = "hops that last are those of the set hopping"
+# fmt: off
+PLAN: dict[str, Entry] = {
+    # What is a single long run begins first: beside it there is work for the other workers. Then
+    # what takes longest.
+    # protocol          on trial, quick   in the limit     steps   as it comes
+    "recurrent":  Entry(ONE_BALL, only=HOPS, seconds=5),
+    "stepped":    Entry(ONE_BALL, only=HOPS, by=MOREAU),
+    "choice":     Entry(ONE_BALL,         ONE_BALL,        (4, 4),
+                        only="it is one of balls with mu > 1"),
+    "thresholds": Entry(VARIED,           WITNESSED,       (3, 4), seeded=True, seconds=20),
+    "settled":    Entry(VARIED,           WITNESSED,       (4, 4), ONE_BALL, seconds=11),
+    "edge":       Entry(("reference", "rough-floor"), seconds=8),
+    "rates":      Entry((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL, seconds=7),
+    "pulsation":  Entry(DRAG_LAWS,        ONE_BALL, seconds=7),
+    "slope":      Entry(VARIED,           ONE_BALL, seconds=6),
+    "unsteady":   Entry(DRAG_LAWS,        ONE_BALL, seconds=5),
+    "unloading":  Entry(ENDS_OF_ROLLING, seconds=4),
+    "laws":       Entry(VARIED,           ONE_BALL, settles=False, seconds=3),
+    "plane":      Entry(ONE_BALL, only="the planes of Figs. 7 and 8 are those of reference only",
+                        seconds=3),
+    "birth":      Entry(VARIED, seconds=3),
+    "bounds":     Entry(VARIED,           ONE_BALL, seconds=2),
+    "mirrored":   Entry(ONE_BALL,         ONE_BALL),
+    "growth":     Entry(VARIED,           WITNESSED, settles=False),
+    "steepest":   Entry(VARIED,           WITNESSED, settles=False),
+    "lift":       Entry(VARIED,           ENDS_OF_ROLLING, (4, 4), settles=False),
+    "field":      Entry(VARIED,           WITNESSED, settles=False),
+    "motions":    Entry(ONE_BALL,         ONE_BALL, settles=False),
+    "runs":       Entry(DRAG_LAWS,        ONE_BALL, settles=False),
+    "torque":     Entry(ONE_BALL,         ONE_BALL,        (4, 4)),
+    "impacts":    Entry(ENDS_OF_ROLLING,  ONE_BALL, settles=False),
+    "hysteresis": Entry(ONE_BALL,         ONE_BALL,        (4, 4)),
+    "followed":   Entry(ONE_BALL, level=Level.DEFAULT, only=HOPS),
+    "rebounding": Entry(ONE_BALL, level=Level.DEFAULT, only=HOPS, by=MOREAU),
+    "swing":      Entry(ONE_BALL, level=Level.DEFAULT,
+                        only="swings that last are those of reference on a very rough floor"),
+    "calm":       Entry(ONE_BALL, level=Level.DEFAULT,
+                        only="strong drag is tried on sets of its own"),
+}
+# fmt: on
+
+
+def planned(protocol: str, engine: Engine, divisor: int, level: Level) -> dict[str, Parameters]:
+    """The sets that a protocol measures at a level, by an engine whose time steps are divided so,
+    by name."""
+    entry, known, above = PLAN[protocol], sets(level), level > Level.QUICK
+    names: Iterable[str] = known if above else entry.trial
+    if engine.role is Role.AS_IT_COMES:
+        names = entry.as_it_comes
+    elif engine.role is Role.IN_THE_LIMIT:
+        names = tuple(known)[: MOST_WITNESSED if entry.limit else 1] if above else entry.limit
+        if divisor not in engine.refine[: entry.steps[above]]:
+            names = ()
+    if level < entry.level or (entry.by and engine.refine != (1,)):
+        names = ()
+    return {name: p for name, p in known.items() if name in names}
