@@ -162,12 +162,18 @@ class Output:
 
 HDF5 = Output("HDF5", (".h5", ".hdf5", ".nc"))
 TABLE = Output("CSV", (".csv",))
+DATA = Output("HDF5 or CSV", (*HDF5.suffixes, *TABLE.suffixes))
 MARKDOWN = Output("Markdown", (".md",))
 PAGE = Output("an HTML page", (".html", ".htm"))
 FIGURE = Output("a figure", (".png", ".svg", ".pdf"))
 MAP = Output("a map", (*FIGURE.suffixes, ".json"))
 ENDINGS = {suffix for each in (HDF5, TABLE, MARKDOWN, PAGE, MAP) for suffix in each.suffixes}
 """Names of files end in these."""
+
+
+def is_table(output: Path | None) -> bool:
+    """Whether an output is a table of numbers, by the end of its name."""
+    return output is not None and output.suffix.lower() in TABLE.suffixes
 
 
 def results(text: str) -> Path:

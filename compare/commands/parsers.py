@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from compare.commands import options
-from compare.commands.options import HDF5, MAP, MARKDOWN, PAGE, TABLE, Number, Parser
+from compare.commands.options import DATA, MAP, MARKDOWN, PAGE, TABLE, Number, Parser
 from model import InputError
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range
@@ -118,12 +118,14 @@ def parameters(parser: Parser) -> None:
 def predict(parser: Parser) -> None:
     """Stationary solutions, thresholds and operating range, from theory."""
     options.add_parameters(parser)
+    written = "write the solutions, a line each, with the thresholds (default: don't)"
+    parser.add_argument("-o", "--output", type=TABLE, dest="table", help=written)
     options.add_json(parser, "print JSON instead of tables")
 
 
 @command("the ball", "simulate.run", "--omega-0 25 -o run.h5")
 def simulate(parser: Parser) -> None:
-    """One run with any engine, into an HDF5 file, or live in MuJoCo's viewer."""
+    """One run with any engine, into a file, or live in MuJoCo's viewer."""
     options.add_engine(parser)
     options.add_parameters(parser)
     group = parser.add_argument_group(
@@ -145,7 +147,8 @@ def simulate(parser: Parser) -> None:
     options.add_start(parser)
     parser.add_argument("--time", type=options.seconds, help="duration (default 10)")
     options.add_samples(parser)
-    parser.add_argument("-o", "--output", type=HDF5, help="HDF5 file to write (default: none)")
+    written = "file to write: HDF5, or the samples as CSV"
+    parser.add_argument("-o", "--output", type=DATA, help=f"{written} (default: none)")
     live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
     parser.add_argument("--view", action="store_true", help=live)
     parser.add_argument(
@@ -220,7 +223,7 @@ def collect(parser: Parser) -> None:
     of = "directory of a sweep, or any with files of runs in it"
     parser.add_argument("directory", type=Path, metavar="DIR", help=of)
     parser.add_argument(
-        "-o", "--output", type=HDF5, default=Path("sweep.h5"), help="HDF5 file to write"
+        "-o", "--output", type=DATA, default=Path("sweep.h5"), help="file to write: HDF5 or CSV"
     )
     options.add_processes(parser)
 

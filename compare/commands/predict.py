@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rich.table import Table
@@ -22,9 +22,10 @@ from compare.kit.doubt import model_warning
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
 from compare.report import meter
-from model import Case, Parameters
+from model import Case, Parameters, table
 from model.drag import LAWS, REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES
+from model.trajectory import AXES
 
 
 def show_parameters(args: argparse.Namespace) -> int:
@@ -44,23 +45,23 @@ def show_parameters(args: argparse.Namespace) -> int:
             | row
             | {"unit": meta["unit"], "range": allowed, "meaning": meta["meaning"]}
         )
-    table = Table("option", "value", "unit", "range", "meaning", box=None)
+    shown = Table("option", "value", "unit", "range", "meaning", box=None)
     for row in rows:
-        table.add_row(
+        shown.add_row(
             row["option"],
             f"{row['value']:.6g}",
             readable(row["unit"]),
             row["range"],
             row["meaning"],
         )
-    table.add_row("--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}")
+    shown.add_row("--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}")
     others = [name for name in Parameters.names() if args.parameters or name != args.set]
     own = f"Values of {args.parameters or args.set}; other sets: {', '.join(others)}."
     toml = "A file of your own for --parameters: TOML, a line NAME = value each, named as in the options (omega_0)."
     options.show(
         {"parameters": rows, "drag": p.drag, "sets": Parameters.names()},
         args.json,
-        table,
+        shown,
         "",
         own,
         toml,
@@ -71,6 +72,8 @@ def show_parameters(args: argparse.Namespace) -> int:
 def run(args: argparse.Namespace) -> int:
     """Show what theory predicts of a parameter set."""
     data = described(p := options.parameters(args))
+    if args.table:
+        table.write(args.table, labelled(data))
     options.show(data, args.json, *tables(p, data))
     return 0
 
@@ -107,6 +110,23 @@ def described(p: Parameters) -> dict[str, Any]:
         "fluid_inertia": diagram.inertia_shifts(p) if p.density_ratio else None,
         "solutions": solutions,
     }
+
+
+def labelled(data: dict[str, Any]) -> dict[str, Sequence[Any]]:
+    """The solutions of `described` as a table has them, a row each; thresholds are the same in
+    all."""
+    solutions, thresholds = data["solutions"], data["thresholds"]
+    rows: dict[str, Sequence[Any]] = {"case": [s["case"] for s in solutions]}
+    rows["omega_0 (rad/s)"] = [data["parameters"].omega_0] * len(solutions)
+    for name, unit in zip(VARIABLES, UNITS, strict=True):
+        rows[table.label(name, unit)] = [s["x"][name] for s in solutions]
+    for force in ("force_A", "force_B"):
+        for k, axis in enumerate(AXES):
+            rows[f"{force}{axis} (N)"] = [s[force][k] for s in solutions]
+    rows |= {name: [s[name] for s in solutions] for name in ("exists", "stability", "slip_stable")}
+    for name, value in thresholds.items():
+        rows[table.label(name, "rad s-1" if name in QUANTITIES else "1")] = [value] * len(solutions)
+    return rows
 
 
 def reading(p: Parameters) -> str:

@@ -15,7 +15,7 @@ from compare.kit import collection, steady, sweep
 from compare.kit.tasks import failed_path, store
 from compare.view import motions
 from mjsim import ContactSettings
-from model import Flow, InputError, storage
+from model import Flow, InputError, storage, table
 from model.files import reading_json, write_text
 
 DURATION = 10.0
@@ -43,17 +43,21 @@ def run(args: argparse.Namespace) -> int:
     task = running.task(args, p, flow=flow)
     # The first signal ends the run with its samples, the second without.
     with tempfile.TemporaryDirectory() as scratch, signals.noted() as heard:
-        path = args.output or Path(scratch) / "run.h5"
+        as_table = options.is_table(args.output)
+        path = Path(scratch) / "run.h5" if as_table or not args.output else args.output
         failure = store(task, path, stop=lambda: bool(heard), tell=args.tell or (lambda done: None))
-        about = motions.describe(failed_path(path) if failure else path)
+        path = failed_path(path) if failure else path
+        kept = failed_path(args.output) if args.output and failure else args.output
+        if as_table:
+            table.write(kept, motions.labelled(storage.load(path)))
+        about = motions.describe(path)
         options.show(about, args.json, motions.table(about))
         if args.output and not failure and not args.json:
             print(f"written to {args.output}")
         if failure:
-            kept = "nothing is kept without --output"
-            if args.output:
-                kept = f"its samples so far are kept in {failed_path(path)}"
-            print(f"dualball: the simulation {failure}; {kept}", file=sys.stderr)
+            where = f"its samples so far are kept in {kept}"
+            where = where if args.output else "nothing is kept without --output"
+            print(f"dualball: the simulation {failure}; {where}", file=sys.stderr)
         return 128 + heard[0] if heard else 1 if failure else 0
 
 
@@ -122,8 +126,13 @@ def run_sweep(args: argparse.Namespace) -> int:
 
 def collect(args: argparse.Namespace) -> int:
     """Gather the runs of a directory into one file."""
-    count = collection.collect(args.directory, args.output, args.workers)
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "runs.h5" if options.is_table(args.output) else args.output
+        count = collection.collect(args.directory, path, args.workers)
+        of = collection.read(path)
+        if path != args.output:
+            table.write(args.output, collection.labelled(of))
     print(f"{count} run{'s' * (count != 1)} gathered into {args.output}")
-    if said := collection.unsettled(collection.describe(args.output)):
+    if said := collection.unsettled(collection.described(of)):
         options.warn(said)
     return 0

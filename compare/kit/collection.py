@@ -313,6 +313,7 @@ def draw(of: Columns) -> Figure:
     figure, axes = style.panels(7, 4.6, 1)
     axes = np.ravel(axes)[0]
     axes.plot(x, of["omega_c_theory"], "x", color="0.6", label="theory")
+    off = steady.share(of["omega_c"], of["omega_c_uncertainty"], of["omega_0"]) > steady.DRIFT
     for case in Case:
         of_case = of["case"] == case
         if of_case.any():
@@ -320,6 +321,9 @@ def draw(of: Columns) -> Figure:
                 x[of_case], of["omega_c"][of_case], of["omega_c_uncertainty"][of_case],
                 fmt="o", ms=4, color=style.COLOURS[case], label=case.name,
             )  # fmt: skip
+    if off.any():
+        ring = {"ms": 8, "mfc": "none", "color": "black", "label": f"not settled: {off.sum()}"}
+        axes.plot(x[off], of["omega_c"][off], "o", **ring)
     axes.set(xlabel=label, ylabel=f"{style.symbol('omega_c')} (rad/s)")
     axes.grid(alpha=0.3)
     style.legend(axes)

@@ -8,15 +8,16 @@ be nearer than the time in which the fluid takes the ball along lets it be.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 import analytic
 from analytic.mechanics import drag
 from compare.kit.statistics import steady_mean
-from model import Header, Parameters
+from model import Flow, Header, Parameters, Trajectory
 from model.arrays import Array
+from model.kinematics import VARIABLES
 
 QUARTER = 0.25
 FEWEST = 6
@@ -67,6 +68,35 @@ def last_quarter(
     slowest = time_taken_along(p, float(x[-length:, 2].mean())) / interval
     means, drifts = steady_mean(x.T, length, slowest)
     return means.tolist(), drifts.tolist()
+
+
+def described(
+    settled: tuple[Sequence[float], Sequence[float]] | None,
+) -> dict[str, dict[str, float]]:
+    """What `last_quarter` gives as JSON-able data by the name of the variable."""
+    rows = zip(VARIABLES, *(settled or ((), ())), strict=bool(settled))
+    return {name: {"mean": mean, "drift": drift} for name, mean, drift in rows}
+
+
+def of_run(run: Trajectory) -> str:
+    """`in_words` of a run that is at hand."""
+    found = described(last_quarter(run.time, run.x, run.header, len(run.time)))
+    lasts = float(run.time[-1]) if len(run.time) else 0.0
+    return in_words(run.header.flow, lasts, found.get("omega_c"))
+
+
+def in_words(flow: Flow, lasts: float, of: Mapping[str, float] | None) -> str:
+    """The steady omega_c of a run, and whether it is one, by what `described` says of it."""
+    if of is None:
+        return "none: too few samples"
+    mean, drift = of["mean"], of["drift"]
+    if not flow.is_steady and np.ptp(flow(np.linspace(1 - QUARTER, 1, 100) * lasts)):
+        return "none: the flow still changes in the last quarter"
+    off = float(share(np.array(mean), np.array(drift), flow(lasts)))
+    said = f"omega_c = {mean:.9g} ± {drift:.1g} rad/s over the last quarter"
+    if off > DRIFT:
+        return f"not settled: {said}, which may change by {100 * off:.2g} % yet"
+    return said
 
 
 def share(omega_c: Array, drift: Array, omega_0: Array) -> Array:

@@ -348,7 +348,7 @@ def ground(
     named: bool = True,
 ) -> None:
     """Shade each stretch of a span of time in the colour of its case, and name it above where there
-    is room."""
+    is room, else in the legend."""
     begins = [
         (run.cases[0], run.time[0]),
         *zip(map(Case, run.events.to_case), run.events.time, strict=True),
@@ -357,8 +357,10 @@ def ground(
         low, high = max(first, span[0]), min(last, span[1])
         if low < high:
             x = unit * (np.array([low, high]) - origin)
-            axes.axvspan(*x, color=COLOURS[case], alpha=0.15, lw=0)
-            if named and high - low > 0.04 * (span[1] - span[0]):
+            wide = high - low > 0.04 * (span[1] - span[0])
+            name = case.name if named and not wide else None
+            axes.axvspan(*x, color=COLOURS[case], alpha=0.15, lw=0, label=name)
+            if named and wide:
                 axes.text(
                     x.mean(),
                     1.02,

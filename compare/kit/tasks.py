@@ -175,7 +175,7 @@ def store(
 
 def failed_path(path: Path) -> Path:
     """The path at which a run that broke down is kept, by that of a whole run."""
-    return path.with_suffix(".failed.h5")
+    return path.with_suffix(f".failed{'.csv' if path.suffix.lower() == '.csv' else '.h5'}")
 
 
 def _start_stream(task: Task, **more: Any) -> mjsim.Run:

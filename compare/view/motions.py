@@ -68,12 +68,7 @@ def describe(path: Path) -> dict[str, Any]:
             for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
         ],
         "last": dict(zip(VARIABLES, last.x[-1], strict=True)) if samples else {},
-        "steady": {
-            name: {"mean": mean, "drift": drift}
-            for name, mean, drift in zip(VARIABLES, *settled, strict=True)
-        }
-        if settled
-        else {},
+        "steady": steady.described(settled),
     }
 
 
@@ -118,7 +113,7 @@ def table(about: dict[str, Any]) -> Table:
         "last state": "\n".join(
             f"{n} = {about['last'][n]:.9g} {pages.readable(u)}" for n, u in last
         ),
-        "steady value": in_words(about),
+        "steady value": steady.in_words(flow, about["duration"], about["steady"].get("omega_c")),
     }
     return pages.pairs(rows | ({"failure": about["failure"]} if about["failure"] else {}))
 
@@ -131,21 +126,6 @@ def labelled(run: Trajectory) -> dict[str, Sequence[Any]]:
         for name, values in run.table().items()
     }
     return columns | {"case": [Case(code).name for code in run.case]}
-
-
-def in_words(about: dict[str, Any]) -> str:
-    """What `describe` says of the steady omega_c, and whether it is one."""
-    flow = Flow.from_mapping(about["flow"])
-    if not about["steady"]:
-        return "none: too few samples"
-    mean, drift = about["steady"]["omega_c"].values()
-    if not flow.is_steady and np.ptp(flow(np.linspace(0.75, 1, 100) * about["duration"])):
-        return "none: the flow still changes in the last quarter"
-    off = float(steady.share(np.array(mean), np.array(drift), flow(about["duration"])))
-    said = f"omega_c = {mean:.9g} rad/s over the last quarter"
-    if off > steady.DRIFT:
-        return f"not settled: {said}, which may change by {100 * off:.2g} % yet"
-    return said
 
 
 def compared(a: Series, b: Series) -> dict[str, Any]:
@@ -288,5 +268,6 @@ def draw(run: Trajectory) -> Figure:
         axes.grid(alpha=0.3)
         style.legend(axes, ncols=4)
     panels[-1].set_xlabel("time (s)")
-    figure.suptitle(f"{run.header.engine}: {style.named(p)}", fontsize=11)
+    told = steady.of_run(run)
+    figure.suptitle(f"{run.header.engine}: {style.named(p)}\nsteady value: {told}", fontsize=11)
     return figure

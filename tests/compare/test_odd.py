@@ -208,7 +208,9 @@ def outputs_of(words: list[str]) -> set[str]:
                 if before in action.option_strings
             }
     named |= {
-        str(Path(name).with_suffix(".failed.h5")) for name in named if name.endswith(".h5")
+        str(Path(name).with_suffix(f".failed{suffix}"))
+        for name in named
+        if (suffix := Path(name).suffix) in (".h5", ".csv")
     }  # samples so far
     return {os.path.normpath(name) for name in named}
 
