@@ -300,6 +300,27 @@ def design(parser: Parser) -> None:
     options.add_json(parser, "print JSON instead of tables")
 
 
+@command("the ball", "calibrate.run", "--parameters mine.toml --swirl 5e4 --plot curve.png")
+def calibrate(parser: Parser) -> None:
+    """The calibration curve of a meter: range, K-factor, hysteresis, as table and figure.
+
+    Theory's reading while the flow rises from rest and while it falls. The flow is the angular
+    velocity of the swirling fluid, omega_0 in rad/s, or with --swirl the volume flow."""
+    options.add_parameters(parser)
+    known = "the swirler's constant, omega_0 divided by the volume flow; flows are in m3/s then"
+    parser.add_argument("--swirl", type=Number("rad m-3", Range(1e-9, 1e12)), help=known)
+    ends = (("slowest", "above 0"), ("fastest", "a quarter beyond the last threshold"))
+    for end, usual in ends:
+        flow = Number("FLOW", Range(1e-12, 1e12))
+        parser.add_argument(f"--{end}", type=flow, help=f"{end} flow (default: {usual})")
+    points = Number(allowed=Range(2, 10_000, whole=True))
+    parser.add_argument("--count", type=points, default=60, help="flows between them")
+    written = "write the curve (default: don't)"
+    parser.add_argument("-o", "--output", type=TABLE, dest="table", help=written)
+    options.add_plot(parser, "the curve")
+    options.add_json(parser)
+
+
 @command("the ball", "look.render", "run.h5 -o run.html --at 1 --time 10")
 def render(parser: Parser) -> None:
     """A run as a page: the motion in 3-D, contact forces, slip, case."""

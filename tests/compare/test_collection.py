@@ -15,11 +15,11 @@ import analytic
 from compare.kit import collection, record
 from compare.kit.campaign import Campaign
 from compare.kit.record import Missing, Records
-from compare.kit.tasks import Task
+from compare.kit.tasks import Task, carry_out, failed_path
 from compare.testing import assert_tracks
 from model import Flow, InputError, Parameters, StorageError, storage
 from model.hdf5 import column, dataset, reading
-from tests.commands import refused, told
+from tests.commands import carried_out, refused, told
 from tests.measured import measured
 
 P = Parameters.named("reference")
@@ -252,3 +252,46 @@ def test_runs_and_collections_as_tables_and_a_collection_drawn(tmp_path, monkeyp
     ran(tmp_path / "one", [P])
     told(capsys, "collect one -o one.h5 --workers 0")
     assert "only a collection in which" in refused(capsys, "inspect one.h5 --plot x.png")
+
+
+def test_commands_write_csv_where_the_name_says_so(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    line = "simulate --time 0.1 --engine event -o"
+    told(capsys, f"{line} run.h5")
+    assert "written to run.CSV" in told(capsys, f"{line} run.CSV")
+    assert_tracks("run.CSV", "run.h5", rms=1e-15)
+    monkeypatch.setattr("compare.commands.simulate.store", broke_down)
+    assert carried_out(capsys, f"{line} run.csv")[2].endswith("are kept in run.failed.csv\n")
+    assert (tmp_path / "run.failed.csv").read_text("utf-8").startswith("time (s),")
+    assert not (tmp_path / "run.csv").exists()
+
+    ran(tmp_path / "runs", [P.replace(omega_0=10.0), P.replace(omega_0=20.0)])
+    told(capsys, "collect runs -o all.csv --workers 0")
+    told(capsys, "collect runs -o all.h5 --workers 0")
+    told(capsys, "inspect all.h5 --table again.csv")
+    assert Path("all.csv").read_text("utf-8") == Path("again.csv").read_text("utf-8")
+
+    data = json.loads(told(capsys, "predict --omega-0 25 --json -o cases.csv"))
+    rows = list(csv.DictReader(Path("cases.csv").read_text("utf-8").splitlines()))
+    assert [row["case"] for row in rows] == [each["case"] for each in data["solutions"]]
+    for row, each in zip(rows, data["solutions"], strict=True):
+        assert float(row["omega_c (rad/s)"]) == each["x"]["omega_c"]
+        assert float(row["force_Ay (N)"]) == each["force_A"][1]
+        assert float(row["omega_01 (rad/s)"]) == data["thresholds"]["omega_01"]
+        assert row["slip_stable"] == str(each["slip_stable"])
+
+
+def broke_down(task, path, **_):
+    """What `store` does of a run that breaks down at its end."""
+    storage.save(carry_out(task), failed_path(path))
+    return "broke down"
+
+
+def test_what_has_not_settled_is_ringed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for lasts, ringed in ((2.0, True), (60.0, False)):
+        sets = [P.replace(omega_0=omega_0) for omega_0 in (8.0, 10.0)]
+        ran(tmp_path / f"{lasts:g}s", sets, t_end=lasts)
+        carried_out(capsys, f"collect {lasts:g}s -o all.h5 --workers 0")
+        told(capsys, "inspect all.h5 --plot curve.svg")
+        assert ("not settled: 2" in Path("curve.svg").read_text("utf-8")) == ringed

@@ -3,6 +3,7 @@ designed meter."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,6 +18,7 @@ from analytic.flowmeter.design import THRESHOLDS, Design
 from analytic.simulation import simulator
 from compare.branches import check_thresholds, fold_state, slipping, stable_ends
 from compare.kit import style
+from compare.kit.doubt import model_warning
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where
 from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
@@ -101,14 +103,7 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
             "the flow came from "
             "(arrows). Dashed: unstable."
         )
-        slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
-        look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
-        jumps = (
-            (t.omega_04, fold_state(p).omega_c, t.omega_04),
-            (t.omega_02, t.omega_02, slow.state.omega_c),
-        )
-        for x, begin, end in jumps:
-            axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
+        _jumps(axes, p, t)
         for side, (mark, text) in _WAYS.items():
             style.points(
                 axes,
@@ -136,6 +131,46 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     return figure, style.caption(
         p, "Characteristic curve of the flowmeter.", said, states=of.states
     )
+
+
+def _jumps(axes: Axes, p: Parameters, t: bifurcation.Thresholds) -> None:
+    """Draw as arrows where the reading jumps while the flow rises, and while it falls."""
+    slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
+    look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
+    jumps = (
+        (t.omega_04, fold_state(p).omega_c, t.omega_04),
+        (t.omega_02, t.omega_02, slow.state.omega_c),
+    )
+    for x, begin, end in jumps:
+        axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
+
+
+_PLAINLY = {Case.RR: "RR: rolls", Case.SS: "SS: slips, reads low", Case.NR: "SR, NR: on the wall"}
+"""Cases of the curve for those who don't know the paper's names."""
+
+
+def draw_calibration(
+    p: Parameters, fastest: float, swirl: float | None = None, off: float = 0.0
+) -> Figure:
+    """A figure of the calibration curve of a set up to a flow, rad s-1, its range shaded; the
+    volume flow above, by the swirl constant in rad m-3; and a warning if the model is `off` by too
+    much."""
+    figure, axes = style.panels(7.0, 4.8)
+    limit = min(analytic.operating_range(p), fastest)
+    axes.axvspan(0, limit, color="#0072B2", alpha=0.1, lw=0, label="operating range")
+    t = theory(axes, p, fastest)
+    if p.eta < p.j and t.omega_04 < fastest:
+        _jumps(axes, p, t)
+    for case in (Case.RR, Case.SS, Case.NR)[:: 1 if p.eta < p.j else 2]:
+        axes.plot([], [], color=style.COLOURS[case], label=_PLAINLY[case])
+    axes.set(xlim=(0, fastest), ylim=(0, 1.1 * fastest), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    if swirl:
+        scale: Any = (lambda w: w / swirl, lambda Q: Q * swirl)
+        axes.secondary_xaxis("top", functions=scale).set_xlabel("volume flow (m³/s)")
+    figure.suptitle("\n".join(textwrap.wrap(" ".join(model_warning(off)), 90)), fontsize=9)
+    style.legend(axes, loc="upper left")
+    names_within(axes)
+    return figure
 
 
 def top_flow(p: Parameters) -> float:
