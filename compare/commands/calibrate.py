@@ -19,7 +19,7 @@ from model import InputError, Parameters, table
 from model.arrays import Array
 from model.parameters import REACH, check_number
 
-SHOWN, FINE = 12, 2000
+LINES, FINE = 12, 2000
 """Flows of the table for the terminal, and of those among which the largest error is looked for."""
 
 
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
         drawing.save(figures.draw_calibration(p, top, args.swirl, off), args.plot)
     said = [*model_warning(off), *in_words(p, slowest, top, args.swirl, off)]
-    at = np.unique(np.linspace(0, len(columns[FLOW]) - 1, SHOWN).round().astype(int))
+    at = np.unique(np.linspace(0, len(columns[FLOW]) - 1, LINES).round().astype(int))
     names = [name for name in columns if not name.startswith("K ")]
     rows = [names, *([_cell(columns[name][i]) for name in names] for i in at)]
     options.show(
