@@ -107,7 +107,7 @@ class Claim:
 
         def predicts(of: Bearing) -> bool:
             if of.relation is Relation.EQUAL:
-                return quantity(of.quantity).resolves > 0
+                return quantity(of.quantity).resolution > 0
             both = Relation.AT_MOST, Relation.AT_LEAST
             return all((of.protocol, of.quantity, each) in sides for each in both)
 

@@ -14,12 +14,9 @@ from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records
-from compare.kit.settling import ERROR_GROUPS, scale
 from compare.kit.statistics import COVERAGE, Measured
-from compare.kit.trials import slip_unit
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
-from model.kinematics import VARIABLES, state_units
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -34,9 +31,6 @@ ENOUGH = 2 / 3
 """Part of the numbers of each bearing that must be able to tell."""
 SILENT = "its protocol measured nothing, and does not say why"
 
-_RATIOS = frozenset({"slope", "steepest", "filippov_share", "response", "law_in_motion"})
-"""Ratios, angles, and deviations that are divided by their scales already."""
-_SETTLED = frozenset(name for group in ERROR_GROUPS for name in group)
 _computed = functools.cache(lambda function, *args, **options: function(*args, **options))
 
 
@@ -158,36 +152,20 @@ def checks_of(claim: Claim, records: Records) -> list[Check]:
 
 def check(bearing: Bearing, m: Measurement) -> Check:
     """One measurement beside its prediction; the scale of what must be exactly equal is 1."""
+    known = quantity(m.quantity)
     try:
         prediction = bearing.predict(m)
-        size = bearing.size(m) if bearing.size else natural_size(m.quantity, m.parameters)
+        own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
+        size = bearing.size(m) if bearing.size else known.size(m.parameters, own.value)
     except UNKNOWN:
-        prediction, size = math.nan, 1.0
-    own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
-    exact = quantity(m.quantity).resolves == 0
+        own, size = Measured(math.nan, 0.0), 1.0
     return Check(
         measurement=m,
         predicted=own.value,
         tolerance=COVERAGE * math.hypot(m.uncertainty, own.uncertainty),
-        scale=1.0 if exact else abs(own.value) if size is None else size,
+        scale=1.0 if known.resolution == 0 else size,
         relation=bearing.relation,
     )
-
-
-def natural_size(quantity: str, p: Parameters) -> float | None:
-    """Natural size of a quantity by its name; None where that is the predicted value itself."""
-    kind, _, of = quantity.partition("_")
-    if (settled := quantity.removeprefix("edge_")) in _SETTLED:
-        return scale(settled, p)
-    if kind in ("end", "after"):
-        return float(state_units(p)[VARIABLES.index(of)])
-    if kind == "rate":
-        return p.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": p.R}.get(of, p.r)
-    if kind == "moving":
-        return p.m * p.g
-    if quantity == "gamma":
-        return slip_unit(p)
-    return 1.0 if quantity in _RATIOS else None
 
 
 def select(claims: Iterable[Claim], ids: Sequence[str] | None) -> list[Claim]:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
-from compare.kit.settling import rotation_scale
+from compare.kit.scales import rotation_scale
 from compare.kit.steady import time_constant
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.arrays import Array

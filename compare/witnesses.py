@@ -37,9 +37,10 @@ from compare.judge import (
     verdict,
 )
 from compare.kit.engines import Engine, engine
-from compare.kit.lab import coarse_step, time_unit
+from compare.kit.lab import coarse_step
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records, RecordsByEngine, Relation
+from compare.kit.scales import time_unit
 from compare.kit.statistics import COVERAGE, Measured
 from model.arrays import Array
 from model.kinematics import VARIABLES, state_units
@@ -153,7 +154,7 @@ def _testify(
     ):  # numbers may be off by a share of their scales, since their errors have no limit
         checks = tuple(
             replace(c, tolerance=share * c.scale, ceiling=2 * share)
-            if quantity(c.measurement.quantity).resolves
+            if quantity(c.measurement.quantity).resolution
             else c
             for c in found[max(found)]
         )
@@ -214,7 +215,7 @@ def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
     numbers = (
         c
         for c in checks
-        if quantity(c.measurement.quantity).resolves and c.relation is Relation.EQUAL
+        if quantity(c.measurement.quantity).resolution and c.relation is Relation.EQUAL
     )
     off = (abs(c.deviation / c.scale) for c in numbers if c.scale > 10 * c.tolerance)
     return tuple(each for each in off if math.isfinite(each))
@@ -295,7 +296,7 @@ def _limit_of_no_step(
     measured with three steps; and of a threshold that moves too far with the step."""
     last = there[-1][1]
     m, scale, p = last.measurement, last.scale or 1.0, last.measurement.parameters
-    wanted, threshold = quantity(m.quantity).resolves, m.quantity.startswith("omega_0")
+    wanted, threshold = quantity(m.quantity).resolution, m.quantity.startswith("omega_0")
     near = [end for name, end in ends if name == m.set and abs(p.omega_0 - end) < MARGIN * end]
     if near and m.protocol in ("settled", "hysteresis"):
         return None

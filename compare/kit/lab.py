@@ -14,9 +14,9 @@ from compare.kit import levels
 from compare.kit.campaign import Campaign
 from compare.kit.engines import Engine
 from compare.kit.levels import Effort, Level
+from compare.kit.scales import time_unit
 from compare.kit.tasks import Task
 from model import Flow, Parameters, Trajectory
-from model.drag import STOKES
 
 
 @dataclass(frozen=True)
@@ -85,20 +85,6 @@ class Lab:
         """The trajectory of every task, one after the other, or why it failed."""
         for group in self.groups([[task] for task in tasks]):
             yield group if isinstance(group, str) else group[0]
-
-
-def time_unit(p: Parameters) -> float:
-    """sqrt(R/g), s: the time in which the ball falls by half of R."""
-    return math.sqrt(p.R / p.g)
-
-
-def dragged_speed(p: Parameters) -> float:
-    """A speed relative to the fluid, m s-1, at which drag is about as large as the weight, or
-    larger.
-
-    By Stokes' law g/c. In thin fluids with another law that is far too fast: no more than 20 sqrt(g
-    R) then."""
-    return p.g / p.c if p.drag == STOKES else min(p.g / p.c, 20 * math.sqrt(p.g * p.R))
 
 
 def coarse_step(p: Parameters) -> float:

@@ -2,7 +2,7 @@
 it must have.
 
 A check resolves r if it would notice a prediction that is off by r times the quantity's scale, see
-`compare.claim`. A check that resolves less than `Quantity.resolves` is inconclusive, however well
+`compare.claim`. A check that resolves less than `Quantity.resolution` is inconclusive, however well
 the numbers agree. These ceilings follow from the errors of each protocol at its quick level:
 
 * settled states don't depend on the time step: what is left is their drift, which is waited for
@@ -41,10 +41,23 @@ of the worst."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from model import InputError
+from compare.kit.scales import (
+    dragged_speed,
+    rotation_scale,
+    slip_scale,
+    slip_unit,
+    weight,
+)
+from model import InputError, Parameters
 from model.errors import suggestion
+from model.kinematics import VARIABLES, state_units
+
+Scale = Callable[[Parameters], float]
+"""A natural size, by a parameter set."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +68,41 @@ class Quantity:
     symbol: str
     unit: str
     """SI, as in the HDF5 files."""
-    resolves: float
+    resolution: float
     """Largest error of a prediction, divided by the scale of the quantity, that a check may
     overlook."""
+    scale: Scale | None = None
+    """Its natural size; None where that is the predicted value."""
+
+    def size(self, p: Parameters, value: float = math.nan) -> float:
+        """Natural size of the quantity, by which its errors are divided: that of its `scale`, or of
+        a value."""
+        return abs(value) if self.scale is None else self.scale(p)
 
 
-_TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
-_RATES = [(name, name, "m s-1") for name in ("v_y", "v_h")] + [
-    (*turn, "rad s-1") for turn in _TURNS.items()
-]
+def _unit_of(variable: str) -> Scale:
+    """The natural size of a variable of the state."""
+    return lambda p: float(state_units(p)[VARIABLES.index(variable)])
+
+
+def _one(p: Parameters) -> float:
+    """The scale of ratios, angles, and deviations that are divided by their scales already."""
+    return 1.0
+
+
+_TURNS: dict[str, tuple[str, Scale]] = {
+    "omega_c": ("ω_c", rotation_scale),
+    "slip_x": ("ω̃_x", slip_scale),
+    "slip_y": ("ω̃_y", slip_scale),
+    "slip_z": ("ω̃_z", slip_scale),
+}
+_WALL_SPIN: dict[str, tuple[str, Scale]] = {"wall_spin": ("ω_x⁰", slip_scale)}
+_RATES: tuple[tuple[str, str, str, Scale], ...] = (
+    *((name, name, "m s-1", lambda p: p.g) for name in ("v_y", "v_h")),
+    ("omega_c", "ω_c", "rad s-1", lambda p: p.g / p.R),
+    *((n, s, "rad s-1", lambda p: p.g / p.r) for n, (s, _) in _TURNS.items() if n != "omega_c"),
+)
+"""Variables with a rate of change: name, symbol, unit, and the scale of the rate."""
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
 _FORCES |= {
     "Ax-By": "A_x − B_y",
@@ -74,56 +113,58 @@ _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),
     *(
-        Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6)
-        for n, symbol in _TURNS.items()
+        Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6, scale)
+        for n, (symbol, scale) in (_TURNS | _WALL_SPIN).items()
     ),
-    Quantity("wall_spin", "ω_x⁰", "rad s-1", 1e-6),
-    Quantity("v_y", "v_y", "m s-1", 1e-6),
+    Quantity("v_y", "v_y", "m s-1", 1e-6, dragged_speed),
     Quantity("y", "y", "m", 1e-2),
-    *(Quantity(f"force_{name}", symbol, "N", 1e-5) for name, symbol in _FORCES.items()),
+    *(Quantity(f"force_{name}", symbol, "N", 1e-5, weight) for name, symbol in _FORCES.items()),
     *(
-        Quantity(f"moving_force_{name}", f"{symbol} in motion", "N", 5e-3)
+        Quantity(f"moving_force_{name}", f"{symbol} in motion", "N", 5e-3, weight)
         for name, symbol in _FORCES.items()
     ),
     Quantity("decay_rate", "−Re λ", "s-1", 2e-2),
     Quantity("slowest_decay", "slowest −Re λ < 0", "s-1", 2e-2),
     Quantity("frequency", "Im λ", "rad s-1", 2e-2),
-    Quantity("response", "answer to a push", "1", 5e-2),
-    Quantity("gamma", "γ", "rad s-2", 2e-2),
-    Quantity("steepest", "β₁", "rad", 2e-2),
-    Quantity("filippov_share", "δ", "1", 2e-2),
+    Quantity("response", "answer to a push", "1", 5e-2, _one),
+    Quantity("gamma", "γ", "rad s-2", 2e-2, slip_unit),
+    Quantity("steepest", "β₁", "rad", 2e-2, _one),
+    Quantity("filippov_share", "δ", "1", 2e-2, _one),
     Quantity("gamma_zero", "ω₀ at γ = 0", "rad s-1", 2e-2),
     Quantity("gamma_slope", "dγ/dω₀", "s-1", 2e-2),
     Quantity("gamma_zero_square", "ω₀² at γ = 0", "rad2 s-2", 2e-2),
     Quantity("gamma_slope_square", "dγ/d(ω₀²)", "rad-1", 2e-2),
     *(
-        Quantity(f"rate_{name}", f"d{symbol}/dt", unit.replace("-1", "-2"), 5e-3)
-        for name, symbol, unit in _RATES
+        Quantity(f"rate_{name}", f"d{symbol}/dt", unit.replace("-1", "-2"), 5e-3, scale)
+        for name, symbol, unit, scale in _RATES
     ),
-    *(Quantity(f"after_{name}", f"{symbol} after", unit, 5e-2) for name, symbol, unit in _RATES),
+    *(
+        Quantity(f"after_{name}", f"{symbol} after", unit, 5e-2, _unit_of(name))
+        for name, symbol, unit, _ in _RATES
+    ),
     Quantity("rebounds", "landings that rebound", "1", 0.0),
     *(
         Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4)
         for k in range(1, 5)
     ),
     *(
-        Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3)
-        for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()
+        Quantity(f"edge_{n}", f"{symbol} on the edge", "rad s-1", 1e-3, scale)
+        for n, (symbol, scale) in (_TURNS | _WALL_SPIN).items()
     ),
     Quantity("lifts", "leaves the floor", "1", 0.0),
     Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),
     Quantity("critical_drag", "c at η = η_cr", "s-1", 4e-3),
     Quantity("folds", "number of folds", "1", 0.0),
-    Quantity("slope", "dω_c/dω₀", "1", 1e-4),
+    Quantity("slope", "dω_c/dω₀", "1", 1e-4, _one),
     Quantity("law", "deviation from the law", "1", 1e-6),
-    Quantity("law_in_motion", "largest deviation from the law", "1", 6e-3),
+    Quantity("law_in_motion", "largest deviation from the law", "1", 6e-3, _one),
     Quantity("friction_ratio", "friction divided by normal force", "1", 1e-6),
     Quantity("time", "t", "s", 1e-2),
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
     *(
-        Quantity(f"end_{n}", f"{s} at the end", u, 5e-3)
-        for n, s, u in (("y", "y", "m"), ("h", "h", "m"), *_RATES)
+        Quantity(f"end_{n}", f"{s} at the end", u, 5e-3, _unit_of(n))
+        for n, s, u in (("y", "y", "m"), ("h", "h", "m"), *(rate[:3] for rate in _RATES))
     ),
     Quantity("orbit_period", "period", "s", 1.5e-2),
     Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-3),

@@ -178,7 +178,7 @@ class Check:
     def conclusive(self) -> bool:
         """Whether the check resolves as much as its quantity asks for."""
         ceiling = (
-            quantity(self.measurement.quantity).resolves if self.ceiling is None else self.ceiling
+            quantity(self.measurement.quantity).resolution if self.ceiling is None else self.ceiling
         )
         return self.resolves <= ceiling
 

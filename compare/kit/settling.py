@@ -12,9 +12,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.scales import dragged_speed
 from compare.kit.statistics import COVERAGE, Measured, steady_mean
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
@@ -160,15 +161,17 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
         free |= set(FORCES) - set(SUMS) if case is Case.RR else set(SUMS) - set(FORCES)
         groups = [[q for q in group if q not in free] for group in ERROR_GROUPS]
         worst = {
-            q: max(drift[each] / scale(each, p) for each in group)
+            q: max(drift[each] / quantity(each).size(p) for each in group)
             for group in groups
             for q in group
         }
-        values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
-        swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
-        drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
+        values = {
+            q: Measured(mean[q], math.hypot(solved, worst[q]) * quantity(q).size(p)) for q in worst
+        }
+        swings = max(float(np.ptp(series[q][-length:])) / quantity(q).size(p) for q in worst)
+        drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolution for q in worst)
         solving = max(
-            COVERAGE * solved / quantity(q).resolves for q in worst
+            COVERAGE * solved / quantity(q).resolution for q in worst
         )  # the same however long a run is
         excess, failure = max(drifting, swings / 1e-3), ""
         if counts.max() < 0.98 * length and loose < math.inf:
@@ -224,20 +227,6 @@ def named_start(set: str, p: Parameters, how: str) -> Start:
         how,
         State(y=safe_height(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked(),
     )
-
-
-def rotation_scale(p: Parameters) -> float:
-    """Natural size of a rate of rotation, rad s-1: omega_0, in a fluid at rest 1/`time_unit`."""
-    return abs(p.omega_0) or 1 / time_unit(p)
-
-
-def scale(name: str, p: Parameters) -> float:
-    """Natural size of a quantity of a settled state, by which errors are divided."""
-    if name.startswith("force"):
-        return p.m * p.g
-    if name == "v_y":
-        return dragged_speed(p)
-    return rotation_scale(p) * (1.0 if name == "omega_c" else p.R / p.r)
 
 
 def forces(A: Array, B: Array) -> dict[str, Array]:

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, measurement
+from compare.kit.scales import time_unit
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State
@@ -113,11 +114,6 @@ EXTRAPOLATION, DOUBT = 2 / 3, 1 / 3
 """Limit of a vanishing step beyond the finer run, and its uncertainty, in differences of the two
 runs: the error is between first order in the step, for the direction of friction, and second, with
 limits of 1 and 1/3."""
-
-
-def slip_unit(p: Parameters) -> float:
-    """The rate of slip in rad s-2 that a force as large as the weight makes at a contact."""
-    return p.g / p.r * (1 + p.j) / p.j
 
 
 def lag_error(p: Parameters, refine: int = 1) -> float:

@@ -94,7 +94,7 @@ def findings(verdict: Verdict) -> dict[str, str]:
     check = ranked(verdict.checks)[0]
     where = f"{SYMBOLS[check.measurement.quantity]}, {check.measurement.set}"
     found = {"Largest deviation": f"{verdict.worst:.2g} of its tolerance ({where})"}
-    if quantity(check.measurement.quantity).resolves == 0:
+    if quantity(check.measurement.quantity).resolution == 0:
         found = {"Largest deviation": "none: all equal" if check.agrees else f"not equal: {where}"}
     elif math.isnan(check.predicted):
         found = {"Largest deviation": f"theory knows no such state: {where}"}
@@ -115,7 +115,7 @@ def noticed_errors(powers: Mapping[str, float]) -> str:
     quantities are counts."""
     alike: dict[str, list[str]] = {}
     for name, power in powers.items():
-        if quantity(name).resolves:
+        if quantity(name).resolution:
             alike.setdefault(f"{power:.2g}" if power < 1 else "", []).append(SYMBOLS[name])
     blind = ", ".join(alike.pop("", []))
     errors = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
@@ -128,7 +128,7 @@ def noticed_errors(powers: Mapping[str, float]) -> str:
 def coarsest(witness: Witness) -> float:
     """The coarsest resolving power of a quantity; nan where all are counts."""
     return max(
-        (power for name, power in witness.resolving_power.items() if quantity(name).resolves),
+        (power for name, power in witness.resolving_power.items() if quantity(name).resolution),
         default=math.nan,
     )
 

@@ -138,14 +138,14 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial], alone: Sequence[Ju
     ]
     rows = [["quantity", "ceiling", *columns, "where"]]
     for name, quantity in QUANTITIES.items():
-        if quantity.resolves and name in powers[-1]:
+        if quantity.resolution and name in powers[-1]:
             cells = [
-                _power([each[0] for each in power.get(name, ())], quantity.resolves)
+                _power([each[0] for each in power.get(name, ())], quantity.resolution)
                 for power in powers
             ]
             where = "{1}, {2}".format(*powers[-1][name][0])
             rows.append(
-                [quantity.symbol, f"{quantity.resolves:.2g}", *itertools.chain(*cells), where]
+                [quantity.symbol, f"{quantity.resolution:.2g}", *itertools.chain(*cells), where]
             )
     tables = _table("theories", {each.name: each.trials for each in (*levels, *alone)})
     tables += _table("engines", {"quick": measured}) if measured else ""

@@ -132,7 +132,7 @@ def _ceilings(times: float) -> Iterator[None]:
     """All ceilings of quantities multiplied."""
     known = quantities.QUANTITIES
     with mock.patch.dict(
-        known, {name: replace(q, resolves=times * q.resolves) for name, q in known.items()}
+        known, {name: replace(q, resolution=times * q.resolution) for name, q in known.items()}
     ):
         yield
 

@@ -25,7 +25,7 @@ from model import InputError, Parameters
 from tests import measured as made
 
 P = Parameters.named("reference")
-FINE = quantity("omega_c").resolves / 10
+FINE = quantity("omega_c").resolution / 10
 """Relative uncertainty with which a check of omega_c resolves enough."""
 
 

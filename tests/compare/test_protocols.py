@@ -14,10 +14,11 @@ from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit import levels, settling
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
-from compare.kit.lab import Lab, time_unit
+from compare.kit.lab import Lab
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
+from compare.kit.scales import time_unit
 from compare.kit.statistics import COVERAGE, Measured, extrapolated_maximum, hops, zero_and_slope
 from compare.kit.trials import with_step_error
 from compare.subjects.attractors import measure as attractors
@@ -133,7 +134,7 @@ def test_a_mean_may_depend_on_more_than_the_state(lab):
     begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
     driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, lead=float(begin) / a)
     (row,) = unsteady.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
-    assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolves * 0.9 * abs(row.value)
+    assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolution * 0.9 * abs(row.value)
 
 
 def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():

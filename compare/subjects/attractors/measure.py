@@ -25,10 +25,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compare.kit.engines import MOREAU
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
 from compare.kit.statistics import Measured, hops, peaks, settled_case, tail, top
 from compare.kit.sweep import sobol
@@ -374,7 +375,7 @@ def calm(
         if not isinstance(run, str) and not hops(run):
             last = run.omega_c[tail(run)]
             # By chance samples may be the same: no state is known better than a settled one.
-            least = QUANTITIES["omega_c"].resolves * task.parameters.omega_0
+            least = QUANTITIES["omega_c"].resolution * task.parameters.omega_0
             end = Measured(float(last[-1]), max(float(np.ptp(last)), least))
             at = {"case": settled_case(run).name}
             p = task.parameters

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from compare.kit import settling
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.record import (
     Condition,
@@ -37,6 +37,7 @@ from compare.kit.record import (
     measurement,
     state_of,
 )
+from compare.kit.scales import time_unit
 from compare.kit.settling import Patience, Settled
 from compare.kit.statistics import Measured, settled_case
 from compare.kit.trials import Start, Trial, TrialResult, carry_out

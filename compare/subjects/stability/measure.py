@@ -24,10 +24,11 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.kit.engines import STUDY_SLIP
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
+from compare.kit.scales import time_unit
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
 from compare.kit.statistics import COVERAGE, Measured, exponents, matched, propagator
 from compare.kit.tasks import Task
@@ -341,12 +342,14 @@ def _modes(
             parts.append((name, mode, value, natural_size(value, other, p), float(uncertainty[k])))
     # They come from one propagator: where one is too vague for a check, the others aren't to be
     # trusted more.
-    vague = max(COVERAGE * sure / size / quantity(name).resolves for name, *_, size, sure in parts)
+    vague = max(
+        COVERAGE * sure / size / quantity(name).resolution for name, *_, size, sure in parts
+    )
     decays = [part for part in parts if part[0] == "decay_rate" and part[2] > ZERO_RATE * p.c]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
     for name, mode, value, size, sure in parts:
-        least = vague * quantity(name).resolves * size / COVERAGE if vague > 1 else 0.0
+        least = vague * quantity(name).resolution * size / COVERAGE if vague > 1 else 0.0
         yield row(quantity=name, value=Measured(value, max(sure, least)), mode=mode)
 
 

@@ -13,9 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from compare.kit import settling
-from compare.kit.lab import Lab, time_unit
+from compare.kit.lab import Lab
 from compare.kit.programme import Protocol
+from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.scales import time_unit
 from compare.kit.settling import Patience, Settled
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
@@ -117,7 +119,7 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
     else:
         for group in settling.ERROR_GROUPS:
             sizes = {
-                n: settling.scale(n, p)
+                n: quantity(n).size(p)
                 for n in group
                 if all(n in each.values for each in (fine, *same))
             }
@@ -145,8 +147,8 @@ def mirrored(
             yield _unsettled(state, 1 + len(state.values), "mirrored")
             continue
         yield _row(lab, state, "case", state.case, "mirrored")
-        for quantity, value in state.values.items():
-            yield _row(lab, state, quantity, value, "mirrored")
+        for name, value in state.values.items():
+            yield _row(lab, state, name, value, "mirrored")
 
 
 def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
@@ -162,11 +164,11 @@ def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
 
 
 def _row(
-    lab: Lab, each: Settled, quantity: str, value: Measured | float, protocol: str = PROTOCOL
+    lab: Lab, each: Settled, name: str, value: Measured | float, protocol: str = PROTOCOL
 ) -> Measurement:
-    """The measurement of a quantity of a settled state."""
+    """The measurement of a quantity, by its name, of a settled state."""
     start, at = each.start, {"case": each.case.name, "start": each.start.name}
-    return measurement(lab, protocol, start.set, start.p, quantity, value, [each.task], **at)
+    return measurement(lab, protocol, start.set, start.p, name, value, [each.task], **at)
 
 
 PROTOCOLS = (

@@ -114,7 +114,7 @@ def pulsation(
         # The predicted amplitude may be a tenth smaller than the measured one.
         if (
             COVERAGE * onset.uncertainty
-            <= QUANTITIES["slip_amplitude"].resolves * 0.9 * onset.value
+            <= QUANTITIES["slip_amplitude"].resolution * 0.9 * onset.value
         ):
             slipping.append((each, 1.5 * onset.value))
         else:

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES
 from compare.kit.statistics import Measured
 from model import Flow, Parameters, State, Trajectory

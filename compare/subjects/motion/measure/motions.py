@@ -19,8 +19,9 @@ from itertools import product
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task

@@ -26,8 +26,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, Records, state_of
+from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start, Trial, carry_out, lag_error

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.kit import trials
-from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
+from compare.kit.scales import dragged_speed, slip_unit, time_unit
 from compare.kit.statistics import Measured, slope_error
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
@@ -215,7 +216,7 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     size = (value - limit_of_no_size(best[-2:])[0]) / 3
     p = push.start.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
-    least = trials.lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * trials.slip_unit(p)
+    least = trials.lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
     return Measured(float(value), math.hypot(step, value - lower, size, least))
 
 

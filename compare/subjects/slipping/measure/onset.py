@@ -18,20 +18,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.scales import slip_unit, time_unit
 from compare.kit.settling import named_start, settle_groups
 from compare.kit.statistics import Measured, extrapolated_zero, straight_line, zero_and_slope
 from compare.kit.tasks import Task
-from compare.kit.trials import (
-    DOUBT,
-    EXTRAPOLATION,
-    REFINED,
-    Start,
-    lag_error,
-    polynomials,
-    slip_unit,
-)
+from compare.kit.trials import DOUBT, EXTRAPOLATION, REFINED, Start, lag_error, polynomials
 from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, limit_of_no_size
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array

@@ -21,9 +21,10 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
+from compare.kit.scales import time_unit
 from compare.kit.settling import (
     Patience,
     named_start,

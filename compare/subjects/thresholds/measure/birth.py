@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.kit.lab import Lab, time_unit
+from compare.kit.lab import Lab
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
+from compare.kit.scales import time_unit
 from compare.kit.settling import named_start, settle_groups
 from compare.kit.statistics import Measured, initial_slope, straight_line
 from compare.kit.tasks import Task
