@@ -18,10 +18,10 @@ from typing import Any
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Condition, Measurement, Missing, Relation
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Estimate
 
 When = Callable[[Measurement], bool]
-Prediction = float | Measured
+Prediction = float | Estimate
 """A predicted value, with its own uncertainty where it comes from an integrator."""
 
 

@@ -14,7 +14,7 @@ from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records
-from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.statistics import COVERAGE, Estimate
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
 
@@ -155,10 +155,10 @@ def check(bearing: Bearing, m: Measurement) -> Check:
     known = quantity(m.quantity)
     try:
         prediction = bearing.predict(m)
-        own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
+        own = prediction if isinstance(prediction, Estimate) else Estimate(float(prediction), 0.0)
         size = bearing.size(m) if bearing.size else known.size(m.parameters, own.value)
     except UNKNOWN:
-        own, size = Measured(math.nan, 0.0), 1.0
+        own, size = Estimate(math.nan, 0.0), 1.0
     return Check(
         measurement=m,
         predicted=own.value,

@@ -41,7 +41,7 @@ from compare.kit.lab import coarse_step
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records, RecordsByEngine, Relation
 from compare.kit.scales import time_unit
-from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.statistics import COVERAGE, Estimate
 from model.arrays import Array
 from model.kinematics import VARIABLES, state_units
 
@@ -332,7 +332,7 @@ def _limit_of_no_step(
     ), order
 
 
-def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, float]:
+def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Estimate, float]:
     """The limit of errors (n,) with steps (n,), the coarsest first, and the order found from the
     last three.
 
@@ -351,7 +351,7 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
     change = abs(float(errors[-1] - errors[-2]))
     if max(change, float(np.ptp(errors[-3:]))) <= COVERAGE * math.hypot(*np.sort(own[-3:])[1:]):
         further = change * float(steps[-1] / (steps[-2] - steps[-1]))
-        return Measured(float(errors[-1]), math.hypot(further, float(own[-1]))), math.nan
+        return Estimate(float(errors[-1]), math.hypot(further, float(own[-1]))), math.nan
     h, (coarse, middle, fine) = steps[-3:], errors[-3:]
 
     def misfit(p: float) -> float:
@@ -365,7 +365,7 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
             np.linalg.norm(weights * own[-terms - 1 :])
         )
 
-    def limit(q: int) -> Measured:
+    def limit(q: int) -> Estimate:
         """The limit with as many terms as give the least uncertainty: more leave less out, but
         amplify the noise."""
         found, (before, _) = [], fit(q, 0)
@@ -373,7 +373,7 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
             value, noise = fit(q, terms)
             # Terms left out are smaller than those fitted by the step in natural units.
             least = abs(value - errors[-1]) * float(steps[0]) ** terms
-            found.append(Measured(value, math.hypot(noise, abs(value - before), least)))
+            found.append(Estimate(value, math.hypot(noise, abs(value - before), least)))
             before = value
         return min(found, key=lambda each: each.uncertainty)
 
@@ -387,14 +387,14 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
         and np.all(slopes[1:] * slopes[:-1] > 0)
         and np.all(np.diff(np.abs(slopes)) < 0)
     ):
-        return Measured(fine, math.hypot(change, float(own[-1]))), math.nan
+        return Estimate(fine, math.hypot(change, float(own[-1]))), math.nan
     order = float(brentq(misfit, low, high)) if misfit(low) * misfit(high) < 0 else math.nan
     first = limit(1)
     if math.isnan(order):  # the changes fall as no power of the step
-        return Measured(first.value, math.hypot(first.uncertainty, float(np.ptp(errors)))), order
+        return Estimate(first.value, math.hypot(first.uncertainty, float(np.ptp(errors)))), order
     other = first
     if order < LOWEST_ORDER:
-        other = Measured(
+        other = Estimate(
             fine - (middle - fine) * h[2] ** order / (h[1] ** order - h[2] ** order),
             first.uncertainty,
         )
@@ -404,4 +404,4 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
         min(first, other, key=lambda each: each.uncertainty),
         abs(first.value - other.value),
     )
-    return Measured(surer.value, math.hypot(surer.uncertainty, apart)), order
+    return Estimate(surer.value, math.hypot(surer.uncertainty, apart)), order

@@ -1,8 +1,8 @@
 """Do two results directories hold the same measurements, to the bit? ``python -m tests.same A B
 [PROTOCOL ...]``
 
-A pure refactoring of what measures must leave them so. Which runs a number came from is not
-compared."""
+A pure refactoring of what measures must leave them so. Which runs a number came from, and what its
+uncertainty is made up of, is not compared."""
 
 from __future__ import annotations
 
@@ -40,7 +40,9 @@ def differences(one: Records, other: Records) -> list[str]:
         return [*found, f"{len(one.measurements)} and {len(other.measurements)} measurements"]
     for a, b in zip(one.measurements, other.measurements, strict=True):
         names = [
-            name for name in vars(a) if name != "runs" and getattr(a, name) != getattr(b, name)
+            name
+            for name in vars(a)
+            if name not in ("runs", "budget") and getattr(a, name) != getattr(b, name)
         ]
         if names:
             found.append(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compare.kit.lab import Lab
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Estimate, estimate
 from compare.kit.tasks import Task
 from model import Trajectory
 
@@ -55,11 +55,10 @@ class Bracket:
         return self.high - self.low
 
     @property
-    def place(self) -> Measured:
+    def place(self) -> Estimate:
         """The middle, with the uncertainty of a uniform distribution and the shift."""
-        return Measured(
-            (self.low + self.high) / 2, math.hypot(self.width / math.sqrt(12), self.shift)
-        )
+        middle = (self.low + self.high) / 2
+        return estimate(middle, bracket=self.width / math.sqrt(12), time_step=self.shift)
 
 
 @dataclass(frozen=True, eq=False)

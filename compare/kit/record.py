@@ -24,7 +24,7 @@ import numpy as np
 
 from compare.kit.lab import Lab
 from compare.kit.quantities import quantity
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Estimate
 from compare.kit.tasks import Task
 from model import Parameters, StorageError
 from model.arrays import Array
@@ -48,6 +48,8 @@ class Measurement:
     value: float
     uncertainty: float
     """Standard uncertainty, in the unit of the quantity."""
+    budget: Mapping[str, float] = field(default_factory=dict)
+    """What that is made up of: standard uncertainties by cause."""
     engine: str
     set: str
     """Name of the parameter set."""
@@ -87,17 +89,18 @@ def measurement(
     set: str,
     p: Parameters,
     quantity: str,
-    value: Measured | float,
+    value: Estimate | float,
     tasks: Iterable[Task] = (),
     **conditions: Condition,
 ) -> Measurement:
     """A measurement by the lab's engine; a plain number is exact."""
-    sure = value if isinstance(value, Measured) else Measured(float(value), 0.0)
+    sure = value if isinstance(value, Estimate) else Estimate(float(value), 0.0)
     return Measurement(
         protocol=protocol,
         quantity=quantity,
         value=sure.value,
         uncertainty=sure.uncertainty,
+        budget=sure.budget,
         engine=lab.engine.name,
         set=set,
         parameters=p,
@@ -257,12 +260,12 @@ class Records:
             if m.protocol == protocol and quantity in (None, m.quantity) and m.finite and where(m):
                 yield m
 
-    def threshold(self, set: str, quantity: str) -> Measured | None:
+    def threshold(self, set: str, quantity: str) -> Estimate | None:
         """The least uncertain measured value of a threshold of a set; None if it was not
         measured."""
         measured = self.select("thresholds", quantity, lambda m: m.set == set)
         best = min(measured, key=lambda m: m.uncertainty, default=None)
-        return Measured(best.value, best.uncertainty) if best else None
+        return Estimate(best.value, best.uncertainty) if best else None
 
 
 RecordsByEngine = Mapping[str, Mapping[int, Records]]
@@ -275,7 +278,8 @@ _PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     """Write records, whole or not at all; `about` says whose they are (JSON-able, see `Origin`).
 
-    A condition that a row doesn't have is nan, or empty where it is text. Raises `StorageError`.
+    A condition or a cause of error that a row doesn't have is nan, or empty where it is text. Raises
+    `StorageError`.
     """
     rows = records.measurements
     columns: dict[str, Sequence[Any]] = {"row": range(len(rows))}
@@ -286,6 +290,8 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     for name, text in texts.items():
         values = [m.conditions.get(name, "" if text else np.nan) for m in rows]
         columns[f"at_{name}"] = values if text else np.array(values, float).tolist()
+    for cause in dict.fromkeys(cause for m in rows for cause in m.budget):
+        columns[f"u_{cause}"] = [float(m.budget.get(cause, math.nan)) for m in rows]
     with WholeFile(path) as whole:
         whole.file.attrs.update(
             schema=SCHEMA,
@@ -344,6 +350,11 @@ def load(path: Path, **origin: Any) -> Records:
             row = Measurement(
                 **{name: columns[name][k] for name in _OWN if name != "unit"},
                 runs=tuple(columns["runs"][k].split()),
+                budget={
+                    name[2:]: values[k]
+                    for name, values in columns.items()
+                    if name.startswith("u_") and values[k] == values[k]
+                },
                 parameters=parameters(*(columns[name][k] for name in _PARAMETERS)),
                 conditions={
                     name: value

@@ -16,7 +16,7 @@ from compare.kit.lab import Lab, coarse_step
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.scales import dragged_speed
-from compare.kit.statistics import COVERAGE, Measured, steady_mean
+from compare.kit.statistics import COVERAGE, Estimate, estimate, steady_mean
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
@@ -61,7 +61,7 @@ class Settled:
 
     start: Start
     case: Case
-    values: Mapping[str, Measured] = field(repr=False)
+    values: Mapping[str, Estimate] = field(repr=False)
     mean: Array
     """Its mean state, (8,), from which it goes on: without the oscillation that it still has."""
     task: Task = field(repr=False)
@@ -166,7 +166,7 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
             for q in group
         }
         values = {
-            q: Measured(mean[q], math.hypot(solved, worst[q]) * quantity(q).size(p)) for q in worst
+            q: estimate(mean[q], quantity(q).size(p), solver=solved, drift=worst[q]) for q in worst
         }
         swings = max(float(np.ptp(series[q][-length:])) / quantity(q).size(p) for q in worst)
         drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolution for q in worst)

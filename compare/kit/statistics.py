@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,11 +26,36 @@ m^(TAPER+1)) of one."""
 
 
 @dataclass(frozen=True)
-class Measured:
-    """A value and its standard uncertainty."""
+class Estimate:
+    """A value, its standard uncertainty, and what that is made up of."""
 
     value: float
     uncertainty: float
+    budget: Mapping[str, float] = field(default_factory=dict, compare=False)
+    """Standard uncertainties by cause, in the unit of the value."""
+
+    def also(self, **causes: float) -> Self:
+        """The same value with further causes of error, each a standard uncertainty."""
+        known = self.budget or ({"measured": self.uncertainty} if self.uncertainty else {})
+        uncertainty = math.hypot(self.uncertainty, *causes.values())
+        return replace(self, uncertainty=uncertainty, budget=dict(known) | causes)
+
+    def times(self, factor: float) -> Self:
+        """The estimate of a number that is so many times as large."""
+        budget = {cause: u * abs(factor) for cause, u in self.budget.items()}
+        return replace(
+            self,
+            value=self.value * factor,
+            uncertainty=self.uncertainty * abs(factor),
+            budget=budget,
+        )
+
+
+def estimate(value: float, size: float = 1.0, **causes: float) -> Estimate:
+    """An estimate whose errors have independent causes, each a standard uncertainty divided by
+    `size`."""
+    budget = {cause: u * size for cause, u in causes.items()}
+    return Estimate(float(value), math.hypot(*causes.values()) * size, budget)
 
 
 def plain(value: Any) -> Any:
@@ -139,7 +164,7 @@ def slope_error(x: Array, degree: int) -> float:
 
 def straight_line(
     x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike
-) -> tuple[Measured, Measured]:
+) -> tuple[Estimate, Estimate]:
     """Zero and slope of the line through points x, y (n,) whose y have the standard uncertainties
     `noise`.
 
@@ -158,12 +183,12 @@ def straight_line(
     height, rise = np.sqrt(scatter / weight.sum()), np.sqrt(scatter / spread)
     zero = x0 - y0 / slope
     return (
-        Measured(float(zero), math.hypot(height / slope, (zero - x0) / slope * rise)),
-        Measured(float(slope), float(rise)),
+        estimate(zero, height=height / slope, slope=(zero - x0) / slope * rise),
+        estimate(slope, points=float(rise)),
     )
 
 
-def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured]:
+def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate]:
     """Zero of the polynomial through all points x, y (n,), and its slope there; nan without one
     zero between them.
 
@@ -180,12 +205,16 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured
     degree = len(x) - 1
     best = fitted(y, degree)
     shifted = [fitted(y + shift, degree) - best for shift in np.diag(noise)]
-    spread = np.linalg.norm([(best - fitted(y, degree - 1)) / 3, *shifted], axis=0)
-    zero, slope = (Measured(*pair) for pair in zip(best.tolist(), spread.tolist(), strict=True))
+    bent = np.abs(best - fitted(y, degree - 1)) / 3
+    rows = best, np.linalg.norm([bent, *shifted], axis=0), bent, np.linalg.norm(shifted, axis=0)
+    zero, slope = (
+        Estimate(value, spread, {"degree": of_degree, "points": of_points})
+        for value, spread, of_degree, of_points in np.transpose(rows).tolist()
+    )
     return zero, slope
 
 
-def extrapolated_zero(where: Array, values: Sequence[Measured]) -> Measured:
+def extrapolated_zero(where: Array, values: Sequence[Estimate]) -> Estimate:
     """The place at which a quantity is zero, from places (n,) and its values there, the one nearest
     to zero first."""
     return _extrapolated(
@@ -193,7 +222,7 @@ def extrapolated_zero(where: Array, values: Sequence[Measured]) -> Measured:
     )
 
 
-def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:
+def initial_slope(where: Array, values: Sequence[Estimate]) -> Estimate:
     """Derivative of the place with respect to a quantity where that is zero; arguments as for
     `extrapolated_zero`."""
     size = max(abs(m.value) for m in values)
@@ -204,8 +233,8 @@ def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:
 
 
 def extrapolated_maximum(
-    where: Array, values: Sequence[Measured], others: Array | None = None
-) -> Measured:
+    where: Array, values: Sequence[Estimate], others: Array | None = None
+) -> Estimate:
     """The maximum of the place as a function of a quantity, whose value nearest to it is the first;
     nan without one.
 
@@ -224,7 +253,7 @@ def extrapolated_maximum(
     return _extrapolated(maximum, values)
 
 
-def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Measured]) -> Measured:
+def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Estimate]) -> Estimate:
     """The estimate(values, n) from all n values, with an uncertainty by its convergence with n and
     their noise.
 
@@ -247,7 +276,8 @@ def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Meas
         rest /= 1 - (LARGEST_RATIO if ratios[1] > ratios[0] > 0 else min(ratio, LARGEST_RATIO))
     carried = [estimate(values + shift, count) - row[-1] for shift in np.diag(noise)]
     rounding = np.finfo(float).eps * abs(row[-1]) * 2**count
-    return Measured(float(row[-1]), math.hypot(rest, rounding, *carried))
+    budget = {"extrapolation": rest, "rounding": rounding, "points": math.hypot(*carried)}
+    return Estimate(float(row[-1]), math.hypot(rest, rounding, *carried), budget)
 
 
 def _real_roots(polynomial: Polynomial) -> list[float]:

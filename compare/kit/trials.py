@@ -16,7 +16,7 @@ import numpy as np
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, measurement
 from compare.kit.scales import time_unit
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Estimate
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
@@ -67,7 +67,7 @@ class TrialResult:
     fine: Any
 
     def row(
-        self, lab: Lab, quantity: str, value: Measured | float, **conditions: Condition
+        self, lab: Lab, quantity: str, value: Estimate | float, **conditions: Condition
     ) -> Measurement:
         """A measurement of this trial."""
         trial, conditions = self.trial, {**self.trial.conditions, **conditions}
@@ -96,10 +96,10 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Tria
             )
 
 
-def with_step_error(coarse: float, fine: Measured) -> Measured:
+def with_step_error(coarse: float, fine: Estimate) -> Estimate:
     """The value with the finer step, uncertain by its difference from that with the coarser one,
     too, in quadrature."""
-    return Measured(fine.value, math.hypot(fine.value - coarse, fine.uncertainty))
+    return fine.also(time_step=abs(fine.value - coarse))
 
 
 REFINED = 16

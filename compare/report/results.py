@@ -101,6 +101,7 @@ def described(verdict: Verdict) -> dict[str, Any]:
         "set",
         "conditions",
         "uncertainty",
+        "budget",
         "runs",
     )
     numbers = (

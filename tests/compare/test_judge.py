@@ -19,7 +19,7 @@ from compare.kit.levels import Level, sets
 from compare.kit.plan import PLAN
 from compare.kit.quantities import quantity
 from compare.kit.record import Missing, Planned, Records, Relation
-from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.statistics import COVERAGE, Estimate
 from compare.witnesses import full_verdict
 from model import InputError, Parameters
 from tests import measured as made
@@ -148,7 +148,7 @@ def test_bounds_hold_on_one_side_and_what_must_be_equal_has_no_tolerance():
 
 def test_a_prediction_may_be_uncertain_itself():
     (verdict,) = judge(
-        [claim(lambda m: Measured(P.omega_0 + 1e-7, 1e-7))], measured(P.omega_0, FINE / 100)
+        [claim(lambda m: Estimate(P.omega_0 + 1e-7, 1e-7))], measured(P.omega_0, FINE / 100)
     )
     assert verdict.outcome is Outcome.CONFIRMED
     assert verdict.checks[0].tolerance == pytest.approx(COVERAGE * 1e-7, rel=1e-3)

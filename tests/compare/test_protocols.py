@@ -19,7 +19,7 @@ from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
 from compare.kit.scales import time_unit
-from compare.kit.statistics import COVERAGE, Measured, extrapolated_maximum, hops, zero_and_slope
+from compare.kit.statistics import COVERAGE, Estimate, extrapolated_maximum, hops, zero_and_slope
 from compare.kit.trials import with_step_error
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
@@ -368,7 +368,7 @@ def test_a_bent_line_has_its_zero_and_slope(power):
 def test_a_line_has_no_maximum(bend):
     """Nor has one that is bent by round-off, or so little that a maximum would be far away."""
     where = np.linspace(1.0, 2.0, 6)[::-1]
-    order = [Measured(float(w), 0.0) for w in where]
+    order = [Estimate(float(w), 0.0) for w in where]
     assert not math.isfinite(extrapolated_maximum(where - bend * where**2, order).value)
 
 

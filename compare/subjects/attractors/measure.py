@@ -31,7 +31,7 @@ from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
-from compare.kit.statistics import Measured, hops, peaks, settled_case, tail, top
+from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, carry_out, constrained, with_step_error
@@ -114,7 +114,7 @@ def hopping(
             )
             factor = row(
                 quantity="orbit_multiplier",
-                value=with_step_error(slow, Measured(fast, abs(fast - later))),
+                value=with_step_error(slow, estimate(fast, part=abs(fast - later))),
             )
             yield if_found(
                 factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s"
@@ -140,7 +140,7 @@ class Hops(NamedTuple):
     x: Array
 
     @property
-    def values(self) -> dict[str, Measured]:
+    def values(self) -> dict[str, Estimate]:
         """Period, mean angular velocity and height, uncertain by half the range over single hops.
 
         Means of two parts could agree by chance, because disturbances swing while they die out.
@@ -155,7 +155,7 @@ class Hops(NamedTuple):
             "orbit_height": (height.mean(), height),
         }
         return {
-            name: Measured(float(mean), float(np.ptp(hops)) / 2)
+            name: estimate(mean, swing=float(np.ptp(hops)) / 2)
             for name, (mean, hops) in values.items()
         }
 
@@ -199,11 +199,11 @@ def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
     )
 
 
-def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
+def birth(flows: Sequence[float], heights: Sequence[float]) -> Estimate:
     """Flow at which hops would have no height: a parabola through the last three; a line shows the
     uncertainty."""
     parabola, line = (float(np.polyfit(heights[-n:], flows[-n:], n - 1)[-1]) for n in (3, 2))
-    return Measured(parabola, abs(parabola - line))
+    return estimate(parabola, degree=abs(parabola - line))
 
 
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
@@ -302,7 +302,7 @@ def rebounding(
                 yield measurement(lab, "rebounding", SET, p, name, value, alone, **at)
 
 
-def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
+def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate:
     """The wall friction at which disturbances neither grow nor shrink, by lines through eta (n,)
     and factors (n, 3).
 
@@ -311,7 +311,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured
     slow, fast, later = (
         float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True)
     )
-    return with_step_error(slow, Measured(fast, abs(fast - later)))
+    return with_step_error(slow, estimate(fast, part=abs(fast - later)))
 
 
 def swing(
@@ -341,7 +341,10 @@ def swing(
         ("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True
     ):
         yield result.row(
-            lab, name, with_step_error(coarse, Measured(fine, abs(fine - before))), **conditions
+            lab,
+            name,
+            with_step_error(coarse, estimate(fine, part=abs(fine - before))),
+            **conditions,
         )
 
 
@@ -376,7 +379,7 @@ def calm(
             last = run.omega_c[tail(run)]
             # By chance samples may be the same: no state is known better than a settled one.
             least = QUANTITIES["omega_c"].resolution * task.parameters.omega_0
-            end = Measured(float(last[-1]), max(float(np.ptp(last)), least))
+            end = estimate(last[-1], swing=max(float(np.ptp(last)), least))
             at = {"case": settled_case(run).name}
             p = task.parameters
             yield measurement(lab, "calm", "strong drag", p, "end_omega_c", end, [task], **at)

@@ -15,7 +15,7 @@ from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, state
 from compare.kit.settling import physical_case
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Estimate
 from compare.states import (
     case_of,
     from_floor,
@@ -111,12 +111,12 @@ def _end_case(m: Measurement) -> Case:
     return physical_case(Case(_simulated(m).case[-1]))
 
 
-def _at_event(m: Measurement) -> Measured:
+def _at_event(m: Measurement) -> Estimate:
     """A number at an event of theory's motion; LookupError if there is no such event."""
     run, events, event, unsure = _simulated(m), _simulated(m).events, m.conditions["event"], 0.0
     changes = list(zip(map(Case, events.from_case), map(Case, events.to_case), strict=True))
     if m.quantity == "lift":
-        top = Measured(float(run.y[-1]), 0.0) if event == "end" else first_top(run)
+        top = Estimate(float(run.y[-1]), 0.0) if event == "end" else first_top(run)
         value, unsure = top.value, top.uncertainty
     else:
         slips = [after.B is Contact.S for _, after in changes]
@@ -136,7 +136,7 @@ def _at_event(m: Measurement) -> Measured:
             "landing_speed": -impulse / m.parameters.m,
         }
         value = values[m.quantity]
-    return Measured(
+    return Estimate(
         value, math.hypot(unsure, 100 * RTOL * value)
     )  # errors of 100 steps may have the same sign
 

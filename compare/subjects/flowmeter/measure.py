@@ -39,7 +39,7 @@ from compare.kit.record import (
 )
 from compare.kit.scales import time_unit
 from compare.kit.settling import Patience, Settled
-from compare.kit.statistics import Measured, settled_case
+from compare.kit.statistics import Estimate, estimate, settled_case
 from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
@@ -131,7 +131,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
             yield Curve("mean", name, q, (*around[:2], holds.value), noise=noise)
 
 
-def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
+def _slope(curve: Curve, states: Sequence[Settled]) -> Estimate | None:
     """The slope of a curve, from its settled states; None where these are not of the cases that
     belong.
 
@@ -147,9 +147,8 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
     noise, below = float(noises.max()), (w[1] - w[0]) / (f[1] - f[0])
     if curve.by == "neighbours" and len(set(map(settling.physical_case, cases))) == 1:
         wide, near = (w[3] - w[0]) / (f[3] - f[0]), (w[2] - w[1]) / (f[2] - f[1])
-        return Measured(
-            near + (near - wide) / 3, math.hypot((near - wide) / 3, 2 * noise / (f[2] - f[1]))
-        )
+        bent = (near - wide) / 3
+        return estimate(near + bent, curvature=abs(bent), states=2 * noise / (f[2] - f[1]))
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
         secants, middles = np.diff(w[2:]) / np.diff(f[2:]), (f[2:-1] + f[3:]) / 2 - onset
         cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
@@ -157,12 +156,11 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
         # the cubic exceeds 4.
         solved = 4 * math.sqrt(2) * noise / (f[3] - f[2])
         placed = parabola[-2] * curve.noise
-        return Measured(
-            float(cubic[-1] - below), math.hypot(cubic[-1] - parabola[-1], solved, placed)
-        )
+        bent = abs(float(cubic[-1] - parabola[-1]))
+        return estimate(cubic[-1] - below, degree=bent, states=solved, threshold=abs(placed))
     if curve.by == "mean" and cases == [Case.RR, Case.RR, Case.SS]:
         first, rise = w[1] + (onset - f[1]) * (w[1] - w[0]) / (f[1] - f[0]), f[2] - onset
-        return Measured(float((w[2] - first) / rise), 3 * math.hypot(noise, curve.noise) / rise)
+        return estimate((w[2] - first) / rise, 3 / rise, states=noise, threshold=curve.noise)
     return None
 
 
@@ -229,9 +227,9 @@ def hysteresis(
                 }
                 row = partial(measurement, lab, "hysteresis", name, level.p, tasks=[task], **at)
                 omega_c = ended.values["omega_c"]
-                sure = math.hypot(omega_c.uncertainty, certainty * level.p.omega_0)
                 yield row(quantity="case", value=ended.case)
-                yield row(quantity="omega_c", value=Measured(omega_c.value, sure))
+                value = omega_c.also(time_step=certainty * level.p.omega_0)
+                yield row(quantity="omega_c", value=value)
             before = settling.physical_case(ended.case).name
 
 
@@ -308,7 +306,7 @@ def unloading(
                 )
             else:
                 trials += [_trial(lab, state, name) for name in names]
-    kinds: dict[Shown, list[tuple[TrialResult, Measured, float]]] = {}
+    kinds: dict[Shown, list[tuple[TrialResult, Estimate, float]]] = {}
     for result in carry_out(lab, "unloading", trials):
         if isinstance(result, Missing):
             yield result
@@ -333,9 +331,7 @@ def unloading(
         # The difference may be small by chance: at least the median of all trials counts.
         usual = float(np.median([change for *_, change in alike]))
         for result, fine, change in alike:
-            value = Measured(
-                fine.value, math.hypot(max(change, usual) * fine.value, fine.uncertainty)
-            )
+            value = fine.also(time_step=max(change, usual) * abs(fine.value))
             row = result.row(lab, number.quantity, value, event=number.event)
             yield if_found(row, f"{number.trial}: no {number.quantity}")
 
@@ -361,7 +357,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
         coarse_step(p) / fine,
     )
 
-    def read(run: Trajectory) -> tuple[Case, dict[Shown, Measured]]:
+    def read(run: Trajectory) -> tuple[Case, dict[Shown, Estimate]]:
         numbers = {}
         if name == LANDING:
             numbers = _landed(run)
@@ -370,11 +366,8 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
         elif (
             name == BY_SPIN
         ):  # it leaves the floor at a whole step, up to one late or early, which changes its height
-            numbers = {
-                Shown(name, "lift", "end"): Measured(
-                    float(run.y[-1]), step / 2 * float(run.v_y.max())
-                )
-            }
+            late = step / 2 * float(run.v_y.max())
+            numbers = {Shown(name, "lift", "end"): estimate(run.y[-1], sampling=late)}
         return settling.physical_case(settled_case(run)), numbers
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
@@ -392,7 +385,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
     )
 
 
-def _landed(run: Trajectory) -> dict[Shown, Measured]:
+def _landed(run: Trajectory) -> dict[Shown, Estimate]:
     """Onset of slip, and landing: time, speed and vertical impulse. Empty if the ball doesn't
     land."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
@@ -409,20 +402,19 @@ def _landed(run: Trajectory) -> dict[Shown, Measured]:
     wait = float(run.y[k] / -run.v_y[k])
     v_y = float(run.v_y[k] + (run.v_y[k] - run.v_y[k - 1]) / step * wait)
     rest = run.v_y[k + 5 : k + 12]  # by then it must have come to rest on the floor
-    impulse = Measured(p.m * (float(rest.mean()) - v_y), p.m * float(np.abs(rest).max()))
+    impulse = estimate(p.m * (float(rest.mean()) - v_y), p.m, rest=float(np.abs(rest).max()))
+    sampling = step / math.sqrt(12)
     return {
-        Shown(LANDING, "time", "slip at B"): Measured(
-            cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))
+        Shown(LANDING, "time", "slip at B"): estimate(
+            cubic, degree=abs(cubic - quadratic), sampling=sampling
         ),
-        Shown(LANDING, "time", "landing"): Measured(
-            float(run.time[k]) + wait, step / math.sqrt(12)
-        ),
-        Shown(LANDING, "landing_speed", "landing"): Measured(v_y, 0.0),
+        Shown(LANDING, "time", "landing"): estimate(run.time[k] + wait, sampling=sampling),
+        Shown(LANDING, "landing_speed", "landing"): Estimate(v_y, 0.0),
         Shown(LANDING, "landing_impulse", "landing"): impulse,
     }
 
 
-def first_top(run: Trajectory) -> Measured:
+def first_top(run: Trajectory) -> Estimate:
     """Height in m at which v_y first falls to zero.
 
     It lies between those that constant acceleration gives from the samples on either side: its
@@ -433,7 +425,7 @@ def first_top(run: Trajectory) -> Measured:
     heights = (
         run.y[ends] + run.v_y[ends] ** 2 * (run.time[k] - run.time[k - 1]) / (before - after) / 2
     )
-    return Measured(float(heights.mean()), float(np.ptp(heights)) / 2)
+    return estimate(heights.mean(), sampling=float(np.ptp(heights)) / 2)
 
 
 PROTOCOLS = (

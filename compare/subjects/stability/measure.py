@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +30,14 @@ from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
 from compare.kit.scales import time_unit
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
-from compare.kit.statistics import COVERAGE, Measured, exponents, matched, propagator
+from compare.kit.statistics import (
+    COVERAGE,
+    Estimate,
+    estimate,
+    exponents,
+    matched,
+    propagator,
+)
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
@@ -97,9 +104,9 @@ def measure(
         (_, step), start = state.steps(lab), state.start
         at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
         row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
-        values, uncertainty = spectrum(state, answers, step)
-        yield from _modes(state, values, uncertainty, step, row)
-        yield from _responses(state, answers, float(uncertainty.max()), row)
+        modes = spectrum(state, answers, step)
+        yield from _modes(state, modes, step, row)
+        yield from _responses(state, answers, float(modes.uncertainty.max()), row)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,8 +285,17 @@ def stays(run: Trajectory, case: Case) -> int:
     return int(np.argmax(np.append(left, True))) + 1
 
 
-def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
-    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the
+class Spectrum(NamedTuple):
+    """Exponents and what they may be off, each (d,), s-1."""
+
+    exponents: Exponents
+    uncertainty: Array
+    budget: Mapping[str, Array]
+    """Standard uncertainties by cause."""
+
+
+def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> Spectrum:
+    """Exponents with their standard uncertainties, from the answers to pushes of the
     `Pushed.sizes`.
 
     They are extrapolated to a vanishing push, and to a vanishing step by second order. The
@@ -311,11 +327,18 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
     stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
     slip = np.abs(state.start.x0 / state_units(state.start.p))[SLIP_XYZ].max()
     solved = SOLVED * max(1.0, slip) / (size * interval)
-    uncertainty = np.sqrt(np.abs(correction) ** 2 + half**2 + bent**2 + stepped**2 + solved**2)
+    budget = {
+        "time_step": np.abs(correction),
+        "record": half,
+        "push": bent,
+        "fastest_motion": stepped,
+        "solver": np.full(len(values), solved),
+    }
+    uncertainty = np.sqrt(sum(u**2 for u in budget.values()))
     # Relative errors of one propagator have the same causes; that of one exponent may vanish by
     # chance.
     alike = np.abs(values) * uncertainty.max() / np.abs(values).max()
-    return values + correction, np.maximum(uncertainty, alike)
+    return Spectrum(values + correction, np.maximum(uncertainty, alike), budget)
 
 
 Row = Callable[..., Measurement]
@@ -323,11 +346,11 @@ Row = Callable[..., Measurement]
 
 
 def _modes(
-    state: Pushed, exponents: Exponents, uncertainty: Array, step: float, row: Row
+    state: Pushed, modes: Spectrum, step: float, row: Row
 ) -> Iterator[Measurement | Missing]:
     """Measurements of decay rate and frequency of each mode, slowest first, one of each pair of
     conjugates."""
-    p, parts = state.start.p, []
+    p, parts, exponents = state.start.p, [], modes.exponents
     order = np.lexsort((-exponents.real, exponents.imag))
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):
         if abs(exponents[k]) * step > 0.25:
@@ -339,18 +362,20 @@ def _modes(
             continue
         rate, frequency = -float(exponents[k].real), float(exponents[k].imag)
         for name, value, other in (("decay_rate", rate, frequency), ("frequency", frequency, rate)):
-            parts.append((name, mode, value, natural_size(value, other, p), float(uncertainty[k])))
+            parts.append((name, mode, value, natural_size(value, other, p), k))
     # They come from one propagator: where one is too vague for a check, the others aren't to be
     # trusted more.
+    sure = modes.uncertainty.tolist()
     vague = max(
-        COVERAGE * sure / size / quantity(name).resolution for name, *_, size, sure in parts
+        COVERAGE * sure[k] / size / quantity(name).resolution for name, *_, size, k in parts
     )
     decays = [part for part in parts if part[0] == "decay_rate" and part[2] > ZERO_RATE * p.c]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
-    for name, mode, value, size, sure in parts:
+    for name, mode, value, size, k in parts:
         least = vague * quantity(name).resolution * size / COVERAGE if vague > 1 else 0.0
-        yield row(quantity=name, value=Measured(value, max(sure, least)), mode=mode)
+        budget = {cause: float(u[k]) for cause, u in modes.budget.items()}
+        yield row(quantity=name, value=Estimate(value, max(sure[k], least), budget), mode=mode)
 
 
 def _responses(
@@ -369,12 +394,15 @@ def _responses(
     coarse, large, small = (propagator(answers[k][:length], length // 3) for k in (0, 1, -1))
     bent, late = (small - large) / (2**state.order - 1), (small - coarse) / 3
     value, time = small + bent + late, length // 3 * lasts * coarse_step(state.start.p) / samples
-    turned = turns * time * np.abs(value).max()
-    sure = float(np.linalg.norm([np.abs(bent).max(), np.abs(late).max(), turned]))
+    budget = {
+        "push": float(np.abs(bent).max()),
+        "time_step": float(np.abs(late).max()),
+        "exponents": float(turns * time * np.abs(value).max()),
+    }
     for (i, of), (j, by) in product(enumerate(names), repeat=2):
         yield row(
             quantity="response",
-            value=Measured(float(value[i, j]), sure),
+            value=estimate(value[i, j], **budget),
             time=time,
             of=of,
             pushed=by,

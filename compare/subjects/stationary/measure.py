@@ -19,7 +19,7 @@ from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.scales import time_unit
 from compare.kit.settling import Patience, Settled
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Estimate
 from compare.kit.trials import Start
 from model import Case, Parameters, State
 from model.drag import QUADRATIC
@@ -129,8 +129,8 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
                 for n in sizes
             ]
             for n, size in sizes.items():
-                uncertainty = math.hypot(fine.values[n].uncertainty, max(changes) * size)
-                yield _row(lab, fine, n, Measured(fine.values[n].value, uncertainty))
+                changed = max(changes) * size
+                yield _row(lab, fine, n, fine.values[n].also(time_step_or_start=changed))
 
 
 def mirrored(
@@ -164,7 +164,7 @@ def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
 
 
 def _row(
-    lab: Lab, each: Settled, name: str, value: Measured | float, protocol: str = PROTOCOL
+    lab: Lab, each: Settled, name: str, value: Estimate | float, protocol: str = PROTOCOL
 ) -> Measurement:
     """The measurement of a quantity, by its name, of a settled state."""
     start, at = each.start, {"case": each.case.name, "start": each.start.name}

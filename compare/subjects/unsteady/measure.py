@@ -38,7 +38,7 @@ from compare.kit.record import (
     state_of,
 )
 from compare.kit.settling import rounded_duration, settle
-from compare.kit.statistics import COVERAGE, Measured, peaks, top
+from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top
 from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, carry_out, with_step_error
 from model import Case, Contact, Flow, Parameters, State, Trajectory
@@ -99,8 +99,8 @@ def pulsation(
             continue
         gain, lag, sure = abs(each.ratio), -cmath.phase(each.ratio), each.uncertainty
         for quantity, value in (
-            ("gain", Measured(gain, sure)),
-            ("phase_lag", Measured(lag, sure / gain)),
+            ("gain", estimate(gain, time_step=sure)),
+            ("phase_lag", estimate(lag, time_step=sure / gain)),
         ):
             yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
     rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
@@ -194,7 +194,7 @@ class Pulsation:
         )
 
     def row(
-        self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: Condition
+        self, lab: Lab, quantity: str, value: Estimate, tasks: Sequence[Task], **at: Condition
     ) -> Measurement:
         """A measurement in this pulsation."""
         return measurement(
@@ -219,7 +219,7 @@ def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing
     return each.row(
         lab,
         "slip_amplitude",
-        Measured(place.value, math.hypot(place.uncertainty, unseen)),
+        place.also(unseen_slip=unseen),
         bracket.tasks,
     )
 
@@ -394,7 +394,7 @@ def mean_errors(
         # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by
         # half of that part.
         within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
-        error = Measured(value, drift + within)
+        error = estimate(value, drift_and_time_step=drift + within)
         slips = _slips(halved.case[-samples:])
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude, slips=slips)
         yield if_found(row, f"{at} is none")
@@ -481,7 +481,7 @@ def jumps(
                 )
                 yield if_found(row, f"{quantity} in {trial.name}: no peak")
         elif math.isfinite(coarse) and math.isfinite(fine):
-            yield result.row(lab, "ramp_end", with_step_error(coarse, Measured(fine, 0.0)))
+            yield result.row(lab, "ramp_end", with_step_error(coarse, estimate(fine)))
         else:
             why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
             yield Missing("unsteady", trial.set, why)
@@ -530,7 +530,7 @@ def odd_part(up: Trajectory, down: Trajectory) -> Array:
     return np.asarray(odd / odd[-1])
 
 
-def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
+def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Estimate]:
     """The delay; time and height of the highest peak, nan where there is none in the first half of
     the runs."""
     t, y = up.time, odd_part(up, down)
@@ -543,9 +543,9 @@ def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
         for each in (t[k] + later * (t[1] - t[0]), top(y, k, later))
     )
     return {
-        "jump_delay": Measured(float(np.trapezoid(1 - y, t)), late),
-        "jump_peak": Measured(float(at), late),
-        "jump_height": Measured(float(height), 0.0),
+        "jump_delay": estimate(float(np.trapezoid(1 - y, t)), sampling=late),
+        "jump_peak": estimate(at, sampling=late),
+        "jump_height": estimate(height),
     }
 
 

@@ -18,7 +18,7 @@ from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES
-from compare.kit.statistics import Measured
+from compare.kit.statistics import estimate
 from model import Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import slip_velocities
@@ -94,7 +94,8 @@ def measure(
             # Halving the step may by chance change little: the larger change of the two contacts
             # counts.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == law[:2]]
-            sure, at = Measured(value, math.hypot(np.nanmax(changes), ROUNDING)), law._asdict()
+            change, at = float(np.nanmax(changes)), law._asdict()
+            sure = estimate(value, time_step=change, rounding=ROUNDING)
             yield measurement(
                 lab, PROTOCOL, name, p, at.pop("quantity"), sure, own[len(own) // 2 :], **at
             )
@@ -120,7 +121,8 @@ def measure(
         (before, _), (speed, lasts) = _sinking_speed(*runs[:2]), _sinking_speed(*runs[2:])
         # What is left of a fall that has only just begun is a difference of speeds, each of them
         # rounded in every step.
-        sinking = Measured(speed, math.hypot(speed - before, ROUNDING * abs(speed) / (p.c * lasts)))
+        rounding = ROUNDING * abs(speed) / (p.c * lasts)
+        sinking = estimate(speed, time_step=abs(speed - before), rounding=rounding)
         yield measurement(
             lab, PROTOCOL, name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name]
         )

@@ -23,7 +23,7 @@ from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES
-from compare.kit.statistics import Measured
+from compare.kit.statistics import Estimate, estimate
 from compare.kit.tasks import Task
 from compare.kit.trials import (
     DOUBT,
@@ -122,7 +122,7 @@ def field(
 
 def _values(
     lab: Lab, case: Case, result: TrialResult, centre: int
-) -> tuple[Array, dict[str, Measured]] | None:
+) -> tuple[Array, dict[str, Estimate]] | None:
     """State (8,), rates and forces at the centre of a window; None if its case changes, or it
     `turns_or_hovers`.
 
@@ -175,10 +175,14 @@ def _values(
         max(force_change, lag_error(p)),
     )
     values = {
-        f"rate_{VARIABLES[k]}": Measured(rows[0, 8 + k], rate_change * scales[k]) for k in moving
+        f"rate_{VARIABLES[k]}": estimate(
+            rows[0, 8 + k], scales[k], time_step_and_degree=rate_change
+        )
+        for k in moving
     }
     values |= {
-        f"moving_force_{name}": Measured(w, force_change * weight) for name, w in held[0].items()
+        f"moving_force_{name}": estimate(w, weight, time_step_and_degree=force_change)
+        for name, w in held[0].items()
     }
     return constrained(case, rows[0, :8], p), values
 
@@ -290,7 +294,7 @@ def _turns_at_end(lab: Lab, piece: TrialResult) -> Iterator[Measurement | Missin
     for name, value, unit in zip(
         VARIABLES[TURNING], ends[1][TURNING].tolist(), units[TURNING].tolist(), strict=True
     ):
-        yield piece.row(lab, f"end_{name}", Measured(value, change * unit))
+        yield piece.row(lab, f"end_{name}", estimate(value, unit, time_step=change))
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
@@ -405,5 +409,5 @@ def _landed(lab: Lab, landing: TrialResult) -> Iterator[Measurement | Missing]:
     # The contact closes at a whole step, up to one late; until then weight and friction differ.
     late = coarse_step(p) / REFINED / lab.refine / time_unit(p) / 2
     for quantity, k in zip(LANDED, changed, strict=True):
-        value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
+        value = estimate(fine.x[2 * at, k], float(units[k]), time_step=change, closing=late)
         yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))

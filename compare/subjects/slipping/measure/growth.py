@@ -22,7 +22,7 @@ from compare.kit import trials
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
 from compare.kit.scales import dragged_speed, slip_unit, time_unit
-from compare.kit.statistics import Measured, slope_error
+from compare.kit.statistics import Estimate, estimate, slope_error
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Parameters, State, Trajectory
@@ -107,10 +107,13 @@ def measure(
         ):  # the share of the side of negative slip with which the two growth rates cancel
             plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
             both = plus.value + minus.value
-            error = (
-                math.hypot(plus.uncertainty * minus.value, minus.uncertainty * plus.value) / both**2
+            share = estimate(
+                plus.value / both,
+                1 / both**2,
+                ahead=plus.uncertainty * abs(minus.value),
+                back=minus.uncertainty * abs(plus.value),
             )
-            yield push.row(lab, "growth", "filippov_share", Measured(plus.value / both, error), own)
+            yield push.row(lab, "growth", "filippov_share", share, own)
     for (name, inner, outer), count in left.items():
         yield Missing(
             "growth",
@@ -171,7 +174,7 @@ class Push:
         lab: Lab,
         protocol: str,
         quantity: str,
-        value: Measured | float,
+        value: Estimate | float,
         tasks: Sequence[Task],
         **at: float,
     ) -> Measurement:
@@ -202,7 +205,7 @@ class Push:
         return self.row(lab, protocol, "case", ended, tasks, **at)
 
 
-def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
+def growth(push: Push, runs: Sequence[Trajectory]) -> Estimate | None:
     """gamma for a vanishing size and step from `Push.tasks`, None if a record left the case.
 
     Its uncertainty is what the step and a degree of the polynomials change, and for three sizes a
@@ -217,7 +220,13 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     p = push.start.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
     least = trials.lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
-    return Measured(float(value), math.hypot(step, value - lower, size, least))
+    return estimate(
+        value,
+        time_step=abs(float(step)),
+        degree=abs(float(value - lower)),
+        push=abs(float(size)),
+        lag=least,
+    )
 
 
 def limit_of_no_size(rates: Array) -> Array:
@@ -328,7 +337,8 @@ def steepest(
             continue
         scatter = np.sqrt(2.0 / len(fan)) * max(g.uncertainty for g in grown)
         others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
-        beta = Measured(angle, float(np.hypot(scatter, others) / np.abs(harmonics[1])))
+        first = float(np.abs(harmonics[1]))
+        beta = estimate(angle, 1 / first, rates=float(scatter), harmonics=float(others))
         yield measurement(
             lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0)
         )

@@ -22,7 +22,13 @@ from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.scales import slip_unit, time_unit
 from compare.kit.settling import named_start, settle_groups
-from compare.kit.statistics import Measured, extrapolated_zero, straight_line, zero_and_slope
+from compare.kit.statistics import (
+    Estimate,
+    estimate,
+    extrapolated_zero,
+    straight_line,
+    zero_and_slope,
+)
 from compare.kit.tasks import Task
 from compare.kit.trials import DOUBT, EXTRAPOLATION, REFINED, Start, lag_error, polynomials
 from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, limit_of_no_size
@@ -353,7 +359,7 @@ class Arrow:
         return [self.task(orbit, times) for orbit in orbits for times in self.lab.effort.halves]
 
     def row(
-        self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]
+        self, quantity: str, omega_c: float, value: Estimate | float, tasks: Sequence[Task]
     ) -> Measurement:
         """A measurement along the arrow, with the state at one orbit as conditions."""
         p, x0 = self.start(omega_c)
@@ -361,7 +367,7 @@ class Arrow:
         return measurement(self.lab, "lift", self.set, p, quantity, value, tasks, **at)
 
 
-def _force(run: Trajectory) -> Measured | None:
+def _force(run: Trajectory) -> Estimate | None:
     """Force of the floor at the beginning divided by the weight; None where it doesn't press for
     long enough."""
     p, force = run.header.parameters, run.force_A[LIFT_SKIPPED:, 1]
@@ -374,21 +380,21 @@ def _force(run: Trajectory) -> Measured | None:
     value, lower = (
         polynomials(time, force[:pressed], LIFT_DEGREES, begin)[0] / (p.m * p.g)
     ).tolist()
-    return Measured(value, abs(value - lower))
+    return estimate(value, degree=abs(value - lower))
 
 
-def _load(runs: Sequence[Trajectory]) -> Measured | None:
+def _load(runs: Sequence[Trajectory]) -> Estimate | None:
     """Force of the floor in N at the beginning of runs with both steps; None if it doesn't
     press."""
     p, coarse, fine = runs[0].header.parameters, *map(_force, runs)
     if coarse is None or fine is None:
         return None
     change, weight = fine.value - coarse.value, p.m * p.g
-    sure = math.hypot(fine.uncertainty, change * DOUBT, lag_error(p, 2))
-    return Measured((fine.value + change * EXTRAPOLATION) * weight, sure * weight)
+    best = replace(fine, value=fine.value + change * EXTRAPOLATION)
+    return best.also(time_step=abs(change) * DOUBT, lag=lag_error(p, 2)).times(weight)
 
 
-def _onset(runs: Sequence[Trajectory]) -> Measured | None:
+def _onset(runs: Sequence[Trajectory]) -> Estimate | None:
     """omega_c at which the floor's force is zero, from runs with both steps; None if it doesn't
     fall smoothly."""
     squares, forces = np.array([run.omega_c[0] ** 2 for run in runs[::2]]), []
@@ -396,12 +402,10 @@ def _onset(runs: Sequence[Trajectory]) -> Measured | None:
         if coarse is None or fine is None:
             return None
         change = fine.value - coarse.value
-        forces.append(
-            Measured(
-                fine.value + change * EXTRAPOLATION, math.hypot(fine.uncertainty, change * DOUBT)
-            )
-        )
-    square = extrapolated_zero(squares, forces) if forces else Measured(0.0, math.inf)
+        best = replace(fine, value=fine.value + change * EXTRAPOLATION)
+        forces.append(best.also(time_step=abs(change) * DOUBT))
+    square = extrapolated_zero(squares, forces) if forces else Estimate(0.0, math.inf)
     if not square.value > 0 or math.isinf(square.uncertainty):
         return None
-    return Measured(math.sqrt(square.value), square.uncertainty / (2 * math.sqrt(square.value)))
+    root = math.sqrt(square.value)
+    return replace(square.times(1 / (2 * root)), value=root)

@@ -32,7 +32,7 @@ from compare.kit.settling import (
     rounded_duration,
     settle_groups,
 )
-from compare.kit.statistics import Measured, extrapolated_zero, tail, taper
+from compare.kit.statistics import estimate, extrapolated_zero, tail, taper
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -201,7 +201,7 @@ def borders(
             CLOSING
         ):  # the edge meets the lifted ball where both have the same omega_c
             noise = max(float(_uncertainty(edge)[2]) for edge in near)
-            apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
+            apart = [estimate((edge.crossing - edge.lifted)[2], edge=noise) for edge in near]
             place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
             tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
             p = sets[name].replace(omega_0=place.value)
@@ -353,7 +353,7 @@ def _edge_rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
     values["wall_spin"] = x.slip_x + roll * x.omega_c
     slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
     for name, value in values.items():
-        of = Measured(value, slips / roll if name == "omega_c" else slips)
+        of = estimate(value, edge=slips / roll if name == "omega_c" else slips)
         yield measurement(
             lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS"
         )

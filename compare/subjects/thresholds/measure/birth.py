@@ -8,7 +8,7 @@ that, where they last up to the end."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from compare.kit.lab import Lab
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
 from compare.kit.scales import time_unit
 from compare.kit.settling import named_start, settle_groups
-from compare.kit.statistics import Measured, initial_slope, straight_line
+from compare.kit.statistics import Estimate, initial_slope, straight_line
 from compare.kit.tasks import Task
 from model import Case, Parameters
 
@@ -33,7 +33,7 @@ class BranchEnd:
     """How the branch of slipping ends in one drag."""
 
     lag: float  # 1/c, s, to which the lag by a force is proportional
-    slope: Measured  # of omega_0 as a function of the floor's force where that vanishes
+    slope: Estimate  # of omega_0 as a function of the floor's force where that vanishes
     tasks: list[Task]
 
 
@@ -51,7 +51,7 @@ def birth(
         if begins and ends and begins.value < ends.value:
             ranges[name] = begins.value, ends.value
     found: dict[str, list[BranchEnd]] = {name: [] for name in ranges}
-    lags: dict[str, Measured] = {}
+    lags: dict[str, Estimate] = {}
     drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
     for _ in (FIRST_DRAGS, NEARER_DRAGS):
         starts = [
@@ -93,7 +93,8 @@ def birth(
                 "too few states of slipping at both points settle near the end of the branch",
             )
         else:
-            drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)
+            lag = lags[name]
+            drag = replace(lag.times(1 / lag.value**2), value=1 / lag.value)
             tasks = [task for end in found[name] for task in end.tasks]
             row = measurement(lab, "birth", name, p, "critical_drag", drag, tasks)
             yield if_found(row, "no drag gives birth to a fold")

@@ -29,7 +29,7 @@ from compare.kit.settling import Patience, Settled
 from compare.kit.statistics import (
     COVERAGE,
     POINTS,
-    Measured,
+    Estimate,
     extrapolated_maximum,
     extrapolated_zero,
 )
@@ -138,14 +138,14 @@ class Findings:
         return Missing("thresholds", self.set, why, rows)
 
     def row(
-        self, quantity: str, at: Measured | float | None, tasks: Sequence[Task], **how: str
+        self, quantity: str, at: Estimate | float | None, tasks: Sequence[Task], **how: str
     ) -> Measurement | Missing:
         """The measurement of a threshold, or of a number on the set; or why the threshold was not
         found."""
         if at is None:
             why = f"too few states settled for {quantity} by {how['by']}, or their extrapolation has no zero"
             return self.missing(why)
-        p = self.p.replace(omega_0=at.value) if isinstance(at, Measured) else self.p
+        p = self.p.replace(omega_0=at.value) if isinstance(at, Estimate) else self.p
         return measurement(self.lab, "thresholds", self.set, p, quantity, at, tasks, **how)
 
     def row_of_bracket(
@@ -158,8 +158,7 @@ class Findings:
             slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run)
         )
         unseen = of.width / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
-        place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
-        return self.row(quantity, place, of.tasks, side=side, by=by)
+        return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
     def rows_of_zero(
         self, kind: str, what: str, quantity: str, side: str, by: str
@@ -317,7 +316,7 @@ def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) ->
     return ride
 
 
-def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
+def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
     """The maximum of omega_0 along the branch of slipping, if it ends in a fold; and whether it
     ends without one.
 
@@ -341,8 +340,8 @@ def _end_of_slipping(each: Findings) -> tuple[Measured | None, bool]:
 
 
 def extrapolated(
-    states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Measured]], Measured]
-) -> Measured | None:
+    states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Estimate]], Estimate]
+) -> Estimate | None:
     """The flow to which a quantity of settled states is extrapolated; None if they are too few, or
     there is none."""
     if len(states) < POINTS:
@@ -351,7 +350,7 @@ def extrapolated(
     values = [state.values["omega_c" if quantity == "lag" else quantity] for state in states]
     if quantity == "lag":
         values = [
-            Measured(flow - orbit.value, orbit.uncertainty)
+            replace(orbit, value=flow - orbit.value)
             for flow, orbit in zip(flows, values, strict=True)
         ]
     place = to(np.array(flows), values)
