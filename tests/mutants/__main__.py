@@ -9,7 +9,6 @@ from pathlib import Path
 
 from docs.studies import mutants
 from model import InputError
-from model.files import write_text
 from tests.mutants import trial
 
 
@@ -28,7 +27,9 @@ def main() -> int:
         action="store_true",
         help="judge by all claims on the first of them: takes longer",
     )
-    parser.add_argument("--page", type=Path, metavar="FILE", help="page to write")
+    parser.add_argument(
+        "--page", type=Path, metavar="FILE", help="page to write, and the list beside it"
+    )
     parser.add_argument(
         "--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes"
     )
@@ -48,7 +49,7 @@ def main() -> int:
             trial.judged(Path(where or first), args.workers, by=name) for name, _, where in named
         ]
         if args.page:
-            write_text(args.page, mutants.page(levels, measured, alone))
+            mutants.write(args.page, levels, measured, alone)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

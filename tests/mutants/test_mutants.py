@@ -1,6 +1,7 @@
 """Wrong theories are believed everywhere for a while, and forgotten without a trace."""
 
 import contextlib
+import csv
 import dataclasses
 import importlib
 import os
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from analytic.stationary import solutions as stationary
+from compare.claim import Outcome
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO
 from compare.kit.lab import Lab
@@ -19,6 +21,7 @@ from compare.kit.levels import Level
 from compare.subjects.stationary import claims
 from docs.studies import mutants
 from model import Parameters
+from tests.mutants import trial
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import believed, noting
 from tests.mutants.theories import FOR_TESTS, THEORIES
@@ -61,8 +64,18 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(wrong, tmp_path, mon
     assert np.abs(other.x - right.x).max() > 1e-6
 
 
-def test_subjects_name_wrong_theories_and_tests_that_there_are():
-    assert set(mutants.SUBJECTS.values()) <= {wrong.what for wrong in (*THEORIES, *FOR_TESTS)}
+def test_the_list_has_a_row_for_each_fault_and_names_tests_that_there_are(tmp_path):
+    trials = [trial.Trial(wrong.what, {"prop-1": Outcome.REFUTED}) for wrong in THEORIES]
+    judged = trial.Judged("quick", [*trials[1:], trial.Trial("nobody's", {})], tmp_path)
+    mutants.write(tmp_path / "page.md", [judged], [trial.Trial("crooked", {})])
+    page = (tmp_path / "page.md").read_text("utf-8")
+    assert f"| theories, by quick | {len(THEORIES)} | {len(THEORIES) - 1} | 0 | 0 | 1 |" in page
+    assert "| engines, measured anew | 1 | 0 | 0 | 0 | 1 |" in page
+    with (tmp_path / "page.csv").open(encoding="utf-8") as file:
+        head, *rows = csv.reader(file)
+    assert {len(row) for row in rows} == {len(head)}
+    assert len(rows) == len(THEORIES) + len(FOR_TESTS) + len(mutants.BY_HAND) + 1
+    assert rows[-1] == ["engine", "crooked", "mjsim", "nobody", ""]
     for named in (
         *mutants.BY_HAND.values(),
         *(f"analytic/test_{wrong.test}" for wrong in FOR_TESTS),

@@ -64,7 +64,7 @@ class Trial:
         named = [
             name if of is Outcome.REFUTED else f"{name} ({of})" for name, of in self.noticed.items()
         ]
-        named = named or ["**nobody**" if self.tried else "not measured"]
+        named = named or ["nobody" if self.tried else "not measured"]
         return ", ".join([*named, *(f"{name} hangs" for name in self.hung)])
 
 
