@@ -201,7 +201,9 @@ def test_a_sweep_is_sampled_as_often_as_asked(tmp_path, capsys):
 BLUNT = P.replace(drag="quadratic", nu_f=1e-6, C_D=0.5, density_ratio=0.125)
 MEASURED = (
     dataclasses.replace(
-        measured("settled", "omega_c", 11.9, 1e-9, case="RR"), runs=("runs/a.h5", "runs/b.h5")
+        measured("settled", "omega_c", 11.9, 1e-9, case="RR"),
+        runs=("runs/a.h5", "runs/b.h5"),
+        budget={"drift": 8e-10, "solver": 6e-10},
     ),
     measured("settled", "force_Ay", 0.1, case="SS", y=0.25),
     measured("settled", "case", 4),

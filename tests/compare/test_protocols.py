@@ -19,7 +19,14 @@ from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
 from compare.kit.scales import time_unit
-from compare.kit.statistics import COVERAGE, Estimate, extrapolated_maximum, hops, zero_and_slope
+from compare.kit.statistics import (
+    COVERAGE,
+    Estimate,
+    estimate,
+    extrapolated_maximum,
+    hops,
+    zero_and_slope,
+)
 from compare.kit.trials import with_step_error
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
@@ -177,6 +184,15 @@ def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
         1e-3
     )
     assert found(rolls, "A", slip_z=1e-3 * w_z, slip_x=1e-3 * w_x, case=Case.RS) > 0
+
+
+def test_an_uncertainty_is_made_up_of_its_causes():
+    drifting = estimate(2.0, 10.0, drift=0.3, solver=0.4)
+    assert drifting == Estimate(2.0, 5.0)
+    whole = drifting.also(time_step=12.0).times(-2.0)
+    assert whole == Estimate(-4.0, 26.0)
+    assert whole.budget == {"drift": 6.0, "solver": 8.0, "time_step": 24.0}
+    assert Estimate(1.0, 3.0).also(bracket=4.0).budget == {"measured": 3.0, "bracket": 4.0}
 
 
 def test_first_top_lies_between_samples():

@@ -49,7 +49,13 @@ def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple
         "v_y": 0.0,
     }
     sets = [P.replace(omega_0=12.0 + k) for k in range(count)]
-    rows = [made.measured("settled", "omega_c", 12.0, 1e-9, p, **conditions) for p in sets]
+    rows = [
+        dataclasses.replace(
+            made.measured("settled", "omega_c", 12.0, 1e-9, p, **conditions),
+            budget={"solver": 6e-10, "time_step": 8e-10},
+        )
+        for p in sets
+    ]
     return tuple(
         Check(
             measurement=m,
@@ -114,6 +120,10 @@ def row(text: str, name: str) -> str:
         ("", r"Not part of this run: <code[^>]*>deeper</code>"),
         ("good", "What good states of slip &amp; &lt;roll&gt;."),
         ("good", "dualball validate --claim good --quick -o"),
+        (
+            "good",
+            r'title="time step 64 %, solver 36 %">1.0e-09<br><span class="soft">time step 64 %<',
+        ),
         ("bad", "Prop. bad, corrected. A sign."),
         ("bad", "Expected: confirmed."),
         ("broken", "ValueError: diverged &amp; &lt;so&gt; on"),
