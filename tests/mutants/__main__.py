@@ -54,14 +54,14 @@ def main() -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     trials = [*(trial for level in levels for trial in level.trials if trial.tried), *measured]
-    missed, count = [each for each in trials if not each.noticed], len(trials)
+    missed, count = [each for each in trials if each.kind != "by_numbers"], len(trials)
     hanging = sum(bool(each.hung) for each in trials)
     print(
-        f"{count - len(missed)} of {count} faults were noticed; with {hanging} of them the "
+        f"{count - len(missed)} of {count} faults were noticed by numbers; with {hanging} of them the "
         f"predictions of a claim hang"
     )
     for each in missed:
-        print(f"nobody noticed: {each.what}: {each.by}")
+        print(f"not noticed by numbers: {each.what}: {each.by}")
     return 0 if count - len(missed) >= args.least * count else 1
 
 

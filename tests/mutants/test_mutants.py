@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import analytic
 from analytic.stationary import solutions as stationary
 from compare.claim import Outcome
 from compare.kit.campaign import Campaign
@@ -39,6 +40,16 @@ def test_each_replaces_a_function_that_exists_and_gives_it_back() -> None:
             assert getattr(module, wrong.function) is not right, wrong.what
             raise ZeroDivisionError
         assert getattr(module, wrong.function) is right, wrong.what
+
+
+@pytest.mark.parametrize("what", ["flight with 5 % more drag", "flight with 1 % less weight"])
+def test_a_motion_under_a_wrong_theory_is_wrong_and_does_not_break_down(what):
+    """Then a verdict would be lost by an error, whatever was measured."""
+    wrong, up = next(each for each in THEORIES if each.what == what), [0.03, 0, 9, 0, 0, 0, 0.03, 0]
+    right = analytic.simulate(P, up, 0.02)
+    with believed(wrong):
+        other = analytic.simulate(P, up, 0.02)
+    assert 1e-5 < np.abs(other.x[-1] - right.x[-1]).max() < 1
 
 
 def test_a_function_that_is_noted_answers_as_before() -> None:

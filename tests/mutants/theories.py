@@ -51,10 +51,16 @@ Ball = Parameters | Motion
 
 
 def given(change: Change) -> Fault:
-    """It takes other parameters for those of the ball."""
-    change = functools.lru_cache(change)
+    """It takes other parameters for those of the ball, which are made once for each motion."""
+    last: list[Any] = [None, None]
+
+    def changed(p: Ball) -> Any:
+        if last[0] is not p:
+            last[:] = p, change(p)
+        return last[1]
+
     return lambda right, *args, **named: right(
-        *(change(a) if isinstance(a, Ball) else a for a in args), **named
+        *(changed(a) if isinstance(a, Ball) else a for a in args), **named
     )
 
 
