@@ -165,7 +165,7 @@ class Judged:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Witness(Judged):
+class EngineVerdict(Judged):
     """What one engine says of a claim: by checks in the limit of no time step, where it is judged
     so."""
 
@@ -201,7 +201,7 @@ class Verdict(Judged):
     """Why it could not be judged."""
     missing: tuple[Missing, ...] = ()
     """What its protocols left out, and why."""
-    witnesses: tuple[Witness, ...] = ()
+    engines: tuple[EngineVerdict, ...] = ()
     """What every engine says, the one on trial first."""
 
     @property

@@ -11,6 +11,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from compare.assessment import full_verdict
 from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Claim, Outcome, Verdict
 from compare.judge import forget, select
@@ -27,7 +28,6 @@ from compare.kit.record import Missing, Records, RecordsByEngine
 from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes
 from compare.report import results
 from compare.report.results import Summary
-from compare.witnesses import full_verdict
 from model import Parameters
 from model.errors import check_type
 
@@ -207,7 +207,7 @@ def judge(
     verdicts: dict[str, Verdict] = {}
     for so_far in measured:
         for claim in claims:
-            # Next to a threshold a settled state has no limit: see `witnesses.MARGIN`.
+            # Next to a threshold a settled state has no limit: see `convergence.MARGIN`.
             needed = claim.protocols | ({"thresholds"} if "settled" in claim.protocols else set())
             if claim.id not in verdicts and not any(so_far.waiting[name] for name in needed):
                 verdicts[claim.id] = so_far.verdict(claim)
@@ -269,7 +269,7 @@ def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByE
     """Collect what figures draw: checks by claim, and each engine's measurements, at half the usual
     step if there."""
     checks = {
-        v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts
+        v.claim.id: (*v.checks, *(c for w in v.engines[1:] for c in w.checks)) for v in verdicts
     }
     first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [
         Records()

@@ -12,10 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from compare import validation
+from compare.assessment import full_verdict
 from compare.catalogue import CLAIMS
 from compare.claim import Claim, Outcome
 from compare.kit.record import Measurement, Records, RecordsByEngine
-from compare.witnesses import full_verdict
 
 Thin = Callable[[Sequence[Measurement]], Sequence[Measurement]]
 """What is left of the measurements of a protocol and a quantity."""
@@ -54,7 +54,7 @@ def without_bearing(claim: Claim, records: Records) -> Records:
 
 def outcomes(claim: Claim, testimony: RecordsByEngine) -> dict[str, Outcome]:
     """What each engine says of a claim."""
-    return {each.engine: each.outcome for each in full_verdict(claim, testimony).witnesses}
+    return {each.engine: each.outcome for each in full_verdict(claim, testimony).engines}
 
 
 def changed(testimony: RecordsByEngine, change: Callable[[Records], Records]) -> RecordsByEngine:

@@ -104,13 +104,11 @@ def line(verdict: Verdict) -> Text:
         parts.append(Text(f"measured from the {verdict.claim.level.name.lower()} level on", "dim"))
     elif verdict.missing:
         parts.append(Text(str(verdict.missing[0]), "dim"))
-    for each in (
-        witness for witness in verdict.witnesses[1:] if witness.outcome is not Outcome.NOT_ASKED
-    ):
+    for each in (said for said in verdict.engines[1:] if said.outcome is not Outcome.NOT_ASKED):
         kind, mark = wording.MARKS[each.outcome]
         parts.append(
             Text.assemble(
-                f"{each.engine} ", (f"{mark} {wording.witness_outcome(each)}", _STYLES[kind])
+                f"{each.engine} ", (f"{mark} {wording.engine_outcome(each)}", _STYLES[kind])
             )
         )
     return shown.append(Text("; ").join(parts))
@@ -124,7 +122,7 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
     shown = Text(
         f"{wording.headline(ran)}: {counts}. {wording.coarse_and_missing(ran)}".strip(), "bold"
     )
-    for each in (each for each in wording.witnesses(ran) if each["asked"] != "0"):
+    for each in (each for each in wording.engines(ran) if each["asked"] != "0"):
         counts = f"{each['confirmed']} of {each['asked']} claims confirmed (to {each['to']}), "
         counts += f"{len(each['refuted'])} refuted, {each['open']} undecided"
         off = f"typical deviation {each['typical']}, worst {each['worst']}"

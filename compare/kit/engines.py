@@ -78,7 +78,7 @@ class Engine:
     refine: tuple[int, ...] = (1,)
     """Time steps in one that a protocol asks for; with several, claims are judged in the limit of
     no step."""
-    allowance: float = 0.0
+    relative_tolerance: float = 0.0
     """Share of its scale by which a number may be off, chosen before anything was measured so; 0
     where each measurement has a tolerance of its own."""
     mark: str
@@ -269,7 +269,7 @@ NEWCOMER = replace(
     "no more than 5 %",
     role=Role.AS_IT_COMES,
     refine=(2,),
-    allowance=0.05,
+    relative_tolerance=0.05,
     configure=lambda given, p: vessel.Settings(**{"timestep": 2e-3, **given}),
 )
 _OTHERS = (

@@ -93,7 +93,7 @@ def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -
     Of an engine as it comes every state counts, for what it is when time is up. What isn't settled
     goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land."""
-    span, loose = patience.span, math.inf if lab.engine.allowance else patience.loose
+    span, loose = patience.span, math.inf if lab.engine.relative_tolerance else patience.loose
     rounds, steps = patience.rounds or lab.effort.settling_rounds, lab.effort.settling_steps
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
     states: dict[int, Settled] = {}

@@ -89,7 +89,7 @@ def render(
         missing=wording.coarse_and_missing(ran),
         lead=f"A ball rolls and slips round inside a cylinder. {_opening_sentence(ran)}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
-        witnesses=wording.witnesses(ran),
+        engines=wording.engines(ran),
         tiles=[
             *wording.totals(ran),
             (str(len(measured)), f"simulations with {len(sets)} parameter sets"),
@@ -98,7 +98,7 @@ def render(
         sections=sections,
         outcomes=sorted({verdict.outcome for verdict in ran}),
         heard=sorted(
-            {f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.witnesses[1:]}
+            {f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.engines[1:]}
         ),
         wording=wording,
         run_of=lambda m: next((name for name in m.runs if storage.exists(directory / name)), ""),

@@ -23,7 +23,9 @@ from model.files import check_ours, make_directory, reading_json, write_text
 from model.versions import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS = "summary.json", "report.html", "runs"
-SCHEMA, SCHEMA_VERSION = "dualball-summary", 5
+SCHEMA, SCHEMA_VERSION = "dualball-summary", 6
+READABLE = 5, SCHEMA_VERSION
+"""Versions of summaries that can be read: 5 had `witnesses` in the place of `engines`."""
 
 
 Files = Mapping[str, Mapping[int, Sequence[str]]]
@@ -125,7 +127,7 @@ def described(verdict: Verdict) -> dict[str, Any]:
 
 
 def _outcome(verdict: Verdict) -> dict[str, Any]:
-    """A verdict in numbers, without its checks: outcome, counts, resolving power, witnesses;
+    """A verdict in numbers, without its checks: outcome, counts, resolving power, what each engine says;
     JSON-able."""
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
     counts = {
@@ -139,13 +141,13 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
         "missing": [*map(str, verdict.missing)],
         "error": verdict.error,
     }
-    about["witnesses"] = {
+    about["engines"] = {
         each.engine: {
             name: getattr(each, name) for name in ("outcome", "reason", "order", "left_out")
         }
         | {"checks": len(each.checks), "worst": each.worst, "resolving_power": each.resolving_power}
         | {"deviation_at_2ms": {"typical": each.typical, "worst": each.farthest}}
-        for each in verdict.witnesses
+        for each in verdict.engines
     }
     told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)
     return told
@@ -169,7 +171,7 @@ def load(directory: Path) -> Summary:
             f"cannot read {path}: No such file or directory; run 'dualball validate -o {directory}'"
         )
     with reading_json(path, "summary that this program reads") as content:
-        if (content["schema"], content["schema_version"]) != (SCHEMA, SCHEMA_VERSION):
+        if content["schema"] != SCHEMA or content["schema_version"] not in READABLE:
             raise ValueError("it is in another format; choose another directory with --output")
         Level[content["level"]]
         files = {

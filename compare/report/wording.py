@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from compare.claim import Outcome, Text, Verdict, Witness
+from compare.claim import EngineVerdict, Outcome, Text, Verdict
 from compare.kit.engines import ENGINES
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES, quantity
@@ -137,42 +137,38 @@ def noticed_errors(powers: Mapping[str, float]) -> str:
     return "; ".join(parts)
 
 
-def coarsest(witness: Witness) -> float:
+def coarsest(said: EngineVerdict) -> float:
     """The coarsest resolving power of a quantity; nan where all are counts."""
     return max(
-        (power for name, power in witness.resolving_power.items() if quantity(name).resolution),
+        (power for name, power in said.resolving_power.items() if quantity(name).resolution),
         default=math.nan,
     )
 
 
-def witness_outcome(witness: Witness) -> str:
+def engine_outcome(said: EngineVerdict) -> str:
     """In words the outcome by an engine beside the one on trial, and to what relative error it
     confirms."""
-    if witness.outcome is not Outcome.CONFIRMED:
-        return witness.outcome
-    power = coarsest(witness)
-    return (
-        f"{witness.outcome} to {power:.1e}"
-        if math.isfinite(power)
-        else f"{witness.outcome} by counts"
-    )
+    if said.outcome is not Outcome.CONFIRMED:
+        return said.outcome
+    power = coarsest(said)
+    return f"{said.outcome} to {power:.1e}" if math.isfinite(power) else f"{said.outcome} by counts"
 
 
-def witness_sentence(witness: Witness) -> str:
+def engine_sentence(said: EngineVerdict) -> str:
     """What an engine beside the one on trial says of a claim, in a sentence."""
-    if witness.outcome in (Outcome.NOT_ASKED, Outcome.ERROR):
-        return f"{witness.outcome}: {witness.reason}"
-    order = f", converging with order {witness.order:.1f}" if math.isfinite(witness.order) else ""
-    at = f"; at 2 ms typically off by {percent(witness.typical)}, at most {percent(witness.farthest)}"
-    left_out = f"; {witness.left_out} not measured" if witness.left_out else ""
-    count = len(witness.checks)
+    if said.outcome in (Outcome.NOT_ASKED, Outcome.ERROR):
+        return f"{said.outcome}: {said.reason}"
+    order = f", converging with order {said.order:.1f}" if math.isfinite(said.order) else ""
+    at = f"; at 2 ms typically off by {percent(said.typical)}, at most {percent(said.farthest)}"
+    left_out = f"; {said.left_out} not measured" if said.left_out else ""
+    count = len(said.checks)
     numbers = f" on {count} number{'s' if count > 1 else ''}" if count else ""
-    errors = f"; would notice {found}" if (found := noticed_errors(witness.resolving_power)) else ""
+    errors = f"; would notice {found}" if (found := noticed_errors(said.resolving_power)) else ""
     off, why = (
-        at if math.isfinite(witness.farthest) else "",
-        f"; {witness.reason}" if witness.reason else "",
+        at if math.isfinite(said.farthest) else "",
+        f"; {said.reason}" if said.reason else "",
     )
-    return f"{witness.outcome}{numbers}{order}{errors}{off}{left_out}{why}"
+    return f"{said.outcome}{numbers}{order}{errors}{off}{left_out}{why}"
 
 
 def percent(share: float) -> str:
@@ -181,13 +177,13 @@ def percent(share: float) -> str:
     return f"{shown} %" if share >= 1e-6 else size(share)
 
 
-def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
+def engines(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
     """What each engine says of all claims: what it is, how many came out how, which it refutes, its
     deviations."""
     rows = []
-    for name in dict.fromkeys(each.engine for verdict in ran for each in verdict.witnesses):
+    for name in dict.fromkeys(each.engine for verdict in ran for each in verdict.engines):
         own = [
-            (verdict, each) for verdict in ran for each in verdict.witnesses if each.engine == name
+            (verdict, each) for verdict in ran for each in verdict.engines if each.engine == name
         ]
         counts = Counter(each.outcome for _, each in own)
         refuted = {
@@ -233,7 +229,7 @@ def headline(ran: Sequence[Verdict]) -> str:
         return "; ".join(parts)
     if not ran:
         return "Nothing has been checked yet"
-    name = next((each.engine for verdict in ran for each in verdict.witnesses), "")
+    name = next((each.engine for verdict in ran for each in verdict.engines), "")
     return f"{ENGINES[name].title or name if name else 'The engine'} agrees with the paper"
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from compare.convergence import extrapolated
 from compare.kit.pages import Rows
 from compare.kit.statistics import COVERAGE
-from compare.witnesses import extrapolated
 from model.arrays import Array
 
 COUNT = 4000

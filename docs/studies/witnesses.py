@@ -11,7 +11,8 @@ from pathlib import Path
 from statistics import median
 from unittest import mock
 
-from compare import witnesses
+from compare import convergence
+from compare.assessment import full_verdict
 from compare.catalogue import CLAIMS
 from compare.claim import Outcome, Verdict
 from compare.kit import quantities
@@ -20,7 +21,6 @@ from compare.kit.pages import Rows
 from compare.kit.record import Relation
 from compare.report import wording
 from compare.validation import stored
-from compare.witnesses import full_verdict
 
 QUANTITIES = {
     "angular velocity ω_c": ("omega_c",),
@@ -47,8 +47,8 @@ def counted(results: Path) -> Rows:
     `mujoco-coulomb`, which measures by itself, has a directory of its own below, as `make mutants`
     leaves it."""
     said = verdicts(results)
-    told = wording.witnesses(said)
-    told += wording.witnesses(verdicts(results / "coulomb"))
+    told = wording.engines(said)
+    told += wording.engines(verdicts(results / "coulomb"))
     head = [
         "witness",
         "asked",
@@ -84,7 +84,7 @@ def limits(results: Path) -> Rows:
             "tolerance of the worst",
         ]
     ]
-    own = [w for v in verdicts(results) for w in v.witnesses if w.engine == PLAIN.name]
+    own = [w for v in verdicts(results) for w in v.engines if w.engine == PLAIN.name]
     for text, names in QUANTITIES.items():
         checks = {
             (c.measurement.quantity, c.measurement.value): c
@@ -112,7 +112,7 @@ def not_confirmed(results: Path) -> Rows:
     """The claims that plain MuJoCo was asked and did not confirm."""
     rows = [["claim", "outcome", "why"]]
     for verdict in verdicts(results):
-        for said in verdict.witnesses:
+        for said in verdict.engines:
             if said.engine == PLAIN.name and said.outcome not in (
                 Outcome.CONFIRMED,
                 Outcome.NOT_ASKED,
@@ -138,13 +138,13 @@ def _ceilings(times: float) -> Iterator[None]:
 
 
 def _constant(name: str) -> Callable[[float], AbstractContextManager[None]]:
-    """A constant of `compare.witnesses` multiplied."""
-    return lambda times: mock.patch.object(witnesses, name, times * getattr(witnesses, name))
+    """A constant of `compare.convergence` multiplied."""
+    return lambda times: mock.patch.object(convergence, name, times * getattr(convergence, name))
 
 
 CHOSEN = {
     name: _constant(name)
-    for name in ("SAFETY", "SAME", "CEILING", "COARSEST", "MARGIN", "FAR_OFF", "LOWEST_ORDER")
+    for name in ("GCI_SAFETY", "SAME", "LOOSER", "COARSEST", "MARGIN", "FAR_OFF", "LOWEST_ORDER")
 } | {"all ceilings of quantities": _ceilings}
 """What was chosen after a first measurement and can be changed without measuring anew."""
 
@@ -154,7 +154,7 @@ def chosen(results: Path) -> Rows:
 
     def said() -> dict[str, Outcome]:
         return {
-            f"{v.claim.id} by {w.engine}": w.outcome for v in verdicts(results) for w in v.witnesses
+            f"{v.claim.id} by {w.engine}": w.outcome for v in verdicts(results) for w in v.engines
         }
 
     rows, now = [["constant", "value", "half of it", "twice of it"]], said()
@@ -168,5 +168,5 @@ def chosen(results: Path) -> Rows:
             cells.append(
                 "; ".join(f"{who}: {outcome}" for who, outcome in changed.items()) or "none"
             )
-        rows.append([name, f"{getattr(witnesses, name, '')}", *cells])
+        rows.append([name, f"{getattr(convergence, name, '')}", *cells])
     return rows

@@ -12,6 +12,7 @@ from dataclasses import replace
 import pytest
 
 from compare import validation
+from compare.assessment import full_verdict
 from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Bearing, Claim, Outcome, Text
 from compare.judge import judge, select, theory
@@ -20,7 +21,6 @@ from compare.kit.plan import PLAN
 from compare.kit.quantities import quantity
 from compare.kit.record import Missing, Planned, Records, Relation
 from compare.kit.statistics import COVERAGE, Estimate
-from compare.witnesses import full_verdict
 from model import InputError, Parameters
 from tests import measured as made
 
@@ -103,7 +103,7 @@ def test_what_was_measured_must_be_there(gone):
     assert verdict.left_out == sum(not GONE[gone](m) for m in bearing)
     steps = dict.fromkeys((1, 2, 3), less)
     for engine, own in ("mujoco-plain", steps), ("mujoco-defaults", {2: less}):
-        said = full_verdict(both, {"mujoco": {1: whole}, engine: own}).witnesses[1]
+        said = full_verdict(both, {"mujoco": {1: whole}, engine: own}).engines[1]
         assert said.outcome is expected, engine
         assert ("is lost" in said.reason) == (expected is Outcome.INCONCLUSIVE)
 

@@ -96,7 +96,7 @@ def test_an_engine_that_is_named_is_heard_alone(tmp_path, counted):
         (MUJOCO, ["mujoco"]),
     ):
         (said,) = run(tmp_path, engine=engine, claims=["of-round"])
-        assert [witness.engine for witness in said.witnesses] == heard
+        assert [each.engine for each in said.engines] == heard
 
 
 def test_only_what_a_claim_needs_and_what_is_new_is_measured(tmp_path, counted):

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from compare import validation
+from compare.assessment import full_verdict
 from compare.catalogue import CLAIMS
 from compare.claim import Claim, Outcome
 from compare.judge import forget, verdict
@@ -22,7 +23,6 @@ from compare.kit.engines import ENGINES
 from compare.kit.record import Records
 from compare.kit.workers import LateError, at_most, processes
 from compare.report import results
-from compare.witnesses import full_verdict
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import WrongTheory, believed, noting
 from tests.mutants.theories import THEORIES
@@ -150,8 +150,8 @@ def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
     """The verdict on a claim by a witness; by the engine on trial if it has no name."""
     if not by:
         return verdict(claim, measured(directory)).outcome
-    witnesses = full_verdict(claim, validation.stored(directory)).witnesses
-    return {each.engine: each.outcome for each in witnesses}[by]
+    said = full_verdict(claim, validation.stored(directory)).engines
+    return {each.engine: each.outcome for each in said}[by]
 
 
 def _theory(directory: Path, by: str, whole: bool, right: Sequence[Right], number: int) -> Trial:

@@ -6,11 +6,12 @@ import math
 import numpy as np
 import pytest
 
+from compare.assessment import full_verdict
 from compare.claim import Bearing, Outcome
+from compare.convergence import COARSEST, LOOSER, StepSeries, extrapolated, zero_step_limit
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
-from compare.witnesses import CEILING, COARSEST, _limit_of_no_step, extrapolated, full_verdict
 from model import Parameters
 from tests.measured import claim, measured
 
@@ -26,12 +27,12 @@ def seen(error, **conditions):
     )
 
 
-def said(steps, trial=None, of=None, witness="mujoco-plain"):
-    """What a witness says by its measurements at steps that are so many times shorter, beside the
+def said(steps, trial=None, of=None, engine="mujoco-plain"):
+    """What an engine says by its measurements at steps that are so many times shorter, beside the
     engine on trial."""
-    return full_verdict(
-        of or claim(), {"mujoco": {1: trial or seen(0.0)}, witness: steps}
-    ).witnesses[1]
+    return full_verdict(of or claim(), {"mujoco": {1: trial or seen(0.0)}, engine: steps}).engines[
+        1
+    ]
 
 
 SERIES = (
@@ -114,7 +115,7 @@ def test_a_claim_is_judged_in_the_limit_of_no_step(left, least, steps, near, out
         assert (plain.left_out, plain.order) == (0, pytest.approx(1.0, abs=1e-6))
         assert plain.typical == plain.farthest == pytest.approx(left + least / 2)
         resolves = quantity("omega_c").resolution
-        assert check.ceiling == max(resolves, min(CEILING * resolves, COARSEST))
+        assert check.ceiling == max(resolves, min(LOOSER * resolves, COARSEST))
 
 
 @pytest.mark.parametrize(
@@ -128,7 +129,7 @@ def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
     checks = [
         Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places
     ]
-    limit = _limit_of_no_step(list(zip((2, 3, 4), checks, strict=True)))
+    limit = zero_step_limit(StepSeries((2, 3, 4), tuple(checks)))
     assert (limit and limit[0].agrees) is agrees
 
 
@@ -143,8 +144,8 @@ def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
 @pytest.mark.parametrize(
     ("error", "outcome"), [(0.049, Outcome.CONFIRMED), (0.051, Outcome.REFUTED)]
 )
-def test_an_engine_as_it_comes_may_be_off_by_its_allowance(error, outcome):
-    defaults = said({2: seen(error)}, witness="mujoco-defaults")
+def test_an_engine_as_it_comes_may_be_off_by_its_tolerance(error, outcome):
+    defaults = said({2: seen(error)}, engine="mujoco-defaults")
     assert (defaults.outcome, defaults.farthest) == (outcome, pytest.approx(error))
 
 
@@ -179,8 +180,8 @@ def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
     ("lost", "outcome"),
     [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE), (3, Outcome.INCONCLUSIVE)],
 )
-def test_a_witness_is_asked_every_bearing_on_every_set_that_it_shares(lost, outcome):
-    """The engine on trial has a count and a flow on three sets, the witness all counts, but not all
+def test_an_engine_is_asked_every_bearing_on_every_set_that_it_shares(lost, outcome):
+    """The engine on trial has a count and a flow on three sets, the other one all counts, but not all
     flows."""
     flow = Bearing("thresholds", "omega_03", lambda m: m.parameters.omega_0)
     of = claim("it", Bearing("thresholds", "lifts", lambda m: 1.0), flow)

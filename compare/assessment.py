@@ -1,0 +1,190 @@
+"""What each engine says of a claim: by its own time step, in the limit of no step, or as it comes.
+
+The engine on trial is judged by the tolerances of its measurements. An engine in the limit measures
+the same with several time steps, and is judged by what `convergence` extrapolates, with a looser
+required resolution. An engine as it comes measures with its own step alone, and a claim holds if no
+number is off by more than a share of its scale, `Engine.relative_tolerance`."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+from operator import or_
+from statistics import median
+
+from compare.claim import Claim, EngineVerdict, Outcome, Verdict
+from compare.convergence import Ends, zero_step_limits
+from compare.judge import checks_of, lost_to, outcome, per_bearing, undecided_bearings, verdict
+from compare.kit.engines import Engine, engine
+from compare.kit.lab import coarse_step
+from compare.kit.quantities import quantity
+from compare.kit.record import Check, Measurement, Missing, Records, RecordsByEngine, Relation
+
+USUAL_STEP = 2e-3
+"""MuJoCo's own time step, s, at which users meet its deviations."""
+SEVERAL = 3
+"""Most reasons that are told."""
+
+
+def full_verdict(claim: Claim, evidence: RecordsByEngine) -> Verdict:
+    """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
+    (name, steps), *others = evidence.items()
+    measured = steps[max(steps)]
+    thresholds = measured.select("thresholds", where=lambda m: m.quantity.startswith("omega_0"))
+    ends = {(m.set, m.value) for m in thresholds}
+    if len(steps) == 1 and not engine(name).relative_tolerance:
+        said = verdict(claim, measured)
+        first = EngineVerdict(
+            engine=name,
+            outcome=Outcome.NOT_ASKED if said.outcome is Outcome.NOT_RUN else said.outcome,
+            reason=said.error,
+            checks=said.checks,
+            deviations=_deviations(said.checks),
+            left_out=said.left_out,
+        )
+    else:
+        first = assess(claim, engine(name), steps, ends)
+        said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
+    beside = (assess(claim, engine(other), own, ends, first.checks) for other, own in others)
+    return replace(said, engines=(first, *beside))
+
+
+def assess(
+    claim: Claim,
+    by: Engine,
+    steps: Mapping[int, Records],
+    ends: Ends,
+    trial: Sequence[Check] = (),
+) -> EngineVerdict:
+    """What an engine says of a claim by its measurements at each step divisor; `ends` are measured
+    thresholds, `trial` the checks of the engine on trial.
+
+    Of a bearing it should have as many numbers as with any of its steps, and where the engine on
+    trial has some, one, or one for each set that was asked of both.
+
+    Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves
+    the claim undecided where too few of its numbers can tell, those without a limit among them."""
+    given = _Given(claim, steps)
+    try:
+        found = {n: checks_of(claim, own) for n, own in steps.items()}
+    except Exception as error:  # a theory that breaks down loses its claim, whoever measured
+        reason = f"{type(error).__name__}: {error}"
+        return EngineVerdict(engine=by.name, outcome=Outcome.ERROR, reason=reason)
+    shared = {
+        (c.bearing, m.set) for c in trial if ((m := c.measurement).protocol, m.set) in given.asked
+    }
+    if not shared and not any(found.values()):
+        why = "at this level nothing that bears on the claim was asked of it"
+        reason = "; ".join([why, *map(str, given.missing[:SEVERAL])])
+        return EngineVerdict(engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason)
+    if by.relative_tolerance:
+        checks, orders = _loosened(found[max(found)], by.relative_tolerance), []
+    else:
+        limits = zero_step_limits(found, given.finest, ends)
+        checks = tuple(check for check, _ in limits)
+        orders = [order for _, order in limits if math.isfinite(order)]
+    most = reduce(or_, map(per_bearing, found.values()))
+    wanted = most | Counter(n for n, _ in shared) | Counter({check.bearing for check in trial})
+    lost = given.lost
+    few = _too_few(claim, checks, wanted, given.missing)
+    usual = (
+        c
+        for n, each in found.items()
+        for c in each
+        if by.relative_tolerance or coarse_step(c.measurement.parameters) / n == USUAL_STEP
+    )
+    return EngineVerdict(
+        engine=by.name,
+        outcome=outcome(claim, checks, wanted, lost),
+        reason=few or "; ".join(map(str, lost[:SEVERAL])),
+        checks=checks,
+        order=median(orders) if orders else math.nan,
+        deviations=_deviations(usual),
+        left_out=sum(each.rows for each in given.missing) + most.total() - len(checks),
+    )
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What an engine has measured for a claim, and what is missing."""
+
+    claim: Claim
+    steps: Mapping[int, Records]
+
+    @cached_property
+    def rows(self) -> list[tuple[int, Measurement | Missing]]:
+        """All rows of the claim's protocols, each with its step divisor, the coarsest first."""
+        protocols = self.claim.protocols
+        steps = sorted(self.steps.items())
+        return [(n, row) for n, own in steps for row in own.rows if row.protocol in protocols]
+
+    @cached_property
+    def finest(self) -> dict[str, int]:
+        """The largest step divisor of each protocol."""
+        return {row.protocol: n for n, row in self.rows}
+
+    @cached_property
+    def asked(self) -> set[tuple[str, str]]:
+        """The protocols that it carried out, with their sets."""
+        return {(row.protocol, row.set) for _, row in self.rows}
+
+    @cached_property
+    def lost(self) -> list[Missing]:
+        """What is gone of its numbers, though no protocol said why."""
+        return [each for own in self.steps.values() for each in lost_to(self.claim, own)]
+
+    @cached_property
+    def missing(self) -> list[Missing]:
+        """That, and what its protocols left out with their finest step."""
+        named = [
+            row for n, row in self.rows if isinstance(row, Missing) and self._is_finest(n, row)
+        ]
+        return self.lost + named
+
+    def _is_finest(self, divisor: int, row: Missing) -> bool:
+        return self.finest[row.protocol] == divisor
+
+
+def _loosened(checks: Sequence[Check], share: float) -> tuple[Check, ...]:
+    """Checks whose numbers may be off by a share of their scales, since their errors have no
+    limit."""
+    return tuple(
+        replace(c, tolerance=share * c.scale, ceiling=2 * share)
+        if quantity(c.measurement.quantity).resolution
+        else c
+        for c in checks
+    )
+
+
+def _too_few(
+    claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]
+) -> str:
+    """In words of which bearings too few numbers can tell, and what was not measured of these;
+    empty if of none."""
+    if not (few := undecided_bearings(checks, wanted)):
+        return ""
+    symbols: dict[str, list[str]] = {}
+    for n, told in sorted(few.items()):
+        symbol = quantity(claim.bearings[n].quantity).symbol
+        symbols.setdefault(f"{told} of {wanted[n]}", []).append(symbol)
+    counts = " and ".join(
+        f"{count} in {', '.join(dict.fromkeys(those))}" for count, those in symbols.items()
+    )
+    protocols = {claim.bearings[n].protocol for n in few}
+    gone = [str(each) for each in missing if each.protocol in protocols]
+    return "; ".join([f"too few numbers can tell: {counts}", *gone[:SEVERAL]])
+
+
+def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
+    """Sizes of deviations divided by their scales, of checks that are certain enough to show
+    them."""
+    numbers = (
+        c
+        for c in checks
+        if quantity(c.measurement.quantity).resolution and c.relation is Relation.EQUAL
+    )
+    off = (abs(c.deviation / c.scale) for c in numbers if c.scale > 10 * c.tolerance)
+    return tuple(each for each in off if math.isfinite(each))
