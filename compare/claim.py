@@ -8,10 +8,12 @@ matter: `Claim.text`."""
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 from functools import cached_property
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -95,6 +97,8 @@ class Claim:
     """The least level at which it is measured."""
     section: str = ""
     """Section of the report, set by the `catalogue`."""
+    place: str = ""
+    """FILE:LINE where it is written."""
 
     def __post_init__(self) -> None:
         if not self.bearings:
@@ -132,7 +136,10 @@ def bearings(
 def claim(id: str, source: str, statement: str, *bearings: Bearing, **more: Any) -> Claim:
     """A claim with the bearings of the measurements that bear on it; `more` are other fields of
     `Claim`."""
-    return Claim(id, source, statement, bearings, **more)
+    written = sys._getframe(1)
+    file = Path(written.f_code.co_filename).relative_to(Path(__file__).parents[1])
+    place = f"{file.as_posix()}:{written.f_lineno}"
+    return Claim(id, source, statement, bearings, place=place, **more)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -277,6 +277,15 @@ def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByE
     return Evidence(checks, first, directory, sum(others, Records()))
 
 
+def told(name: str, directory: Path) -> tuple[Claim, Verdict | None, Summary]:
+    """A claim, the verdict on the measurements that a directory holds of it, None where it holds
+    no validation, and their summary. Raises as `judge_stored`."""
+    (claim,) = select(CLAIMS, [name])
+    if not (directory / results.SUMMARY).exists():
+        return claim, None, Summary()
+    return claim, _in_time(claim, stored(directory)), results.load(directory)
+
+
 def stored_evidence(directory: Path) -> Evidence:
     """As `evidence`, of a stored validation, which is judged again; empty if the directory holds
     none."""

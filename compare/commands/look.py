@@ -37,7 +37,13 @@ def figures(args: argparse.Namespace) -> int:
 
 
 def inspect(args: argparse.Namespace) -> int:
-    """Describe what a file of a run or a collection holds."""
+    """Describe what a file of a run or a collection holds, or the chain of a claim."""
+    if args.claim:
+        return _chain(args)
+    if args.file is None:
+        raise InputError(
+            "inspect needs the file of a run, or --claim; see 'dualball inspect --help'"
+        )
     if gathered := collection.read(args.file):
         if args.plot:
             drawing.save(collection.draw(gathered), args.plot)
@@ -52,6 +58,17 @@ def inspect(args: argparse.Namespace) -> int:
         table.write(args.table, motions.labelled(storage.load(args.file)))
     about = motions.describe(args.file)
     options.show(about, args.json, motions.table(about))
+    return 0
+
+
+def _chain(args: argparse.Namespace) -> int:
+    """Show the chain of a claim, with the numbers of a validation if there is one."""
+    from compare import validation  # here, because it loads everything there is
+    from compare.report import chain
+
+    claim, verdict, summary = validation.told(args.claim, args.file or Path("results"))
+    found = chain.links(claim, verdict, summary)
+    options.show(chain.described(found), args.json, *chain.shown(found))
     return 0
 
 

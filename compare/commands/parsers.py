@@ -162,12 +162,18 @@ def simulate(parser: Parser) -> None:
 
 @command("the ball", "look.inspect", "run.h5 --plot run.png")
 def inspect(parser: Parser) -> None:
-    """What a trajectory file holds."""
-    parser.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
+    """What a trajectory file holds; or how a claim comes to its verdict."""
+    what = "a run, or a collection of 'dualball collect'; of a claim the directory of a validation (default: results)"
+    parser.add_argument("file", type=Path, nargs="?", help=what)
+    chain = (
+        "the chain of a claim: statement, measurement, numbers, verdict, each with file and line"
+    )
+    parser.add_argument("--claim", metavar="ID", help=chain)
     options.add_plot(parser, "the run, or what the runs of a collection read")
     written = "write samples, or the runs of a collection, as a table (default: don't)"
     parser.add_argument("--table", type=TABLE, help=written)
     options.add_json(parser)
+    parser.excludes("--claim", "--plot", "--table")
 
 
 @command("the ball", "look.compare", "mine.csv theory.h5 --plot difference.png")

@@ -226,7 +226,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypa
     ("part", "other", "message"),
     [
         (
-            '"schema_version": 5',
+            '"schema_version": 6',
             '"schema_version": 4',
             "holds no summary that this program reads: .* another format",
         ),
