@@ -105,7 +105,7 @@ def numbers(checks: list[Check]) -> Rows:
     rows = [[*head, "required", "", "with"]]
     for check in wording.ranked(checks)[:LISTED]:
         m, known = check.measurement, quantity(check.measurement.quantity)
-        required = known.resolves if check.ceiling is None else check.ceiling
+        required = known.resolution if check.ceiling is None else check.ceiling
         unit = readable(m.unit)
         sizes = wording.size(m.uncertainty), wording.value(m, check.predicted)
         powers = f"{check.share:.2g}", wording.size(check.resolves), wording.size(required)
