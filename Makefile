@@ -2,7 +2,7 @@
 # make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (two hours or more)
 # make test       set everything up and run the tests
 # make test-all   the slow tests, too
-# make benchmarks the figures of speed, as ratios in one run: writes the tables of docs/speed.md and docs/campaigns.md
+# make benchmarks the figures of speed, as ratios in one run: writes the tables of docs/records/speed.md
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
 # make check      what CI runs: wheel, docs, lint, types, import contracts and a small league, two at a time; a quick
@@ -37,8 +37,8 @@ test-all: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist worksteal -m "slow or not slow"
 
 benchmarks: $(VENV)/installed-dev
-	$(BIN)/python -m docs.studies.speed docs/speed.md
-	$(BIN)/python -m docs.studies.costs docs/campaigns.md
+	$(BIN)/python -m docs.studies.speed docs/records/speed.md
+	$(BIN)/python -m docs.studies.costs docs/records/speed.md
 
 verdicts: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)

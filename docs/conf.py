@@ -10,6 +10,7 @@ import os
 import pkgutil
 import re
 import shutil
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -21,6 +22,7 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.util import logging
 
+from compare.commands import options, parsers
 from compare.kit.pages import typeset
 
 HERE = Path(__file__).parent
@@ -77,11 +79,52 @@ autodoc_default_options = {"members": True, "show-inheritance": True}
 
 
 def reference(app: Sphinx) -> None:
-    """A page a package, with all of its modules; `compare` has one for each of its rooms."""
+    """A page a package, with all of its modules; `compare` has one for each of its rooms; and the
+    command line."""
     shutil.rmtree(HERE / "api", ignore_errors=True)
     (HERE / "api").mkdir()
     for name in PACKAGES:
         page(importlib.import_module(name))
+    (HERE / "api" / "commands.md").write_text(commands(), "utf-8")
+
+
+def commands() -> str:
+    """All commands as their parsers explain them, by group."""
+    known: options.Commands = options.Parser(prog="dualball").add_subparsers(prog="dualball")
+    lines = ["# Command line", "", "As `dualball COMMAND --help` prints it.", ""]
+    for group, own in parsers.GROUPS.items():
+        lines += [f"## {group.capitalize()}", ""]
+        for name in own:
+            parsers.declare(known, name)
+            helped = known.choices[name].format_help().strip()
+            lines += [f"### {name}", "", "```text", helped, "```", ""]
+    return "\n".join(lines)
+
+
+def site(app: Sphinx, error: Exception | None) -> None:
+    """Put a motion in 3-D and a report beside the pages, which the home page leads to.
+
+    The report is the one of a validation in results/, if there is one, else one of a few claims."""
+    if error or app.builder.name != "html":
+        return
+    out = Path(app.outdir)
+    run = [sys.executable, "-m", "compare"]
+
+    def dualball(*words: object) -> None:
+        subprocess.run([*run, *map(str, words)], check=True, cwd=out, capture_output=True)
+
+    dualball("simulate", "--omega-0", 25, "--time", 6, "-o", "run.h5")
+    dualball("render", "run.h5", "-o", "run.html")
+    made = HERE.parent / "results" / "report.html"
+    if not made.exists():
+        few = ["--claim", "prop-1", "--claim", "prop-4", "--set", "reference"]
+        made = out / "report" / "report.html"
+        subprocess.run(
+            [*run, "validate", "--quick", *few, "-o", str(made.parent)],
+            cwd=out,
+            capture_output=True,
+        )  # which ends with 1 where a claim isn't confirmed
+    shutil.copy(made, out / "report.html")
 
 
 def page(package: ModuleType) -> None:
@@ -114,7 +157,7 @@ def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
     are only names."""
     text = source[-1]  # of a page, or of what a page includes
     if str(where).startswith(
-        "attractors/"
+        "records/attractors/"
     ):  # tables written by `dualball attractors --page`, to which a page links
         text[0] = f"---\norphan: true\n---\n\n{text[0]}"
 
@@ -239,6 +282,7 @@ def signature(
 def setup(app: Sphinx) -> None:
     """Connect what is done here."""
     app.connect("builder-inited", reference)
+    app.connect("build-finished", site)
     app.connect("source-read", source_links)
     app.connect("include-read", source_links)
     app.connect("doctree-read", as_typed)

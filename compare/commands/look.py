@@ -11,10 +11,11 @@ from compare.commands import options
 from compare.kit import collection, drawing
 from compare.view import motions
 from model import InputError, storage, table
+from model.parameters import check_names
 
 
 def figures(args: argparse.Namespace) -> int:
-    """Draw every figure; one whose results are missing is named."""
+    """Draw every figure, or those named; one whose results are missing is told of."""
     from analytic.flowmeter import real_fluid
     from compare import gallery as registry
     from compare import validation  # here, because drawing takes a second to load
@@ -28,6 +29,9 @@ def figures(args: argparse.Namespace) -> int:
             options.warn(doubt.removeprefix("Warning: "))
     else:
         chosen = registry.of_results(validation.stored_evidence(args.results or Path("results")))
+    if args.figure:
+        check_names(args.figure, list(chosen), "figure")
+        chosen = {name: chosen[name] for name in args.figure}
     formats = args.format or ["svg"]
     for name, gap in registry.write(args.output, chosen, formats):
         files = [name] if gap else [f"{name}.{suffix}" for suffix in formats]

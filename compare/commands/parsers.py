@@ -97,6 +97,9 @@ def figures(parser: Parser) -> None:
     parser.add_argument("--results", type=Path, metavar="DIR", help=stored)
     options.add_own_set(parser)
     parser.add_argument(
+        "--figure", action="append", metavar="NAME", help="only this one, as fig-9; may be repeated"
+    )
+    parser.add_argument(
         "--format",
         action="append",
         metavar="NAME",

@@ -5,7 +5,7 @@
 # with MuJoCo's own contact parameters. Both creep. How fast can be computed before the
 # simulation runs; one option makes it slower, and Coulomb's law ends it.
 
-# %%
+# %% tags=["hide-input"]
 # %config InlineBackend.figure_formats = ["svg"]
 import functools
 
@@ -68,7 +68,7 @@ GRIPPER = """
 # slips at $R_t f_t / b_f$.
 
 
-# %%
+# %% tags=["hide-input"]
 def settled(text):
     """A model at rest, its state, and the forecast."""
     model = mujoco.MjModel.from_xml_string(text)
@@ -95,7 +95,7 @@ for text in (SLOPE, GRIPPER):
 # The creep of the box for every `impratio`, computed once and measured each time. It
 # falls in proportion, and never to zero.
 
-# %%
+# %% tags=["hide-input"]
 ratios = np.geomspace(1, 1e4, 5)
 predicted, measured = [], []
 for ratio in ratios:
@@ -118,7 +118,7 @@ plt.show()
 # far the box and the rod come in five seconds:
 
 
-# %%
+# %% tags=["hide-input"]
 def way(model, data, step, seconds=5.0):
     """Distance of the last body from where it was, in µm, and the time, sampled."""
     begin, moved = data.xpos[-1].copy(), []
@@ -155,7 +155,7 @@ plt.show()
 # with $g(\sin 30^\circ - 0.25\cos 30^\circ)$. In plain MuJoCo slip lifts it; it hovers,
 # lands and hovers again. Under the law it keeps its contact, and its acceleration.
 
-# %%
+# %% tags=["hide-input"]
 SLIDE = SLOPE.replace("0 15 0", "0 30 0").replace("0.6", "0.25")
 SLIDE = SLIDE.replace('pos="0.013 0 0.0485"', 'pos="0.025 0 0.0433"')
 exact = 9.81 * (np.sin(np.radians(30)) - 0.25 * np.cos(np.radians(30)))

@@ -20,7 +20,7 @@
 # or doesn't touch (N). Two letters, floor first, make nine cases: RR rolls at both, NR
 # has left the floor and rolls along the wall, NN flies.
 
-# %%
+# %% tags=["hide-input"]
 # %config InlineBackend.figure_formats = ["svg"]
 
 import matplotlib.pyplot as plt
@@ -49,7 +49,7 @@ for field in p.quantities():
 # As the flow gets faster, the steady motion changes at certain $\omega_0$, for which
 # the paper has formulas.
 
-# %%
+# %% tags=["hide-input"]
 limits = analytic.thresholds(p)
 meanings = {
     "omega_01": "above it a ball that rolls at both points begins to slip",
@@ -67,7 +67,7 @@ for name, meaning in meanings.items():
 # to it. Thin: it does not. Circles: MuJoCo, started at rest at each flow and simulated
 # for 40 seconds.
 
-# %%
+# %% tags=["hide-input"]
 colours = {Case.RR: "#0072B2", Case.SS: "#D55E00", Case.NR: "#009E73"}
 flows = np.linspace(0.5, 48, 191)
 listed = []
@@ -130,7 +130,7 @@ plt.show()
 #
 # How far is MuJoCo from the theory?
 
-# %%
+# %% tags=["hide-input"]
 for omega_0, run in zip(starts, runs, strict=True):
     steady = analytic.stable_solutions(p.replace(omega_0=float(omega_0)))
     nearest = min(steady, key=lambda each: abs(each.x[2] - run.omega_c[-1]))
@@ -147,7 +147,7 @@ for omega_0, run in zip(starts, runs, strict=True):
 # and the equations of motion jump there. So push the ball into a slight slip and see
 # what becomes of it.
 
-# %%
+# %% tags=["hide-input"]
 figure, axes = plt.subplots()
 for factor, colour in ((0.8, "#0072B2"), (1.2, "#D55E00")):
     q = p.replace(omega_0=factor * limits.omega_01)
@@ -186,7 +186,7 @@ plt.show()
 # $\omega_{02}$, sinks, lands, and slips again. (Both changes take seconds, while the
 # flow goes on changing, so that the curve turns a little late.)
 
-# %%
+# %% tags=["hide-input"]
 there_and_back = Flow.sampled([0, 120, 180], [22, 46, 26])
 slipping = analytic.solution(p.replace(omega_0=22.0), Case.SS)
 figure, axes = plt.subplots()
@@ -230,7 +230,7 @@ plt.show()
 # ball goes over from floor to wall and always reads the flow. All thresholds meet at
 # $\eta = j$.
 
-# %%
+# %% tags=["hide-input"]
 eta = np.linspace(0.02, 0.8, 400)
 curves = threshold_curves(p, p.mu, eta)
 figure, axes = plt.subplots()
@@ -243,11 +243,20 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# ## Where to go from here
+# ## By yourself
 #
-# * `dualball validate` puts every statement of the paper to the test: the
-#   [tutorial](../tutorial.md) runs it.
+# ```sh
+# dualball predict --omega-0 25
+# dualball simulate --omega-0 25 --time 20 -o run.h5
+# dualball simulate --omega-0 25 --time 20 --engine event -o theory.h5
+# dualball compare run.h5 theory.h5
+# dualball validate --quick --set reference --claim prop-1
+# ```
+#
+# The last puts a statement of the paper to the test; without `--claim` all of them.
+#
 # * The formulas, and where each is computed: [theory](../theory.md). Where the paper's
 #   text is wrong: [errata](../errata.md).
-# * What it takes to bring MuJoCo this close: [MuJoCo's
-#   settings](../mujoco-settings.md).
+# * Motions beyond the paper: [hopping for ever](../hopping.md).
+# * What engines get right and why: [engines](../engines.md). How far any of it can be
+#   trusted: [here](../trust.md).

@@ -1,6 +1,6 @@
 """What runs of MuJoCo, campaigns and commands cost, as ratios in one run.
 
-``python -m docs.studies.costs docs/campaigns.md`` writes the tables of that page, in some ten
+``python -m docs.studies.costs docs/records/speed.md`` writes the tables of that page, in some ten
 minutes."""
 
 from __future__ import annotations
@@ -318,6 +318,6 @@ if __name__ == "__main__":
         write_all(
             tables,
             "Write the tables on the costs of runs, campaigns and commands.",
-            "docs/campaigns.md",
+            "docs/records/speed.md",
         )
     )

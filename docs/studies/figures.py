@@ -27,10 +27,10 @@ def main() -> None:
     for name, draw in (("fig-2", cases.draw_2), ("fig-3", cases.draw_3), ("fig-6", cases.draw_6)):
         drawing.save(draw(), DOCS / "cases" / f"{name}.svg")
     search, *others = map(Searched.load, SEARCHES)
-    write_text(DOCS / "hopping.md", hopping.page(search, *others))
+    write_text(DOCS / "records" / "hops.md", hopping.page(search, *others))
     basins = Basins.load(DATA / "basins.json")
-    hopping.draw_where(search).savefig(DOCS / "attractors" / "where.png", dpi=110)
-    drawing.save(attractors.draw_basins(basins), DOCS / "attractors" / "basins.png")
+    hopping.draw_where(search).savefig(DOCS / "records" / "attractors" / "where.png", dpi=110)
+    drawing.save(attractors.draw_basins(basins), DOCS / "records" / "attractors" / "basins.png")
     print(hopping.caption_where(search), hopping.caption_plane(basins), sep="\n")
 
 

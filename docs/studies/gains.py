@@ -1,7 +1,7 @@
 """What each correction of ours gains: one taken away at a time, against the event-driven
 simulation.
 
-``python -m docs.studies.tables docs/mujoco-settings.md --only gains`` writes the table.
+``python -m docs.studies.tables docs/records/settings.md --only gains`` writes the table.
 """
 
 from __future__ import annotations

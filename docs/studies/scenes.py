@@ -1,5 +1,5 @@
 """Measure scenes that others wrote, and write their tables: ``python -m docs.studies.scenes
-docs/scenes.md``.
+docs/records/scenes.md``.
 
 What was found is kept beside the page, as scenes.json, since the packages don't get along with one
 version of MuJoCo: run it with ``--only NAME`` in an environment of each package, and with
@@ -150,7 +150,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description="Measure scenes that others wrote, and write their tables."
     )
-    parser.add_argument("page", type=Path, metavar="FILE", help="docs/scenes.md")
+    parser.add_argument("page", type=Path, metavar="FILE", help="docs/records/scenes.md")
     parser.add_argument(
         "--only", action="append", choices=list(SCENES), metavar="NAME", help="only this scene"
     )

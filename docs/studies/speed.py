@@ -1,4 +1,4 @@
-"""What theory costs: ``python -m docs.studies.speed docs/speed.md`` writes the tables of that page,
+"""What theory costs: ``python -m docs.studies.speed docs/records/speed.md`` writes the tables of that page,
 in ten minutes."""
 
 from __future__ import annotations
@@ -331,4 +331,4 @@ def many() -> Rows:
 
 if __name__ == "__main__":
     tables = {"event-driven": event_driven, "states": states, "siconos": stepped, "many": many}
-    sys.exit(write_all(tables, "Write the tables on the speed of theory.", "docs/speed.md"))
+    sys.exit(write_all(tables, "Write the tables on the speed of theory.", "docs/records/speed.md"))

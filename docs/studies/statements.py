@@ -1,4 +1,4 @@
-"""Where each statement is checked, docs/statements.md: by a claim, on measurements, or by a test,
+"""Where each statement is checked, docs/records/statements.md: by a claim, on measurements, or by a test,
 theory against theory."""
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 """Write the measured tables of a page, as in ``python -m docs.studies.tables
-docs/mujoco-settings.md``; or of another.
+docs/records/settings.md``; or of another.
 
 Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are
 kept in a results directory and not computed again."""
@@ -152,13 +152,15 @@ LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
     "league-defaults": lambda campaign: _errors(True, campaign.directory),
     "league-about": lambda campaign: league.declarations(_league(campaign.directory)),
 }
-VERDICTS = {"witnesses": TABLES["witnesses"]}
+VERDICTS: dict[str, Callable[[Campaign], Rows]] = {
+    "verdict": lambda campaign: witnesses.verdict(campaign.directory.parent)
+}
 STATEMENTS: dict[str, Callable[[Campaign], Rows]] = {
     "statements": lambda campaign: statements.table()
 }
 PAGES = {
-    "mujoco-settings.md": ("settings", TABLES),
-    "engines.md": ("league", LEAGUE),
+    "settings.md": ("settings", TABLES),
+    "league.md": ("league", LEAGUE),
     "README.md": ("settings", VERDICTS),
     "statements.md": ("settings", STATEMENTS),
 }

@@ -72,6 +72,19 @@ def counted(results: Path) -> Rows:
     return [head, *rows]
 
 
+def verdict(results: Path) -> Rows:
+    """What README tells of each engine: how many of the claims that it was asked came out how."""
+    rows = [["engine", "confirmed", "refuted", "undecided"]]
+    for row in wording.witnesses(verdicts(results)):
+        falsely = sum(not expected for expected in row["refuted"].values())
+        due = len(row["refuted"]) - falsely
+        refuted = f"{falsely}" + (f", and {due} that should be" if due else "")
+        rows.append(
+            [f"`{row['engine']}`", f"{row['confirmed']} of {row['asked']}", refuted, row["open"]]
+        )
+    return [rows[0], *(row for row in rows[1:] if "mujoco" in row[0])]
+
+
 def limits(results: Path) -> Rows:
     """How far plain MuJoCo is from theory in the limit of no step, and how sure that is, by
     quantity."""

@@ -2,7 +2,7 @@
 
 Where a contact would have to pull (Fig. 12, and (83) for eta > 1), algebra is all there is. Limits,
 derivatives and the results of a search are held against closed forms, and the two ways to compute a
-motion against each other. What these hold is listed in docs/statements.md."""
+motion against each other. What these hold is listed in docs/records/statements.md."""
 
 import math
 from functools import partial

@@ -23,7 +23,7 @@ from compare.subjects.attractors import figures as attractors
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.unsteady import figures as unsteady
 from model import InputError, Parameters, State, StorageError
-from tests.commands import told
+from tests.commands import refused, told
 from tests.measured import measured
 
 DEPENDS = dict.fromkeys(FIGURES, "μηjκ") | {"fig-7": "μjκ", "fig-8": "jκ"}
@@ -220,3 +220,10 @@ def test_what_has_nothing_to_draw_is_said(draw, said):
     p = Parameters.named("reference")
     with pytest.raises(InputError, match=said):
         draw(p, analytic.simulate(p, State(), 0.1))
+
+
+def test_one_figure_is_drawn_where_one_is_named(tmp_path, capsys):
+    told(capsys, f"figures --set reference --figure fig-9 --format png -o {tmp_path / 'one'}")
+    assert {each.name for each in (tmp_path / "one").iterdir()} == {"fig-9.png", "captions.txt"}
+    named = "figures --set reference --figure fig-99"
+    assert "fig-99" in refused(capsys, named)

@@ -12,7 +12,8 @@ from docs.studies import confirmation, settings, statements, tables
 from mjsim import ContactSettings
 from model import InputError
 
-DOCS = Path(__file__).parents[2] / "docs"
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
 ROWS = [["a", "b"], ["1", "2"], ["3", "4"]]
 
 
@@ -35,7 +36,7 @@ def test_a_table_is_put_in_its_place(tmp_path):
 @pytest.mark.parametrize("name", tables.PAGES)
 def test_the_page_has_a_place_for_every_table(name, tmp_path):
     page, (_, named) = tmp_path / name, tables.PAGES[name]
-    page.write_text(({"README.md": DOCS.parent}.get(name, DOCS) / name).read_text("utf-8"), "utf-8")
+    page.write_text((ROOT / name if name == "README.md" else DOCS / "records" / name).read_text("utf-8"), "utf-8")
     for table in named:
         tables.write(page, table, ROWS)
     assert page.read_text("utf-8").count(pages.markdown(ROWS)) == len(named)
@@ -43,10 +44,10 @@ def test_the_page_has_a_place_for_every_table(name, tmp_path):
 
 def test_every_statement_says_where_it_is_checked():
     """The page is what the claims and the tests say now."""
-    assert pages.markdown(statements.table()) in (DOCS / "statements.md").read_text("utf-8")
+    assert pages.markdown(statements.table()) in (DOCS / "records" / "statements.md").read_text("utf-8")
     for each in statements.TESTS:
         file, _, test = each.partition("::")
-        source = (DOCS.parent / "tests" / "analytic" / f"{file}.py").read_text("utf-8")
+        source = (ROOT / "tests" / "analytic" / f"{file}.py").read_text("utf-8")
         assert f"def {test}(" in source, each
 
 
