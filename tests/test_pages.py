@@ -78,7 +78,7 @@ def test_what_readme_shows_below_a_command_is_what_it_says(here, capsys):
     for text in shown:
         command, *lines = text.splitlines()
         code, out, err = carried_out(capsys, *shlex.split(command)[2:])
-        assert (code, err) == (0, "")
+        assert code == 0, err
         assert lines
         assert [line for line in out.splitlines() if line in lines] == lines, out
 

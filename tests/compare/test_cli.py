@@ -19,7 +19,7 @@ from compare.commands import cli, design, parsers, simulate
 from compare.kit import engines, tasks
 from mjsim import ContactSettings
 from model import Parameters, storage
-from tests.commands import COMMANDS, ROOT, carried_out, parser_of, refused, told
+from tests.commands import ROOT, carried_out, parser_of, refused, told
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,10 @@ def test_a_table_is_put_in_its_place(tmp_path):
 @pytest.mark.parametrize("name", tables.PAGES)
 def test_the_page_has_a_place_for_every_table(name, tmp_path):
     page, (_, named) = tmp_path / name, tables.PAGES[name]
-    page.write_text((ROOT / name if name == "README.md" else DOCS / "records" / name).read_text("utf-8"), "utf-8")
+    page.write_text(
+        (ROOT / name if name == "README.md" else DOCS / "records" / name).read_text("utf-8"),
+        "utf-8",
+    )
     for table in named:
         tables.write(page, table, ROWS)
     assert page.read_text("utf-8").count(pages.markdown(ROWS)) == len(named)
@@ -44,7 +47,9 @@ def test_the_page_has_a_place_for_every_table(name, tmp_path):
 
 def test_every_statement_says_where_it_is_checked():
     """The page is what the claims and the tests say now."""
-    assert pages.markdown(statements.table()) in (DOCS / "records" / "statements.md").read_text("utf-8")
+    assert pages.markdown(statements.table()) in (DOCS / "records" / "statements.md").read_text(
+        "utf-8"
+    )
     for each in statements.TESTS:
         file, _, test = each.partition("::")
         source = (ROOT / "tests" / "analytic" / f"{file}.py").read_text("utf-8")
