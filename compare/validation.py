@@ -75,14 +75,14 @@ def validate(
     """
     forget()
     study = plan(Path(output), level, claims, sets, engine)
-    far = ValidationProgress(progress, len(study.claims))
+    count = min(workers if isinstance(workers, int) else workers.count, os.cpu_count() or 1)
+    far = ValidationProgress(progress, len(study.claims), max(count, 1))
     runs = study.output / results.RUNS
     with Campaign(runs, workers, limit=limit, report=far.measuring, passing=True) as campaign:
         verdicts = judge(study.claims, measure(study, campaign, far), announce, far)
         files = study.files(campaign)
     kept = results.load_measurements(study.output, level.name, files)
-    count = workers if isinstance(workers, int) else workers.count
-    with processes(min(count, os.cpu_count() or 1)) as work:
+    with processes(count) as work:
         draw = far.drawing(work.map) if report else None
         write(study.output, level, files, kept, verdicts, draw)
     return [verdicts[claim.id] for claim in study.claims]
@@ -187,7 +187,7 @@ class SoFar:
 def measure(study: Study, campaign: Campaign, far: ValidationProgress) -> Iterator[SoFar]:
     """Carry out what is planned; yield all that is measured, at first and after each protocol."""
     jobs = study.jobs(campaign)
-    far.costs = {job.name: job.cost for job in jobs}
+    far.costs = {job.name: 0.0 if job.file.exists() else job.cost for job in jobs}
     records = {each.name: dict.fromkeys(each.refine, Records()) for each in study.engines}
     measured = SoFar(records, Counter(job.protocol.name for job in jobs))
     yield measured

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -18,6 +21,8 @@ from compare.kit.levels import Level, sets
 from compare.kit.pages import readable
 from compare.report import results, wording
 
+WIDTH, SAYS = 100, 32
+"""Columns of a claim's line, and of what it says, in short."""
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
 
 
@@ -32,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
             pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left")
         )
         return 0
+    console.print(head())
     with progress.reporter(quiet=args.quiet or args.json) as show:
         wanted = {
             "level": Level[args.level.upper()],
@@ -54,6 +60,7 @@ def judge(args: argparse.Namespace) -> int:
 
     console = options.terminal(quiet=args.json)
     verdicts = validation.judge_stored(args.output, args.claim, args.workers)
+    console.print(head())
     for verdict in verdicts:
         console.print(line(verdict), soft_wrap=True)
     known = sets(Level.FULL)
@@ -78,55 +85,96 @@ def _finish(
     be."""
     if args.json:
         print(json.dumps([results.described(verdict) for verdict in verdicts], indent=1))
-    if args.verbose:
-        console.print(*(checks(verdict) for verdict in verdicts if verdict.checks))
-    console.print(summary(verdicts), soft_wrap=True)
-    console.print(f"report: {args.output / results.REPORT}")
+    for verdict in verdicts if args.verbose else ():
+        console.print(detail(verdict), soft_wrap=True)
+        console.print(*([checks(verdict)] if verdict.checks else []))
+    console.print(summary(verdicts, args.output / results.REPORT), soft_wrap=True)
     return 0 if all(verdict.passed or verdict.outcome in spared for verdict in verdicts) else 1
 
 
+def head() -> Text:
+    """What stands where in the lines of claims."""
+    return Text(f"  {'verdict':<13}{'claim':<19}{'says':<{SAYS}}numbers share  beside it", "dim")
+
+
 def line(verdict: Verdict) -> Text:
-    """A claim in one line: verdict, largest deviation, what error of theory would be noticed, or
-    what went wrong."""
+    """A claim in a line of at most `WIDTH` columns: verdict, id, what it says in short, how many
+    numbers, the worst one's share of its tolerance, and what the engines beside say."""
     kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
-    expected = ", as expected" if verdict.passed and verdict.outcome is Outcome.REFUTED else ""
     shown = Text.assemble(
-        (f"{mark} {verdict.outcome + expected:<13}", _STYLES[kind]), f" {verdict.claim.id:<18} "
+        (f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<19}"
     )
-    parts = []
-    if verdict.checks:
-        found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
-        count = len(verdict.checks)
-        parts.append(Text("; ".join([f"{count:>4} number{'s' if count > 1 else ''}", *found])))
-    elif verdict.error:
-        parts.append(Text(verdict.error, "red"))
-    elif verdict.outcome is Outcome.NOT_RUN and verdict.claim.level > Level.QUICK:
-        parts.append(Text(f"measured from the {verdict.claim.level.name.lower()} level on", "dim"))
-    elif verdict.missing:
-        parts.append(Text(str(verdict.missing[0]), "dim"))
-    for each in (said for said in verdict.engines[1:] if said.outcome is not Outcome.NOT_ASKED):
-        kind, mark = wording.MARKS[each.outcome]
-        parts.append(
-            Text.assemble(
-                f"{each.engine} ", (f"{mark} {wording.engine_outcome(each)}", _STYLES[kind])
+    if not verdict.checks:
+        return shown.append(_short(why_no_numbers(verdict), WIDTH - len(shown.plain)), "dim")
+    said = _short(verdict.claim.statement, SAYS)
+    shown.append(f"{said:<{SAYS}}{len(verdict.checks):>7} {_share(verdict):>5}  ")
+    for each in verdict.engines[1:]:
+        if each.outcome is not Outcome.NOT_ASKED:
+            kind, mark = wording.MARKS[each.outcome]
+            shown.append(f"{each.engine.removeprefix('mujoco-')} ").append(
+                f"{mark} ", _STYLES[kind]
             )
-        )
-    return shown.append(Text("; ").join(parts))
+    shown.rstrip()
+    return shown
 
 
-def summary(verdicts: Sequence[Verdict]) -> Text:
-    """The outcome in a sentence, with counts of claims and numbers; and a line for each engine
-    beside."""
+def _short(text: str, width: int) -> str:
+    """The first words of a text."""
+    return textwrap.shorten(text, width, placeholder="…")
+
+
+def _share(verdict: Verdict) -> str:
+    """The worst deviation in parts of its tolerance; a dash for counts and cases."""
+    worst = verdict.worst
+    return "–" if not math.isfinite(worst) else f"{worst:.2f}" if worst < 100 else f"{worst:.1e}"
+
+
+def why_no_numbers(verdict: Verdict) -> str:
+    """Why a claim has none."""
+    if verdict.error:
+        return verdict.error
+    if verdict.outcome is Outcome.NOT_RUN and verdict.claim.level > Level.QUICK:
+        return f"measured from the {verdict.claim.level.name.lower()} level on"
+    return str(verdict.missing[0]) if verdict.missing else "nothing was measured"
+
+
+def detail(verdict: Verdict) -> Text:
+    """All that a verdict says, above the table of its numbers."""
+    found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
+    lines = [
+        f"{verdict.claim.id}: {verdict.claim.statement}",
+        "; ".join(found) or why_no_numbers(verdict),
+    ]
+    lines += [
+        f"{each.engine}: {wording.engine_sentence(each)}"
+        for each in verdict.engines[1:]
+        if each.outcome is not Outcome.NOT_ASKED
+    ]
+    return Text("\n".join(["", *lines]))
+
+
+def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
+    """What all of it means, in three sentences: by the engine on trial, by those beside it, and
+    where to look."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
-    counts = "; ".join(map(" ".join, wording.totals(ran)))
-    shown = Text(
-        f"{wording.headline(ran)}: {counts}. {wording.coarse_and_missing(ran)}".strip(), "bold"
+    counts = ", ".join(map(" ".join, wording.totals(ran)))
+    shown = Text(f"{wording.headline(ran)}: {counts}.", "bold")
+    beside = [
+        f"{each['title']} confirms {each['confirmed']} of {each['asked']} claims and refutes "
+        f"{len(each['refuted'])}"
+        for each in wording.engines(ran)[1:]
+        if each["asked"] != "0"
+    ]
+    if beside:
+        shown.append(
+            f"\nBeside it {', '.join(beside)}: that is what goes wrong without the law, and "
+            "doesn't count in the exit code.",
+            "not bold",
+        )
+    coarse = wording.coarse_and_missing(ran)
+    shown.append(
+        f"\nEvery number is in {report}, and printed by --verbose. {coarse}".rstrip(), "not bold"
     )
-    for each in (each for each in wording.engines(ran) if each["asked"] != "0"):
-        counts = f"{each['confirmed']} of {each['asked']} claims confirmed (to {each['to']}), "
-        counts += f"{len(each['refuted'])} refuted, {each['open']} undecided"
-        off = f"typical deviation {each['typical']}, worst {each['worst']}"
-        shown.append(f"\n{each['engine']} ({each['title']}): {counts}; {off}", "not bold")
     return shown
 
 

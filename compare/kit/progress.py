@@ -27,6 +27,8 @@ INTERVAL = 10.0
 """Seconds between plain lines."""
 DRAWING = 0.1
 """Share of a validation's time that drawing its figures takes, about."""
+PATIENCE = 10.0
+"""Seconds for which a validation's pace is taken to be that of a machine that is free."""
 Show = Callable[[str, int, int, int], None]
 """Called with what is being done, in words, how much of it is done, of how much in all, and how
 much failed."""
@@ -98,12 +100,17 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
 
 @dataclass
 class ValidationProgress:
-    """How far a validation is: claims judged, protocols measured, runs of those under way."""
+    """How far a validation is: claims judged, protocols measured, runs of those under way.
+
+    What is shown as done is a share of time, so that who goes on at the pace of the whole until now
+    tells the time that is left."""
 
     show: Show
     claims: int
+    workers: int = 1
     costs: Mapping[str, float] = field(default_factory=dict)
-    """Processor time of each protocol, in any unit."""
+    """Processor time of each protocol that isn't stored yet, s, on a machine that is free."""
+    began: float = field(default_factory=lambda: time.monotonic())
     _under_way: dict[str, tuple[int, int, int]] = field(default_factory=dict)
     _measured: float = 0.0
     _judged: int = 0
@@ -131,27 +138,34 @@ class ValidationProgress:
 
     def drawing(self, over: Spread) -> Spread:
         """A `map` for figures that shows how many are drawn."""
+        whole = DRAWING * (time.monotonic() - self.began)
 
         def counted(one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
             todo = list(items)
             for k, result in enumerate(over(one, todo)):
-                left = DRAWING * (1 - (k + 1) / len(todo))
-                self.show(
-                    f"drawing figures: {k + 1} of {len(todo)}", round(1000 * (1 - left)), 1000, 0
+                self._show(
+                    f"drawing figures: {k + 1} of {len(todo)}", whole * (1 - (k + 1) / len(todo))
                 )
                 yield result
 
-        self.show("drawing figures", round(1000 * (1 - DRAWING)), 1000, 0)
+        self._show("drawing figures", whole)
         return counted
 
+    def left(self) -> float:
+        """Seconds that are left of measuring and drawing: what isn't done yet, at the pace until
+        now, which counts for little at first, and as on a machine that is free."""
+        shares = {name: done / max(total, 1) for name, (done, total, _) in self._under_way.items()}
+        under_way = sum(self.costs.get(name, 0.0) * share for name, share in shares.items())
+        done = (self._measured + under_way) / self.workers
+        pace = (time.monotonic() - self.began + PATIENCE) / (done + PATIENCE)
+        return (1 + DRAWING) * pace * (sum(self.costs.values()) / self.workers - done)
+
     def _tell(self) -> None:
-        """Show how far claims and protocols are, weighted by their costs."""
+        """Show how far claims and protocols are."""
         runs = [f"{name} {done}/{total}" for name, (done, total, _) in self._under_way.items()]
         what = f"{self._judged} of {self.claims} claims judged; measuring {', '.join(runs)}"
-        all_, done = sum(self.costs.values()), (1 - DRAWING) * self._measured
-        self.show(
-            what,
-            round(1000 * done / (all_ or 1.0)),
-            1000,
-            sum(bad for *_, bad in self._under_way.values()),
-        )
+        self._show(what, self.left(), sum(bad for *_, bad in self._under_way.values()))
+
+    def _show(self, what: str, left: float, failed: int = 0) -> None:
+        passed = time.monotonic() - self.began
+        self.show(what, round(1000 * passed / max(passed + left, 1e-9)), 1000, failed)

@@ -75,7 +75,7 @@ def counted(results: Path) -> Rows:
 def verdict(results: Path) -> Rows:
     """What README tells of each engine: how many of the claims that it was asked came out how."""
     rows = [["engine", "confirmed", "refuted", "undecided"]]
-    for row in wording.witnesses(verdicts(results)):
+    for row in wording.engines(verdicts(results)):
         falsely = sum(not expected for expected in row["refuted"].values())
         due = len(row["refuted"]) - falsely
         refuted = f"{falsely}" + (f", and {due} that should be" if due else "")

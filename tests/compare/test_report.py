@@ -168,11 +168,23 @@ def test_every_number_is_on_the_page():
     assert packed == columns
 
 
+def test_a_claim_has_one_line_of_a_terminal():
+    for verdict in (*VERDICTS, dataclasses.replace(RAN[0], checks=(), error="it broke " * 30)):
+        shown = validate.line(verdict).plain
+        assert len(shown) <= validate.WIDTH
+        assert "\n" not in shown
+        assert verdict.claim.id in shown
+    assert len(validate.head().plain) <= validate.WIDTH
+
+
 def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(page):
-    text, summary = html.unescape(page.read_text("utf-8")), validate.summary(VERDICTS).plain
+    text, summary = (
+        html.unescape(page.read_text("utf-8")),
+        validate.summary(VERDICTS, Path("report.html")).plain,
+    )
     for verdict in RAN:
         for heading, found in wording.findings(verdict).items():
-            assert f"{heading.lower()} {found}" in validate.line(verdict).plain
+            assert f"{heading.lower()} {found}" in validate.detail(verdict).plain
             assert f"<dt>{heading}</dt>" in row(text, verdict.claim.id)
             assert html.unescape(typeset(found)) in row(text, verdict.claim.id)
     for said in (

@@ -1,0 +1,39 @@
+"""What a validation announces of the time that is left is true on machines of any pace."""
+
+import pytest
+
+from compare.kit import progress
+
+COSTS = {f"protocol {k}": 10.0 for k in range(30)}
+"""Seconds on a machine that is free."""
+
+
+@pytest.mark.parametrize("pace", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("workers", [1, 4])
+def test_the_time_left_is_right_within_a_factor_of_two_after_twenty_seconds(
+    pace, workers, monkeypatch
+):
+    now, said = 0.0, []
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    far = progress.ValidationProgress(lambda *told: said.append(told), 30, workers, COSTS)
+    lasts = pace * sum(COSTS.values()) / workers  # of protocols that begin one after the other
+    for k, name in enumerate(COSTS):
+        for half in (1, 2):
+            now = (k + half / 2) / len(COSTS) * lasts
+            far.measuring(name, half, 2, 0)
+            done = said[-1][1] / said[-1][2]
+            if now >= 20 and lasts - now > 0.2 * lasts:
+                extrapolated = now * (1 - done) / done  # as the reporter does
+                assert 0.5 < extrapolated / (lasts - now) < 2, (now, lasts)
+        far.measured(name)
+    assert far.left() == pytest.approx(0, abs=1e-9)
+
+
+def test_what_is_stored_tells_nothing_of_the_pace(monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    costs = COSTS | {"protocol 0": 0.0}  # it is there already
+    far = progress.ValidationProgress(progress.show_nothing, 30, 1, costs)
+    before = far.left()
+    far.measured("protocol 0")
+    assert far.left() == before
