@@ -63,7 +63,9 @@ def _curve(axes: Axes, p: Parameters) -> None:
     """The exact theory: rolling up to a limit, slipping beyond it."""
     limit = float(analytic.thresholds(p).omega_01)
     flows = np.linspace(limit, FASTEST, 100)[1:]
-    slipping = [float(analytic.solution(p.replace(omega_0=w), Case.SS).state.omega_c) for w in flows]
+    slipping = [
+        float(analytic.solution(p.replace(omega_0=w), Case.SS).state.omega_c) for w in flows
+    ]
     axes.plot([0, limit], [0, limit], color=style.COLOURS[Case.RR], lw=2.5, label="exact theory")
     axes.plot(flows, slipping, color=style.COLOURS[Case.SS], lw=2.5)
     for x, case, what in (
