@@ -29,7 +29,7 @@ EXCEPTIONS = {
         f"analytic/simulation/solvers.py:{name}"
         for name in ("_root", "_interpolant", "_first_fall")
     ),
-    *("analytic/simulation/solvers.py:explicit_steps", "analytic/simulation/stepping.py:solve"),
+    "analytic/simulation/solvers.py:explicit_steps",
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
     *("mjsim/corrections.py:corrections", "mjsim/free.py:through"),
     "mjsim/world_axes.py:driven",

@@ -151,6 +151,26 @@ class StepSolution(NamedTuple):
     residual: float
 
 
+class Middle(NamedTuple):
+    """The middle of a step, by the velocities before and after it."""
+
+    u: Velocities
+    """The mean of both."""
+    x_i: float
+    """Where the ball is, along the axes of the beginning, m."""
+    x_k: float
+    spin: float
+    """How fast the axes turn about j, rad s-1."""
+    c: float
+    """Rate of drag, s-1."""
+    omega_0: float
+    """Of the flow, rad s-1."""
+
+
+Slips = tuple[tuple[float, float], tuple[float, float]]
+"""Slip velocities of A and of B, m s-1."""
+
+
 def solve(
     at: BallState, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants
 ) -> StepSolution:
@@ -158,68 +178,21 @@ def solve(
 
     Smooth forces, at the mean of both velocities, and contacts are iterated together; `start`
     guesses the impulses."""
-    v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
-    (in_A, in_B, to_A, to_B), m, r, j = touching, p.m, p.r, p.j
-    fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
-    rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
-    slip_A, slip_B = _old_slip(at, dt, p)
-    on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
+    u, slips = at.u, _old_slip(at, dt, p)
+    fastest = max(abs(u.v_h), abs(u.v_y), abs(u.v_k), p.r * max(abs(u.o_x), abs(u.o_y), abs(u.o_z)))
     for tolerance in (TOLERANCE, BARELY):
         enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
-        still = (
-            4 + 8 / j
-        ) * enough  # what such changes of two impulses, in two iterations, add up to
-        A, B = _first_guess(touching, start, m)
-        new, last, change = old, 0.0, p.g * dt
+        # What such changes of two impulses, in two iterations, add up to.
+        still = (4 + 8 / p.j) * enough
+        A, B = _first_guess(touching, start, p.m)
+        new, last, change = u, 0.0, p.g * dt
         for _ in range(MAX_ITERATIONS):
-            u = mean(old, new)
-            x_i = at.h - p.R + dt / 2 * u.v_h
-            x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
-            w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i  # (20) with (9), no contact
-            c = (
-                drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law)
-                if p.law.blunt > 0
-                else p.law.linear
-            )
-            f_h = v_h - dt * (spin * u.v_k + c * w_h)
-            f_y = v_y - dt * (p.g + c * u.v_y)
-            f_k = v_k + dt * (spin * u.v_h - c * w_k)
-            f_x = o_x - dt * (
-                spin * u.o_z + p.k * u.o_x
-            )  # f_z takes the new o_x, which saves two iterations of seven
-            turn_y = o_y - dt * p.k * (u.o_y - omega_0)
-            f_z = o_z + dt * (spin * (o_x + f_x - A.t / (j * r)) / 2 - p.k * u.o_z)
-            a = Impulse(
-                to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1])
-            )
-            b = Impulse(
-                to_B - f_h,
-                -rest * (f_y - r * f_z + slip_B[0]),
-                -rest * (f_k + r * turn_y + slip_B[1]),
-            )
-            residual, aim = 0.0, max(enough, ROUGH * change)
-            if in_A and in_B:
-                A, B, residual = solve_pair(a, b, B, on_A, on_B, j, aim)
-            elif in_A:
-                A = project(a, on_A)
-            elif in_B:
-                B = project(b, on_B)
-            n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
-            after = Velocities(
-                n_h,
-                n_y,
-                n_k,
-                f_x - A.t / (j * r),
-                turn_y + B.t / (j * r),
-                f_z + (A.s - B.s) / (j * r),
-            )
-            change = (
-                abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)
-            )  # a sum, since max overlooks nan
-            change += r * (
-                abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z)
-            )
-            new = after
+            middle = _middle(at, new, dt, omega_0, touching.B, p)
+            free = _free(u, middle, A.t, dt, p)
+            aim = max(enough, ROUGH * change)
+            A, B, residual = _impulses(free, slips, touching, B, aim, p)
+            before, new = new, _pushed(free, A, B, p)
+            change = _change(before, new, p.r)
             # Changes shrink at a steady rate: what is left is this one times the rate.
             settled = (
                 dt == 0
@@ -232,28 +205,107 @@ def solve(
             last = change
         if converged:
             break
-    u = mean(old, new)
+    work = _work(mean(u, new), middle, A, B, dt, p)
+    # A loaded contact has met its target, and round-off must not open it again.
+    v_h = touching.to_B if B.n > 0 else new.v_h
+    v_y = touching.to_A if A.n > 0 else new.v_y
+    new = Velocities(v_h, v_y, new.v_k, new.o_x, new.o_y, new.o_z)
+    P = Forces(p.m * A.s, p.m * A.n, p.m * A.t, p.m * B.n, p.m * B.s, p.m * B.t)
+    left = 0.0 if converged else _larger_or_nan(change, residual)
+    return StepSolution(new, P, work, middle.spin, left)
+
+
+def _middle(
+    at: BallState, new: Velocities, dt: float, omega_0: float, on_wall: bool, p: Constants
+) -> Middle:
+    """The middle of a step that ends with velocities `new`."""
+    u = mean(at.u, new)
+    x_i = at.h - p.R + dt / 2 * u.v_h
+    x_k, spin = (0.0, -u.v_k / x_i) if on_wall else (dt / 2 * u.v_k, 0.0)
+    if p.law.blunt > 0:
+        w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
+        c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law)
+    else:
+        c = p.law.linear
+    return Middle(u, x_i, x_k, spin, c, omega_0)
+
+
+def _free(old: Velocities, middle: Middle, A_t: float, dt: float, p: Constants) -> Velocities:
+    """Velocities after dt without contacts, (20) with (9).
+
+    But o_z takes the new o_x, with the impulse A_t, which saves two iterations of seven."""
+    (u, x_i, x_k, spin, c, omega_0), k = middle, p.k
+    w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
+    v_h = old.v_h - dt * (spin * u.v_k + c * w_h)
+    v_y = old.v_y - dt * (p.g + c * u.v_y)
+    v_k = old.v_k + dt * (spin * u.v_h - c * w_k)
+    o_x = old.o_x - dt * (spin * u.o_z + k * u.o_x)
+    o_y = old.o_y - dt * k * (u.o_y - omega_0)
+    o_z = old.o_z + dt * (spin * (old.o_x + o_x - A_t / (p.j * p.r)) / 2 - k * u.o_z)
+    return Velocities(v_h, v_y, v_k, o_x, o_y, o_z)
+
+
+def _impulses(
+    free: Velocities, slips: Slips, touching: Touching, B: Impulse, aim: float, p: Constants
+) -> tuple[Impulse, Impulse, float]:
+    """Impulses of A and B per mass that obey Coulomb's law to a tolerance `aim`, near a guess at B;
+    and by how much they don't."""
+    (v_h, v_y, v_k, o_x, o_y, o_z), r = free, p.r
+    rest = p.j / (1 + p.j)  # share of m that a tangential impulse feels at the contact point
+    slip_A, slip_B = slips
+    # What either needs to meet its target and to rest if the other one gives nothing.
+    a = Impulse(
+        touching.to_A - v_y,
+        -rest * (v_h + r * o_z + slip_A[0]),
+        -rest * (v_k - r * o_x + slip_A[1]),
+    )
+    b = Impulse(
+        touching.to_B - v_h,
+        -rest * (v_y - r * o_z + slip_B[0]),
+        -rest * (v_k + r * o_y + slip_B[1]),
+    )
+    on_A, on_B, none = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
+    if touching.A and touching.B:
+        return solve_pair(a, b, B, on_A, on_B, p.j, aim)
+    return project(a, on_A) if touching.A else none, project(b, on_B) if touching.B else none, 0.0
+
+
+def _pushed(free: Velocities, A: Impulse, B: Impulse, p: Constants) -> Velocities:
+    """Velocities with the impulses of both contacts, per mass."""
+    jr = p.j * p.r
+    return Velocities(
+        free.v_h + A.s + B.n,
+        free.v_y + A.n + B.s,
+        free.v_k + A.t + B.t,
+        free.o_x - A.t / jr,
+        free.o_y + B.t / jr,
+        free.o_z + (A.s - B.s) / jr,
+    )
+
+
+def _change(before: Velocities, new: Velocities, r: float) -> float:
+    """By how much velocities differ, m s-1: a sum, since max overlooks nan."""
+    change: float = (
+        abs(new.v_h - before.v_h) + abs(new.v_y - before.v_y) + abs(new.v_k - before.v_k)
+    )
+    change += r * (
+        abs(new.o_x - before.o_x) + abs(new.o_y - before.o_y) + abs(new.o_z - before.o_z)
+    )
+    return change
+
+
+def _work(u: Velocities, middle: Middle, A: Impulse, B: Impulse, dt: float, p: Constants) -> float:
+    """Work of contacts and drag in a step with mean velocities u, J."""
+    (_, x_i, x_k, _, c, omega_0), r = middle, p.r
     power = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
     at_A = A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
     at_B = B.n * u.v_h + B.s * (u.v_y - r * u.o_z) + B.t * (u.v_k + r * u.o_y)
-    turned = j * r * r * p.k * (u.o_x * u.o_x + u.o_y * (u.o_y - omega_0) + u.o_z * u.o_z)
-    work = m * (at_A + at_B - dt * (c * power + turned))
-    # A loaded contact has met its target, and round-off must not open it again.
-    new = Velocities(
-        to_B if B.n > 0 else new.v_h,
-        to_A if A.n > 0 else new.v_y,
-        new.v_k,
-        new.o_x,
-        new.o_y,
-        new.o_z,
-    )
-    P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
-    return StepSolution(new, P, work, spin, 0.0 if converged else _larger_or_nan(change, residual))
+    turned = p.j * r * r * p.k * (u.o_x * u.o_x + u.o_y * (u.o_y - omega_0) + u.o_z * u.o_z)
+    work: float = p.m * (at_A + at_B - dt * (c * power + turned))
+    return work
 
 
-def _old_slip(
-    at: BallState, dt: float, p: Constants
-) -> tuple[tuple[float, float], tuple[float, float]]:
+def _old_slip(at: BallState, dt: float, p: Constants) -> Slips:
     """Slip velocities of A and B before the step, m s-1; set to zero where slip may stop within the
     step.
 
