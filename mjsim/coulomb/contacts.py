@@ -1,8 +1,8 @@
 """The contacts of a step: found, matched with those of the step before, mended.
 
-A contact is the one of the step before that is nearest to it on both bodies. It inherits the state,
-the load and the friction, which turns with both bodies. Colliders drop points of flat faces that
-still overlap, and find them again; such points are put back.
+Each contact of the step before hands on its state, load and friction to the one that is now nearest
+to it on both bodies; friction turns with these, and what several hand on adds up. Colliders drop
+points of flat faces that still overlap, which are put back, and add some, which are left out.
 """
 
 from __future__ import annotations
@@ -105,11 +105,16 @@ def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
                 and abs(contact.frame[3 + j] - pose.tangent[j]) < STILL
             ):
                 return False
-    contacts = contacts_of(memory)
+    return True
+
+
+@kernel
+def read_gaps(data: Any, memory: Any) -> None:
+    """Read the gaps of contacts that haven't moved otherwise."""
+    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
     for i in range(memory.contacts):
         given = found[contacts[i].index]
         contacts[i].gap, contacts[i].margin = given.dist, given.includemargin
-    return True
 
 
 # -- found -----------------------------------------------------------------------------------------
@@ -142,7 +147,7 @@ def find(model: Any, data: Any, memory: Any) -> None:
         if not memory.law.rigid and (given.dim == 1 or damping[address + 1, 1] <= 0):
             continue
         contact = contacts[count]
-        forget(contact)
+        clear(contact)
         contact.index, contact.address, contact.dim = i, address, given.dim
         contact.gap, contact.margin, contact.cone = given.dist, given.includemargin, given.mu
         contact.speed[0] = math.inf
@@ -172,9 +177,9 @@ def find(model: Any, data: Any, memory: Any) -> None:
 
 
 @kernel
-def forget(contact: Any) -> None:
+def clear(contact: Any) -> None:
     """Make it a new contact, of which nothing is known."""
-    contact.state, contact.lift, contact.load, contact.load_before = NEW, 0.0, 0.0, 0.0
+    contact.state, contact.lift, contact.load = NEW, 0.0, 0.0
     contact.predicted, contact.found, contact.extrapolated = 0.0, 0.0, 0.0
     contact.bias, contact.error = 0.0, 0.0
     for axis in range(3):
@@ -284,10 +289,10 @@ def nearest(model: Any, memory: Any, old: Any) -> int:
 
 @kernel
 def match(model: Any, data: Any, memory: Any) -> float:
-    """Let contacts inherit from those before; how far one has moved, if some are gone, m."""
+    """Let contacts inherit from those before; if two have become one, how far one has moved, m."""
     contacts, before = contacts_of(memory), contacts_at(memory.before_at, memory.contacts_before)
     sort_pairs(model, memory)
-    farthest, some_gone = 0.0, False
+    farthest, some_merged = 0.0, False
     for i in range(len(before)):
         old = before[i]
         k = i if i < len(contacts) and square_apart(contacts[i], old) < UNMOVED**2 else -1
@@ -297,9 +302,9 @@ def match(model: Any, data: Any, memory: Any) -> float:
             old.moved = square_apart(contacts[k], old) if k >= 0 else math.inf
         if k >= 0:
             farthest = max(farthest, old.moved)
-            some_gone = some_gone or contacts[k].state != NEW
+            some_merged = some_merged or contacts[k].state != NEW
             inherit(model, data, memory, contacts[k], old)
-    return math.sqrt(farthest / 2) if some_gone else 0.0
+    return math.sqrt(farthest / 2) if some_merged else 0.0
 
 
 @kernel
@@ -312,7 +317,6 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
         contact.speed[axis] = old.speed[axis] if fixed else math.inf
     contact.state = max(contact.state, old.state)
     contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
-    contact.load_before = max(contact.load_before, old.load_before)
     contact.load += old.load
     for side in range(2):
         for axis in range(3):

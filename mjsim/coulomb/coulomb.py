@@ -7,7 +7,7 @@ import math
 import sys
 import warnings
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -47,7 +47,8 @@ class Coulomb:
         least the way of a step at the speed of a fall through the scene, or a fifth of their radius.
         Margins are for steps up to the model's as it is now. While the law acts the integrator is
         Euler's, and dampers are inertia of the same effect, which contacts know
-    restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
+    restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1; or
+        one for each geom, of which two in contact have the larger, as MuJoCo mixes friction
     servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It
         needs geoms with a `margin`, more than bodies sink in, of which an open contact then takes no
         notice; and it must be slower than the contact, best five times the time constant of `solref`
@@ -72,7 +73,7 @@ class Coulomb:
         model: Any,
         *,
         rigid: bool = False,
-        restitution: float = 0.0,
+        restitution: float | Sequence[float] = 0.0,
         servo: float | None = None,
         share: float = Law.share,
         depth: float = Law.depth,
@@ -81,10 +82,11 @@ class Coulomb:
             raise ValueError(f"model is a {type(model).__name__}; a mujoco.MjModel is needed")
         if not isinstance(rigid, (bool, np.bool_)):
             raise ValueError(f"rigid = {_shown(rigid)} must be True or False")
-        _check_number("restitution", restitution, "", 0.0, 1.0)
-        if restitution and not rigid:
+        bounces = _restitution(model, restitution)
+        if bounces and not rigid:
             raise ValueError(
-                f"restitution = {restitution} needs rigid=True: solref says how soft contacts bounce"
+                f"restitution = {_shown(restitution)} needs rigid=True: "
+                "solref says how soft contacts bounce"
             )
         if servo is not None:
             _check_number("servo", servo, " s", float(model.opt.timestep), _LARGEST)
@@ -94,7 +96,7 @@ class Coulomb:
         _check_number("depth", depth, "", 0.0, 0.1)
         law = Law(
             bool(rigid),
-            float(restitution),
+            bounces,
             float(servo or 0.0),
             float(share),
             depth=float(depth),
@@ -420,6 +422,22 @@ def _shown(value: Any) -> str:
     """What was given, in a few words of one line."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 40 else f"{text[:40]}…"
+
+
+def _restitution(model: Any, given: Any) -> tuple[float, ...]:
+    """That of each geom, or none if nothing bounces; `ValueError` for others than 0 … 1."""
+    if isinstance(given, (list, tuple, np.ndarray)):
+        if np.shape(given) != (model.ngeom,):
+            shape = "×".join(map(str, np.shape(given)))
+            raise ValueError(
+                f"restitution has {shape} values; one number, or one for each of {model.ngeom} geoms"
+            )
+        values = list(given)
+    else:
+        values = [given] * model.ngeom
+    for k, value in enumerate(values):
+        _check_number("restitution" if value is given else f"restitution[{k}]", value, "", 0.0, 1.0)
+    return tuple(map(float, values)) if any(values) else ()
 
 
 def _check_friction(model: Any) -> None:

@@ -85,7 +85,7 @@ def find_forces(model: Any, data: Any, memory: Any) -> float:
 
 @kernel
 def store_forces(memory: Any, found: bool) -> None:
-    """Store what contacts bear, in the axes of their bodies: forces found, or remembered before."""
+    """Store what contacts bear, in the axes of their geoms: forces found, or remembered before."""
     contacts, rows = contacts_of(memory), rows_of(memory)
     for i in range(memory.contacts):
         contact = contacts[i]

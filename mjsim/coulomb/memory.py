@@ -36,7 +36,6 @@ CONTACT = np.dtype(
         ("normal", _f8, 3),
         ("gap", _f8),  # m; negative where bodies overlap
         ("load", _f8),  # normal force, N
-        ("load_before", _f8),  # that of a rigid contact in the step before, N
         # friction in the axes of both geoms: geom, axis, force (N) or moment (N m)
         ("friction", _f8, (2, 3, 2)),
         ("speed", _f8, 3),  # of slip, by the last Jacobian and present velocities, m s-1
@@ -78,9 +77,11 @@ ROW = np.dtype(
         ("length", _i4),
         ("R", _f8),  # regularisation: acceleration per force, kg-1
         ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
-        ("remembered", _f8),  # force of the step before, N
+        ("remembered", _f8),  # force of the step before, or of the last solution of this one, N
         ("held", _f8),  # the part of it that it keeps without giving way, N
-        ("residual", _f8),  # J qacc less the reference, m s-2
+        # J qacc (after `multiply`), less the reference (`subtract_references`), less R times what is
+        # held, and of normal rows with the shift (`find_forces`, `find_residuals`), m s-2
+        ("residual", _f8),
         ("force", _f8),  # as found, N
         ("limit", _f8),  # the most that a dry joint bears, N or N m
     ],
@@ -116,6 +117,7 @@ MEMORY = np.dtype(
         ("law", LAW),
         *((name, _i8) for name in ("address", "model", "data")),  # of this, mjModel and mjData
         *((name, _f8) for name in ("time", "timestep", "called")),  # of the last step, call; s
+        ("bounces", _i8),  # how many geoms have a restitution: all or none
         ("least", _f8),  # distance by which contacts move at least where points are put back, m
         # counts: contacts now and before; rows; those of dry friction, now and before; bodies
         *((name, _i8) for name in ("contacts", "contacts_before", "rows", "dry", "dry_before")),
@@ -132,6 +134,7 @@ MEMORY = np.dtype(
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
+        ("restitution_at", _i8),
     ],
     align=True,
 )
@@ -195,6 +198,8 @@ class Simulation:
         self.bodies = self._own("body", free_bodies(model) if law.rigid else np.zeros(0, FREE_BODY))
         record["free_bodies"] = len(self.bodies)
         self._own("point", np.zeros(MJ_CONTACT.itemsize // 8, np.int64))
+        record["bounces"] = len(law.restitution)
+        self._own("restitution", np.array(law.restitution, np.float64))
         self._own("xpos", np.zeros((model.ngeom, 3)))
         self._own("xmat", np.zeros((model.ngeom, 9)))
         self.make_room(16, 64, 64 * min(model.nv, 16))

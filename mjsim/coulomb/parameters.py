@@ -15,7 +15,8 @@ class Law:
     """What a `Coulomb` is asked for, and the numbers that docs/friction.md decided by a table each."""
 
     rigid: bool = False
-    restitution: float = 0.0
+    restitution: tuple[float, ...] = ()
+    """Of each geom; two in contact have the larger one, as of friction. None: nothing bounces."""
     servo: float = 0.0
     """Time in which contacts lose their depth, s; 0: never."""
     share: float = 5e-2
@@ -43,14 +44,16 @@ class Law:
     def record(self) -> np.void:
         """The same as an item of `LAW`."""
         values: Any = np.zeros((), LAW)
-        values[()] = dataclasses.astuple(self)
+        values[()] = tuple(getattr(self, name) for name in LAW.names or ())
         return values[()]  # type: ignore[no-any-return]
 
 
 _KINDS = {"bool": np.bool_, "int": np.int64, "float": np.float64}
+_fields = {each.name: str(each.type) for each in dataclasses.fields(Law)}
 LAW = np.dtype(
-    [(each.name, _KINDS[str(each.type)]) for each in dataclasses.fields(Law)], align=True
+    [(name, _KINDS[kind]) for name, kind in _fields.items() if kind in _KINDS], align=True
 )
+"""What compiled code reads of it; restitution is an array of the memory."""
 
 CCD_TOLERANCE = 1e-10
 """To which colliders find the points of rigid contacts; MuJoCo's own is 1e-6."""
@@ -82,10 +85,13 @@ the shortest."""
 SOFTER = 100.0
 """How much larger R is in Newton's method, until what contacts hold takes its part away."""
 FALLING = 0.1
-"""Part to which the error must fall from one solution to the next for another one."""
+"""Part to which the error of rigid contacts must fall by a solution for another one to be tried."""
 OVER = 0.75
 """Part of a time step after which the next one has begun: stages of Runge and Kutta are in one."""
 NEXT = 1.5
 """Time steps up to which a step is the next one."""
+STUCK = 100.0
+"""Load above which a rigid contact isn't pushed out of its depth, in units of a weight: bodies that
+can't part would be pushed for ever, by ever larger forces."""
 BOUNCES = 2.0
 """Speed of approach that bounces at least, in units of what gravity adds in a step."""

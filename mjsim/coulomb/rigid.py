@@ -17,7 +17,7 @@ from .contacts import smaller_radius
 from .engine import integers, mj_factorM, mj_projectConstraint, reals
 from .friction import shift
 from .memory import SLIDES, bodies_at, contacts_of, rows_of
-from .parameters import APART, BOUNCES, ITERATIONS, USUAL_STEP
+from .parameters import APART, BOUNCES, ITERATIONS, STUCK, USUAL_STEP
 
 AFFINE, JOINT = int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtTrn.mjTRN_JOINT)
 SLIDE, BIASES = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjNBIAS)
@@ -37,15 +37,11 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
     for i in range(memory.contacts):
         contact = contacts[i]
         normal, first = rows[contact.address], contact.address
-        lasting = min(normal.remembered, contact.load_before)  # not the force of a blow
-        contact.load_before = normal.remembered
-        fastest = max(h * gravity, h * estimate[first] * lasting)
-        goal = velocity_to_ask_for(model, memory, contact, fastest)
-        if law.restitution > 0:
-            fall = h * max(-normal.residual, 0.0)
-            goal = max(
-                goal, rebound(law.restitution, contact.gap, velocity[first], fall, h, gravity)
-            )
+        stuck = estimate[first] * normal.remembered > STUCK * gravity
+        goal = velocity_to_ask_for(model, memory, contact, 0.0 if stuck else h * gravity)
+        if memory.bounces:
+            fall, share = h * max(-normal.residual, 0.0), restitution_of(memory, contact)
+            goal = max(goal, rebound(share, contact.gap, velocity[first], fall, h, gravity))
         factor = law.softness * estimate[first] / R[first]
         for r in range(first, first + contact.dim):
             R[r] *= factor
@@ -64,6 +60,13 @@ def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -
 
 
 @kernel
+def restitution_of(memory: Any, contact: Any) -> float:
+    """Share of its normal speed with which a contact parts after a blow: the larger of its geoms'."""
+    given = reals(memory.restitution_at, memory.bounces)
+    return float(max(given[contact.geoms[0]], given[contact.geoms[1]]))
+
+
+@kernel
 def rebound(
     restitution: float, gap: float, speed: float, fall: float, h: float, gravity: float
 ) -> float:
@@ -76,7 +79,7 @@ def rebound(
     above = max(gap, 0.0)
     energy = speed * (speed - fall) / 2 + fall / h * above
     square = fall**2 / 4 + 2 * (restitution**2 * energy - fall / h * above)
-    return math.sqrt(max(square, 0.0)) - fall / 2
+    return math.sqrt(square) - fall / 2 if square > 0 else -math.inf  # it wouldn't come so high
 
 
 @kernel

@@ -15,6 +15,7 @@ from .contacts import (
     match,
     nothing_moved,
     put_points_back,
+    read_gaps,
     remember_forces,
 )
 from .engine import (
@@ -50,18 +51,21 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     memory.model, memory.data = m, d
     known, over, since = begin(model, data, memory)
     if data.ncon == 0 and not memory.law.rigid:  # nothing touches: all is MuJoCo's own
-        forget(memory)
+        forget_contacts(memory)
         return
     if memory.law.rigid:
         add_dampers(model, data, memory)
     still = known and nothing_moved(model, data, memory)
     if still:
+        read_gaps(data, memory)
         keep_forces(memory, over)
     else:
         hand_on(model, data, memory, known, over)
         find(model, data, memory)
-        lost = match(model, data, memory) > memory.least and put_points_back(model, data, memory)
-        if lost or leave_added_points_out(model, data, memory):
+        anew = False
+        if match(model, data, memory) > memory.least:
+            anew = put_points_back(model, data, memory)
+        if anew or leave_added_points_out(model, data, memory):
             find(model, data, memory)
             match(model, data, memory)
         copy_jacobians(model, data, memory)
@@ -77,7 +81,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     if memory.law.rigid:
         stiffen(model, data, memory, gravity)
         if data.nefc != memory.rows:  # MuJoCo's memory was too small, and it has dropped all rows
-            forget(memory)
+            forget_contacts(memory)
             return
     elif memory.law.servo:
         take_depth_away(model, data, memory)
@@ -122,7 +126,7 @@ def begin(model: Any, data: Any, memory: Any) -> Any:
 
 
 @kernel
-def forget(memory: Any) -> None:
+def forget_contacts(memory: Any) -> None:
     """Forget all contacts."""
     memory.contacts, memory.rows, memory.dry, memory.ncon = 0, 0, 0, 0
     memory.pending, memory.stored = 0, 0
@@ -177,9 +181,10 @@ def solve(model: Any, data: Any, memory: Any, enough: float) -> None:
     """Solve for the accelerations, until contacts slip as predicted, to `enough`, m s-2.
 
     Of rigid contacts Newton's method finds slip and forces, for softer ones. Then MuJoCo solves, as
-    it will in the step itself, until what was predicted is what is found.
+    it will in the step itself, until what was predicted is what is found; of rigid ones for as long
+    as the error still falls tenfold. Friction at mid step is known last, and asks for a solution more.
     """
-    start, last, slides = reals(data.qacc_warmstart, model.nv), math.inf, memory.law.rigid
+    start, last, mid_step_due = reals(data.qacc_warmstart, model.nv), math.inf, memory.law.rigid
     mj_fwdActuation(memory.model, memory.data)
     mj_fwdAcceleration(memory.model, memory.data)
     memory.solves += 1
@@ -197,13 +202,13 @@ def solve(model: Any, data: Any, memory: Any, enough: float) -> None:
         hold_what_was_found(memory)
         good = worst <= enough and (not memory.law.rigid or worst > FALLING * last)
         if good or worst <= EXACT * enough:
-            if not slides:
+            if not mid_step_due:
                 return
             multiply(model, data, memory)
             subtract_references(memory)
             if not oppose_slip_at_mid_step(model, data, memory):
                 return
-            slides, worst = False, math.inf
+            mid_step_due, worst = False, math.inf
         last = worst
     memory.unsolved += 1
 

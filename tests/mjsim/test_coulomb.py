@@ -536,3 +536,49 @@ def test_what_lies_on_its_smooth_side_stays(shape):
     Coulomb(model, rigid=True).step(data, 1000)
     assert np.abs(data.qvel).max() < 1e-6
     assert model.opt.ccd_tolerance == 1e-6
+
+
+OVERLAPS = {
+    "ball joint in the floor": '<body pos="0 0 .05"><joint type="ball"/>'
+    '<geom type="box" size=".1 .05 .08" pos=".03 .02 0"/></body>',
+    "hinge in the floor": '<body pos="0 0 .05"><joint axis="1 .3 .2"/>'
+    '<geom type="box" size=".1 .05 .08" pos=".03 .02 0"/></body>',
+    "wedged": '<geom type="box" size=".1 .1 .1" pos=".16 0 .1"/>'
+    '<geom type="box" size=".1 .1 .1" pos="-.16 0 .1"/><body pos="0 0 .1" euler="0 10 5">'
+    '<freejoint/><geom type="box" size=".08 .05 .1"/></body>',
+    "arm in a wall": '<geom type="box" size=".1 .5 .5" pos=".5 0 .5"/><body pos="0 0 .5">'
+    '<joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .45 0 .1" size=".05"/></body>',
+}
+
+
+@WAYS
+@pytest.mark.parametrize("bodies", OVERLAPS.values(), ids=OVERLAPS)
+def test_geoms_that_cannot_part_come_to_rest(rigid, bodies):
+    """What would push them out of each other would do work for ever."""
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+    )
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
+    law.step(data, 4000)
+    assert np.abs(data.qvel).max() < 1e-6
+
+
+def test_restitution_of_each_geom():
+    """A ball bounces by what it has, another one not at all."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="plane" size="9 9 1"/>'
+        '<body pos="0 0 1"><freejoint/><geom size=".05"/></body>'
+        '<body pos="1 0 1"><freejoint/><geom size=".05"/></body></worldbody></mujoco>'
+    )
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=True, restitution=[0.0, 0.8, 0.0])
+    heights = []
+    for _ in range(450):  # until .9 s: the first falls for .44 s
+        law.step(data)
+        heights.append(data.qpos[[2, 9]].copy())
+    after = np.array(heights)[230:]
+    assert after[:, 0].max() - 0.05 == pytest.approx(0.8**2 * 0.95, rel=1e-2)
+    assert after[:, 1].max() < 0.0501
+    with pytest.raises(ValueError, match="restitution has 2 values; one number, or one for each"):
+        Coulomb(model, rigid=True, restitution=[0.5, 0.5])
+    with pytest.raises(ValueError, match=r"restitution\[1\] = 1.5 must be from 0 to 1"):
+        Coulomb(model, rigid=True, restitution=[0.0, 1.5, 0.0])
