@@ -3,9 +3,17 @@
 import pytest
 from hypothesis import settings
 
+from compare.commands import waiting
+
 # Times vary between machines: a deadline would be an assertion on wall time.
 settings.register_profile("dualball", deadline=None, derandomize=True)
 settings.load_profile("dualball")
+
+
+@pytest.fixture(autouse=True)
+def no_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No command says that it takes long, however busy the machine is."""
+    monkeypatch.setattr(waiting, "SOON", 1e6)
 
 
 @pytest.hookimpl(trylast=True)  # of those that are left

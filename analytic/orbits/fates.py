@@ -142,6 +142,7 @@ def attractors(
     seed: int = 0,
     lasting: float | None = None,
     run: Runs = event_driven,
+    progress: Callable[[float], None] = lambda done: None,
 ) -> list[Attractor]:
     """The attractors that balls approach from many starts, the most frequent first.
 
@@ -150,6 +151,7 @@ def attractors(
     starts : number of random starts (`ensemble.random_starts`), or states of shape (n, 6 or 8)
     lasting : how long a run is followed at most, s; `LASTING`/c if None
     run : the simulator that carries out the runs
+    progress : called with the share of the starts that came to an attractor, from time to time
 
     Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without
     `lasting`."""
@@ -177,6 +179,7 @@ def attractors(
                 if group is None:
                     groups.append(group := [])
                 group.append(fate)
+        progress(sum(map(len, groups)) / len(states))
         following = goes_on + [
             (each, next(each)) for each in islice(todo, SIDE_BY_SIDE - len(goes_on))
         ]

@@ -39,13 +39,17 @@ def run(args: argparse.Namespace) -> int:
         return [carry_out(running.task(args, p, x0=State.of(x0), **lasting)) for x0 in x0s]
 
     rows = []
-    for p in grid(options.parameters(args), axes):
-        own = (
-            {}
-            if args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p)
-            else {"run": simulate}
+    sets = list(grid(options.parameters(args), axes))
+    for k, p in enumerate(sets):
+        usual = args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p)
+        own: dict[str, Any] = {} if usual else {"run": simulate}
+
+        def tell(done: float, k: int = k) -> None:
+            args.tell((k + done) / len(sets))
+
+        attractors = analytic.attractors(
+            p, starts, seed=args.seed, lasting=args.time, progress=tell, **own
         )
-        attractors = analytic.attractors(p, starts, seed=args.seed, lasting=args.time, **own)
         orbits = [each.fate.orbit for each in attractors if each.fate.orbit]
         branches = [
             orbit_branch.follow(orbit, name, *ends)

@@ -112,6 +112,7 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
         *(word.strip() for word in words),
     ]  # a page says with what it was written
     own = hasattr(args, "quiet") or getattr(args, "view", False) or args.run == "look.explore"
-    telling = nullcontext() if own or getattr(args, "json", False) else waiting.told(words[0])
+    quiet = own or getattr(args, "json", False)
+    telling = nullcontext(lambda done: None) if quiet else waiting.told(words[0])
     with options.no_empty_directories(args), signals.raised(), telling as args.tell:
         return int(run(args))

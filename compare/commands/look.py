@@ -33,7 +33,8 @@ def figures(args: argparse.Namespace) -> int:
         check_names(args.figure, list(chosen), "figure")
         chosen = {name: chosen[name] for name in args.figure}
     formats = args.format or ["svg"]
-    for name, gap in registry.write(args.output, chosen, formats):
+    for k, (name, gap) in enumerate(registry.write(args.output, chosen, formats), 1):
+        args.tell(k / len(chosen))
         files = [name] if gap else [f"{name}.{suffix}" for suffix in formats]
         for file in files:
             print(f"{args.output / file}: {gap or 'written'}")

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() as scratch, signals.noted() as heard:
         as_table = options.is_table(args.output)
         path = Path(scratch) / "run.h5" if as_table or not args.output else args.output
-        failure = store(task, path, stop=lambda: bool(heard), tell=args.tell or (lambda done: None))
+        failure = store(task, path, stop=lambda: bool(heard), tell=args.tell)
         path = failed_path(path) if failure else path
         kept = failed_path(args.output) if args.output and failure else args.output
         if as_table:
@@ -128,7 +128,7 @@ def collect(args: argparse.Namespace) -> int:
     """Gather the runs of a directory into one file."""
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "runs.h5" if options.is_table(args.output) else args.output
-        count = collection.collect(args.directory, path, args.workers)
+        count = collection.collect(args.directory, path, args.workers, args.tell)
         of = collection.read(path)
         if path != args.output:
             table.write(args.output, collection.labelled(of))

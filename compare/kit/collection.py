@@ -11,7 +11,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -49,11 +49,17 @@ all that determines the run, its `identity`, and one of its `numbers`."""
 _HELD = "steady", "identity", "numbers"
 
 
-def collect(directory: Path, output: Path, workers: int = 0) -> int:
+def collect(
+    directory: Path,
+    output: Path,
+    workers: int = 0,
+    progress: Callable[[float], None] = lambda done: None,
+) -> int:
     """Gather all runs of a directory, whole ones and failed ones, ordered by what varies; return
     their number.
 
     One that is stored twice is taken once. So many processes read the files; 0 is this one.
+    `progress` is called with the share of them that is read.
 
     Raises `StorageError` if there are none, the output can't be written, or, with their names, some
     can't be read or hold the same run twice."""
@@ -74,7 +80,9 @@ def collect(directory: Path, output: Path, workers: int = 0) -> int:
     shares = [files[k : k + SHARE] for k in range(0, len(files), SHARE)]
     parts, problems = [], list[str]()
     with processes(workers) as work:
-        for found, unread in work.map(partial(_columns_of_files, directory), shares):
+        gathered = work.map(partial(_columns_of_files, directory), shares)
+        for k, (found, unread) in enumerate(gathered, 1):
+            progress(k / len(shares))
             parts += [found] if found else []
             problems += unread
     table = {

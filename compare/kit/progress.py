@@ -43,7 +43,8 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
     """Yield a function that shows progress on standard error, which is never silent for longer than
     `INTERVAL`.
 
-    `counted` if what is done are runs, whose number is to be shown, too.
+    `counted` if what is done are runs, whose number is to be shown, too. As long as the total is 0
+    all is being made ready, and nothing is said of the time that is left.
     """
     if quiet:
         yield show_nothing
@@ -65,19 +66,21 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
             yield show
     else:  # what is being done at once, and how far it is every `INTERVAL`, whatever happens
         began, ended = time.monotonic(), threading.Event()
-        before, last = -1, ("starting", 0, 0, 0)
+        since, before, last = began, -1, ("", 0, 0, 0)
 
         def remember(what: str, done: int, total: int, failed: int) -> None:
-            nonlocal before, last
-            if before < 0:
-                before = done  # what an earlier session did is no measure of how fast this one is
+            nonlocal since, before, last
+            if what != last[0] and (before < 0 or not total):
                 print(what, file=sys.stderr, flush=True)
+            if before < 0 or not total:
+                # What an earlier session did, or getting ready, is no measure of how fast this is.
+                since, before = time.monotonic(), done
             last = what, done, total, failed
 
         def print_progress() -> None:
             while not ended.wait(INTERVAL):
                 what, done, total, failed = last
-                rate = (time.monotonic() - began) / (done - before) if done > before >= 0 else 0.0
+                rate = (time.monotonic() - since) / (done - before) if done > before >= 0 else 0.0
                 left = (
                     f", about {rate * (total - done):.0f} s to go" if rate and total > done else ""
                 )

@@ -1,19 +1,73 @@
-"""A command that takes long says that it is at work, and how far it is."""
+"""A command that takes long says that it is at work, how far it is, and that it compiles."""
 
 import time
 
+import numba
+import pytest
+
+import analytic
 from compare.commands import waiting
+from compare.kit import collection, progress
+from model import Parameters
+from tests.commands import carried_out
 
 
-def test_only_what_takes_long_says_so(monkeypatch, capsys):
+@pytest.fixture
+def soon(monkeypatch):
+    """Progress is told at once, and often."""
+    monkeypatch.setattr(waiting, "SOON", 0.1)
+    monkeypatch.setattr(progress, "INTERVAL", 0.3)
+
+
+def test_only_what_takes_long_says_so(soon, capsys):
     with waiting.told("quick"):
         pass
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(waiting, "LATER", 0.05)
-    monkeypatch.setattr("compare.kit.progress.INTERVAL", 0.3)
     with waiting.told("slow") as tell:
         tell(0.25)
         time.sleep(1.5)
     said = capsys.readouterr().err.splitlines()
     assert said[0] == "slow"
     assert "s: slow, 25%" in said[1]
+
+
+def test_compiling_says_so_and_is_no_measure_of_what_is_left(soon, capsys):
+    @numba.njit
+    def slow(x):
+        return x
+
+    @numba.extending.register_jitable
+    def waits(x):
+        return x
+
+    compiled = slow._compiler.compile
+
+    def compile_slowly(*given):
+        time.sleep(2.0)
+        return compiled(*given)
+
+    slow._compiler.compile = compile_slowly
+    with waiting.told("it") as tell:
+        slow(1)
+        for k in range(1, 11):
+            tell(k / 20)
+            time.sleep(0.1)
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "it: compiling, once on this machine"
+    left = [float(line.split("about ")[1].split()[0]) for line in said if "to go" in line]
+    assert left
+    assert max(left) < 2.5  # of compiling it would be four
+
+
+def test_attractors_and_collections_say_how_far_they_are(tmp_path, capsys):
+    told = list[float]()
+    p = Parameters.named("reference")
+    analytic.attractors(p, 3, lasting=2.0, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    runs = tmp_path / "runs"
+    line = "sweep --vary omega_0=5:10:20 --time 0.01 --engine event --workers 0 --batch 1 --quiet"
+    assert carried_out(capsys, *line.split(), "-o", runs)[0] == 0
+    told.clear()
+    collection.collect(runs, tmp_path / "all.h5", 0, told.append)
+    assert told == [0.5, 1.0]
