@@ -13,11 +13,12 @@ import json
 import socket
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import numpy as np
 import numpy.typing as npt
@@ -28,12 +29,16 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.flowmeter import real_fluid
 from compare.branches import slipping_curve, stable_ends
+from compare.kit import steady
 from compare.kit.doubt import model_warning
 from compare.kit.pages import typeset
 from compare.kit.style import COLOURS
+from compare.report import meter
 from compare.subjects.thresholds.figures import TINTS
+from compare.view import cases
 from compare.view import page as motion
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
+from model.parameters import REACH, parse_number
 
 HOST = "127.0.0.1"
 LASTS, RATE = 10.0, 60
@@ -55,6 +60,12 @@ SLIDERS: dict[str, tuple[str, float, float, float]] = {
 }
 """Text, range and step of each."""
 SYMBOLS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄"}
+LIMITS = (
+    "The model is the paper's: a rigid ball with Coulomb's friction in a fluid that turns like a rigid "
+    "body. Left out are rolling resistance, the fluid's inertia and its torque on the spinning ball. "
+    "In water or oil that torque changes the numbers by tens of per cent."
+)
+"""What a user of the page may not take from it."""
 Figure = dict[str, Any]
 """Data and layout of a figure of plotly."""
 
@@ -79,6 +90,25 @@ def with_value(p: Parameters, name: str, value: float | str) -> Parameters:
         return p.replace(c=float(value) * np.sqrt(p.g / p.R))
     more = {"nu_f": OIL} if name == "drag" and value != drag.STOKES and p.nu_f == 0 else {}
     return p.replace(**{name: value}, **more)
+
+
+def address(tab: Tab, first: Parameters) -> str:
+    """What the address of the page says: all that is not as it was `first`, and the start."""
+    kept = {name: f"{getattr(tab.p, name):.6g}" for name in SLIDERS} | {"drag": tab.p.drag}
+    was = {name: f"{getattr(first, name):.6g}" for name in SLIDERS} | {"drag": first.drag}
+    said = {name: value for name, value in kept.items() if value != was[name]}
+    if tab.start.omega_c:
+        said["start"] = f"{float(tab.start.omega_c):.6g}"
+    return f"/?{urlencode(said)}" if said else "/"
+
+
+def set_from(tab: Tab, said: Mapping[str, str]) -> None:
+    """Set a tab as an address says; raises `InputError` for what can't be."""
+    for name in (name for name in [*SLIDERS, "drag"] if name in said):
+        value = said[name] if name == "drag" else parse_number(name, said[name], "1", REACH)
+        tab.p = with_value(tab.p, name, value)
+    if "start" in said:
+        tab.start = State(omega_c=parse_number("start", said["start"], "rad s-1", REACH))
 
 
 def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
@@ -190,7 +220,7 @@ def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more
         "margin": {"l": 50, "r": 10, "t": 30, "b": 40}, "hovermode": "closest",
         "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"}, "uirevision": "kept",
     }  # fmt: skip
-    return {"data": data, "layout": layout | more}
+    return {"data": data, "layout": layout | more, "config": {"displayModeBar": False}}
 
 
 def simulated(p: Parameters, start: State) -> Trajectory:
@@ -216,7 +246,8 @@ def in_words(p: Parameters) -> str:
         for each in analytic.stable_solutions(p)
     )
     doubts = "".join(f"{doubt} " for doubt in model_warning(real_fluid.model_error(p)))
-    return f"{doubts}{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
+    said = f"{doubts}{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
+    return f"{said}. {meter.torque(p)}" if p.nu_f and p.omega_0 and p.c else said
 
 
 def serve(p: Parameters, port: int, show: bool) -> None:
@@ -270,19 +301,58 @@ def serve(p: Parameters, port: int, show: bool) -> None:
 
 
 def page(p: Parameters) -> None:
-    """Build the page in a tab of the browser."""
+    """Build the page in a tab of the browser, as its address says."""
     from nicegui import ui
 
     tab, draw = Tab(p), list[Callable[[], None]]()
+    request = ui.context.client.request
+    try:
+        set_from(tab, request.query_params if request else {})
+    except InputError as error:
+        tab = Tab(p)
+        ui.notify(f"The address can't be followed: {error}", type="negative")
+    _heading(ui)
     wide = "flex: 1 1 26rem; min-width: 0"
     with ui.row().classes("w-full"):
-        with ui.column().classes("w-80"):
+        with ui.column().classes("w-80 max-w-full"):
             follow = _controls(ui, tab, draw)
         with ui.column().style(wide):
             _theory(ui, tab, draw, follow)
         with ui.column().style(wide):
             tab.play = _motion(ui, tab)
+    _cases(ui)
+    here = ui.context.client
+
+    def keep_address() -> None:
+        here.run_javascript(f"history.replaceState(null, '', {json.dumps(address(tab, p))})")
+
+    draw.append(keep_address)
     follow()
+
+
+def _heading(ui: Any) -> None:
+    """Say what the page shows, and what its letters mean."""
+    ui.html("<h1>A ball that a fluid takes round in a vessel</h1>", sanitize=False).classes("title")
+    about = (
+        "It touches the floor and the wall. A case has a letter for each: R rolls, S slips, N does "
+        "not touch. Left: move a slider. Middle: which steady motions theory has. Right: the motion, "
+        "simulated anew. The address holds what you set: to share it, copy the link."
+    )
+    ui.html(f"<p>{about}</p><p>{LIMITS}</p>", sanitize=False).classes("text-sm about")
+    ui.add_css(".title h1 { font-size: 1.5rem; line-height: 1.3; margin: 0 }")
+
+
+def _cases(ui: Any) -> None:
+    """Show all cases by picture and in words."""
+    with (
+        ui.expansion("The nine cases: floor below, wall right", value=True).classes("w-full cases"),
+        ui.row(),
+    ):
+        for case in Case:
+            text = f"{cases.picture(case)}<div><b>{case.name}</b> {cases.in_words(case)}</div>"
+            ui.html(text, sanitize=False).classes("text-sm").style(
+                "display: flex; gap: .5rem; width: 13rem; align-items: center"
+            )
 
 
 def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[], None]:
@@ -395,11 +465,14 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
 
 def _motion(ui: Any, tab: Tab) -> Callable[[], None]:
     """Build the part with the motion in 3-D; return a function that hands it the run of the tab."""
+    line = ui.html("", sanitize=False).classes("text-sm steady")
     within = ui.element("iframe").props('src="/motion" title="motion"').classes("w-full motion")
     within.style("height: 48rem; border: 0")
 
     def play() -> None:
         if tab.run and len(tab.run.time):
+            told = f"After {tab.run.time[-1]:.3g} s: {steady.of_run(tab.run)}"
+            line.set_content(typeset(told.replace("omega_c", "ω_c")))
             frames = json.dumps(motion.frames(tab.run, tab.run.time))
             within.client.run_javascript(
                 f"getHtmlElement({within.id}).contentWindow.postMessage({frames}, origin)"

@@ -11,6 +11,7 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 from unittest import mock
+from urllib.parse import parse_qsl
 
 import numpy as np
 import pytest
@@ -235,6 +236,33 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     assert run.omega_c[0] == pytest.approx(60, abs=1.5)
 
 
+def test_a_link_is_a_setting_and_a_telephone_shows_all(browser, address):
+    page = browser.new_page(viewport={"width": 390, "height": 844})
+
+    def shows(where, text):
+        page.wait_for_function(
+            "([w, t]) => document.querySelector(w)?.innerText.includes(t)",
+            arg=[where, text],
+            timeout=120_000,
+        )
+
+    page.goto(f"{address}?omega_0=25&eta=0.25&start=5")
+    shows(".said", "SS at ωc = ")
+    shows(".about", "Left out are rolling resistance")
+    shows(".cases", "NR is off the floor, rolls on the wall")
+    shows(".steady", "After 10 s: ")
+    assert page.locator(".cases svg").count() == len(Case)
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    number = page.locator("input[type=number]").last
+    number.fill("12")
+    number.press("Tab")
+    page.wait_for_function("location.search == '?eta=0.25&start=5'")
+    page.goto(f"{address}?mu=-3")
+    page.wait_for_selector("text=The address can't be followed: mu = -3 is out of range")
+    shows(".said", "RR at ωc = 12")
+    page.close()
+
+
 @pytest.mark.slow
 def test_a_browser_that_is_busy_keeps_its_set(browser, address):
     """As one that draws in 3-D without a graphics card on a busy machine: its connection is lost
@@ -313,6 +341,18 @@ def test_every_set_has_its_figures_and_a_motion(changes):
     assert explore.with_value(p, "drag", "schiller-naumann").nu_f == explore.OIL
     with pytest.raises(InputError, match="j = 2"):
         explore.with_value(p, "j", 2.0)
+
+
+def test_an_address_tells_a_setting():
+    tab = explore.Tab(P)
+    assert explore.address(tab, P) == "/"
+    said = {"mu": "0.3", "kappa": "0.5", "omega_0": "25", "drag": "quadratic", "start": "5"}
+    explore.set_from(tab, said | {"other": "1"})
+    assert (tab.p.mu, tab.p.omega_0, tab.start.omega_c) == (0.3, 25.0, 5.0)
+    assert dict(parse_qsl(explore.address(tab, P)[2:])) == said
+    for name, value in (("mu", "x"), ("mu", "-1"), ("start", "nan"), ("drag", "mine")):
+        with pytest.raises(InputError, match=name):
+            explore.set_from(explore.Tab(P), {name: value})
 
 
 def test_explore_says_where_the_model_does_not_hold():
