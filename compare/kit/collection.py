@@ -22,7 +22,8 @@ import numpy.typing as npt
 from rich.table import Table
 
 import analytic
-from compare.kit import pages, steady
+from analytic.flowmeter import real_fluid
+from compare.kit import drawing, pages, steady
 from compare.kit.statistics import settled_case
 from compare.kit.workers import processes
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
@@ -41,6 +42,8 @@ MEANS, MEANS_VERSION = "dualball-means", 1
 """What a file of the means of a batch says of itself."""
 NAMED = 5
 """Most files that can't be gathered, and most runs of a file, that are named one by one."""
+DOUBTED = 16
+"""Most runs of a figure that are asked whether the model holds for them."""
 SHARE = 16
 """Files that a process gathers at a time."""
 Columns = dict[str, npt.NDArray[Any]]
@@ -335,7 +338,15 @@ def draw(of: Columns) -> Figure:
     axes.set(xlabel=label, ylabel=f"{style.symbol('omega_c')} (rad/s)")
     axes.grid(alpha=0.3)
     style.legend(axes)
+    some = range(0, len(x), math.ceil(len(x) / DOUBTED))
+    drawing.warn_of(figure, max(real_fluid.model_error(_parameters(of, k)) for k in some))
     return figure
+
+
+def _parameters(of: Columns, k: int) -> Parameters:
+    """The parameters of the k-th run; older collections have not all of them."""
+    names = (f.name for f in dataclasses.fields(Parameters) if f.name in of)
+    return Parameters(**{name: of[name][k : k + 1].tolist()[0] for name in names})
 
 
 def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:

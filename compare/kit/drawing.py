@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analytic.flowmeter import real_fluid
+from compare.kit.doubt import model_warning
 from compare.kit.record import Check, Measurement, Records
 from model import Parameters, Trajectory, storage
 from model.files import write_bytes, write_text
@@ -110,9 +113,23 @@ def diagram(
 ) -> Drawing:
     """The figure of a `Diagram`: of one set with what was measured with it, or of any other set
     without."""
-    return Drawing(
-        title, partial(select, name, set, measured), draw, claims, partial(Diagram, name)
-    )
+    chosen = partial(select, name, set, measured)
+    return Drawing(title, chosen, partial(_doubted, draw), claims, partial(Diagram, name))
+
+
+def _doubted(draw: Callable[[Diagram], tuple[Figure, str]], of: Diagram) -> tuple[Figure, str]:
+    """A figure of a set and its caption, both with a warning if the model doesn't hold for it."""
+    figure, caption = draw(of)
+    return figure, " ".join([caption, *warn_of(figure, real_fluid.model_error(of.p))])
+
+
+def warn_of(figure: Figure, off: float) -> list[str]:
+    """Write the warning of `model_warning` above a figure, and return it."""
+    doubts, above = model_warning(off), figure.get_suptitle()
+    if doubts:
+        lines = textwrap.wrap(doubts[0], round(13 * figure.get_figwidth()))
+        figure.suptitle("\n".join([above, *lines] if above else lines), fontsize=9)
+    return doubts
 
 
 def select(name: str, set: str, measured: _Rows | None, evidence: Evidence) -> Diagram:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
-from compare.kit import pages, steady
+from analytic.flowmeter import real_fluid
+from compare.kit import drawing, pages, steady
 from compare.testing import UNITS, Series, common_times, difference
 from model import Case, Flow, InputError, Parameters, Trajectory, kinematics, storage
 from model import table as storage_table
@@ -270,4 +271,5 @@ def draw(run: Trajectory) -> Figure:
     panels[-1].set_xlabel("time (s)")
     told = steady.of_run(run)
     figure.suptitle(f"{run.header.engine}: {style.named(p)}\nsteady value: {told}", fontsize=11)
+    drawing.warn_of(figure, real_fluid.model_error(p.replace(omega_0=float(run.omega_0[-1]))))
     return figure

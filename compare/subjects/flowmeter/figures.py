@@ -3,7 +3,6 @@ designed meter."""
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator
 from typing import Any
 
@@ -18,8 +17,7 @@ from analytic.flowmeter.design import THRESHOLDS, Design
 from analytic.simulation import simulator
 from compare.branches import check_thresholds, fold_state, slipping, stable_ends
 from compare.kit import style
-from compare.kit.doubt import model_warning
-from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where
+from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where, warn_of
 from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
 from model import Case, Contact, Parameters
@@ -167,7 +165,7 @@ def draw_calibration(
     if swirl:
         scale: Any = (lambda w: w / swirl, lambda Q: Q * swirl)
         axes.secondary_xaxis("top", functions=scale).set_xlabel("volume flow (m³/s)")
-    figure.suptitle("\n".join(textwrap.wrap(" ".join(model_warning(off)), 90)), fontsize=9)
+    warn_of(figure, off)
     style.legend(axes, loc="upper left")
     names_within(axes)
     return figure
