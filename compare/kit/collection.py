@@ -381,7 +381,7 @@ def unsettled(about: dict[str, Any]) -> str:
         return ""
     return (
         f"{about['unsettled']} of {about['runs']} runs have not settled: their omega_c may change "
-        f"by up to {100 * about['drift']:.2g} % yet"
+        f"by up to {steady.percent(about['drift'])} % yet"
     )
 
 

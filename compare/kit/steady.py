@@ -97,8 +97,13 @@ def in_words(flow: Flow, lasts: float, of: Mapping[str, float] | None) -> str:
     shown = f"{mean:.{min(digits, 9)}f}" if drift else f"{mean:.9g}"
     said = f"omega_c = {shown} ± {drift:.1g} rad/s over the last quarter"
     if off > DRIFT:
-        return f"not settled: {said}, which may change by {100 * off:.2g} % yet"
+        return f"not settled: {said}, which may change by {percent(off)} % yet"
     return said
+
+
+def percent(share: float) -> str:
+    """A share in per cent as text, two digits of it."""
+    return f"{float(f'{100 * share:.2g}'):g}"
 
 
 def share(omega_c: Array, drift: Array, omega_0: Array) -> Array:
