@@ -37,7 +37,13 @@ def run(args: argparse.Namespace) -> int:
             pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left")
         )
         return 0
-    console.print(head())
+    titles = iter([head()])
+
+    def announce(verdict: Verdict) -> None:
+        for title in titles:  # above the first one, since there may be none
+            console.print(title)
+        console.print(line(verdict), soft_wrap=True)
+
     with progress.reporter(quiet=args.quiet or args.json) as show:
         wanted = {
             "level": Level[args.level.upper()],
@@ -46,8 +52,7 @@ def run(args: argparse.Namespace) -> int:
             "limit": args.limit,
             "engine": args.engine,
         }
-        wanted |= {"workers": running.workers(args), "progress": show}
-        wanted |= {"announce": lambda verdict: console.print(line(verdict), soft_wrap=True)}
+        wanted |= {"workers": running.workers(args), "progress": show, "announce": announce}
         verdicts = validation.validate(args.output, **wanted)
     return _finish(
         verdicts, {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if chosen else set(), args, console

@@ -256,7 +256,7 @@ def test_claims_and_parameters_are_listed_once(monkeypatch, capsys):
             "simulate --sample-interval 100 --time 1",
             "sample_interval = 100 s is out of range: within this run",
         ),
-        ("simulate -o run.csv", "'run.csv' would hold HDF5: its name must end in .h5"),
+        ("simulate -o run.txt", "'run.txt' would hold HDF5 or CSV: its name must end in .h5"),
         (
             "simulate --engine event --timestep 0.1",
             "--timestep is not for event, which takes --rtol and --restitution",
