@@ -1,7 +1,7 @@
 """The law of MuJoCo's contacts, for those of any settled model: depth, creep, hovering, and small
 motions.
 
-Formulas and their derivation: docs/friction.md. The engine says where contacts are, what they
+Formulas and their derivation: docs/forecast.md. The engine says where contacts are, what they
 carry, and how it estimates their inverse mass; the rest is computed from parameters, so that it can
 be computed for other ones, too."""
 

@@ -52,14 +52,15 @@ def write(page: Path, name: str, rows: Rows) -> None:
 
 
 def write_all(tables: Mapping[str, Callable[[], Rows]], what: str, page: str) -> int:
-    """As a program: measure and write all tables of a page, or those named."""
+    """As a program: measure and write all tables that a page has a place for, or those named."""
     parser = argparse.ArgumentParser(description=what)
     parser.add_argument("page", type=Path, metavar="FILE", help=page)
     parser.add_argument(
         "--only", action="append", choices=list(tables), metavar="NAME", help="only this table"
     )
     args = parser.parse_args()
-    for name in args.only or tables:
+    text = args.page.read_text("utf-8")
+    for name in args.only or [each for each in tables if f"<!-- begin: {each} -->" in text]:
         write(args.page, name, tables[name]())
     return 0
 

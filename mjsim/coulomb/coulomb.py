@@ -265,6 +265,11 @@ class Coulomb:
         with self.acting(data):
             mujoco.mj_forward(self.model, data)
 
+    @property
+    def unsolved(self) -> int:
+        """How many steps there were, of all simulations, that didn't come to `share`."""
+        return sum(int(each.record["unsolved"][0]) for each in self._simulations.values())
+
     def step1(self, data: Any) -> None:
         """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
         self._check_halves(data)

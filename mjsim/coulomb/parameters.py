@@ -12,7 +12,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Law:
-    """What a `Coulomb` is asked for, and the numbers that docs/friction.md decided by a table each."""
+    """What a `Coulomb` is asked for, and its numbers; docs/records/law.md shows what some of them decide."""
 
     rigid: bool = False
     restitution: tuple[float, ...] = ()

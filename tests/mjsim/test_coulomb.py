@@ -582,3 +582,17 @@ def test_restitution_of_each_geom():
         Coulomb(model, rigid=True, restitution=[0.5, 0.5])
     with pytest.raises(ValueError, match=r"restitution\[1\] = 1.5 must be from 0 to 1"):
         Coulomb(model, rigid=True, restitution=[0.0, 1.5, 0.0])
+
+
+def test_steps_that_did_not_come_to_their_share_are_counted():
+    """A share that no solution reaches in the steps it may take."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="plane" size="9 9 1"/><body pos="0 0 .3" euler="10 20 0">'
+        f"<freejoint/>{BOX}</body></worldbody></mujoco>"
+    )
+    usual, strict = Coulomb(model), Coulomb(model, share=1e-9)
+    for law in (usual, strict):
+        data = mujoco.MjData(model)
+        data.qvel[:] = 1.0
+        law.step(data, 500)
+    assert usual.unsolved == 0 < strict.unsolved
