@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compare.kit.lab import Lab
-from compare.kit.statistics import Estimate, estimate
+from compare.kit.statistics import Estimate, estimate, uniform
 from compare.kit.tasks import Task
 from model import Trajectory
 
@@ -58,7 +57,7 @@ class Bracket:
     def place(self) -> Estimate:
         """The middle, with the uncertainty of a uniform distribution and the shift."""
         middle = (self.low + self.high) / 2
-        return estimate(middle, bracket=self.width / math.sqrt(12), time_step=self.shift)
+        return estimate(middle, bracket=uniform(self.width / 2), time_step=uniform(self.shift / 2))
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,6 +51,11 @@ class Estimate:
         )
 
 
+def uniform(half: float) -> float:
+    """Standard uncertainty of an error that may be anything up to `half` on either side."""
+    return half / math.sqrt(3)
+
+
 def estimate(value: float, size: float = 1.0, **causes: float) -> Estimate:
     """An estimate whose errors have independent causes, each a standard uncertainty divided by
     `size`."""

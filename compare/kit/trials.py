@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, measurement
 from compare.kit.scales import time_unit
-from compare.kit.statistics import Estimate
+from compare.kit.statistics import Estimate, uniform
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
@@ -96,10 +96,32 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Tria
             )
 
 
-def with_step_error(coarse: float, fine: Estimate) -> Estimate:
-    """The value with the finer step, uncertain by its difference from that with the coarser one,
-    too, in quadrature."""
-    return fine.also(time_step=abs(fine.value - coarse))
+EXTRAPOLATION, DOUBT = 1 / 2, 1 / math.sqrt(12)
+"""By how much the limit of a vanishing step lies beyond the run with half the step, and its standard
+uncertainty, in differences of the two runs.
+
+The error of the finer run is as large as the difference if it is of first order in the step, a third
+of it if of second, and next to none where it is what is left of the start: contacts forget that by a
+factor in each step (`ContactSettings.contact_decay`, up to 0.95), and twice the steps forget much
+more. So it is anything between none and all of the difference: a uniform distribution."""
+
+
+def of_no_step(coarse: float, fine: Estimate) -> Estimate:
+    """The limit of a vanishing step of a number that is a smooth function of it, from the values with
+    a step and with half of it."""
+    change = fine.value - coarse
+    return replace(fine, value=fine.value + change * EXTRAPOLATION).also(
+        time_step=abs(change) * DOUBT
+    )
+
+
+def unlike(changes: Array) -> Array:
+    """Changes (n,) as uncertainties go by them: each by its own size, and by a tenth of the largest.
+
+    Equations couple the numbers, and one may change by little just by chance. (A tenth was chosen
+    after errors of a 45th of the largest change had been seen where the own change was small.)"""
+    sizes = np.abs(changes)
+    return np.asarray(np.hypot(sizes, 0.1 * sizes.max(initial=0.0)))
 
 
 REFINED = 16
@@ -110,19 +132,15 @@ LAG = 3
 HALF_WINDOW, WINDOW_DEGREES = 8, (5, 3)
 """Half the width of a window in the middle of a motion, in steps of the coarser run; degrees of the
 polynomials through it, of which the lower one shows what the degree changes."""
-EXTRAPOLATION, DOUBT = 2 / 3, 1 / 3
-"""Limit of a vanishing step beyond the finer run, and its uncertainty, in differences of the two
-runs: the error is between first order in the step, for the direction of friction, and second, with
-limits of 1 and 1/3."""
 
 
 def lag_error(p: Parameters, refine: int = 1) -> float:
-    """Least uncertainty of a force divided by the weight, as halving the step may by chance change
-    nothing.
+    """Standard uncertainty of a force divided by the weight, where halving the step may by chance
+    change nothing.
 
-    Half the square of the lag `LAG` in units of `time_unit`: the second order, once the first is
-    extrapolated. The steps of `REFINED` may be divided by `refine`."""
-    return (LAG * coarse_step(p) / (REFINED * refine) / time_unit(p)) ** 2 / 2
+    The error is at most half the square of the lag `LAG` in units of `time_unit`: the second order,
+    once the first is extrapolated. The steps of `REFINED` may be divided by `refine`."""
+    return uniform((LAG * coarse_step(p) / (REFINED * refine) / time_unit(p)) ** 2 / 2)
 
 
 def polynomials(

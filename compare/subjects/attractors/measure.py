@@ -34,7 +34,7 @@ from compare.kit.settling import settled_readings
 from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, carry_out, constrained, with_step_error
+from compare.kit.trials import Start, Trial, carry_out, constrained, of_no_step
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
@@ -99,9 +99,7 @@ def hopping(
             break
         row = partial(measurement, lab, protocol, SET, q, tasks=result.tasks, **fine.conditions(q))
         for quantity, value in fine.values.items():
-            yield row(
-                quantity=quantity, value=with_step_error(coarse.values[quantity].value, value)
-            )
+            yield row(quantity=quantity, value=of_no_step(coarse.values[quantity].value, value))
         if k:
             parts = (
                 (result.coarse, DISTURBED),
@@ -114,7 +112,7 @@ def hopping(
             )
             factor = row(
                 quantity="orbit_multiplier",
-                value=with_step_error(slow, estimate(fast, part=abs(fast - later))),
+                value=of_no_step(slow, estimate(fast, part=abs(fast - later))),
             )
             yield if_found(
                 factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s"
@@ -124,7 +122,7 @@ def hopping(
         coarse_birth, fine_birth = (
             birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)
         )
-        yield result.row(lab, "orbit_birth", with_step_error(coarse_birth.value, fine_birth))
+        yield result.row(lab, "orbit_birth", of_no_step(coarse_birth.value, fine_birth))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
@@ -298,7 +296,7 @@ def rebounding(
                 return
             coarse, fine = (tops(run, REBOUNDS_ALONE / 2, REBOUNDS_ALONE).values for run in runs)
             for name in ("orbit_period", "orbit_omega_c"):
-                value = with_step_error(coarse[name].value, fine[name])
+                value = of_no_step(coarse[name].value, fine[name])
                 yield measurement(lab, "rebounding", SET, p, name, value, alone, **at)
 
 
@@ -311,7 +309,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate
     slow, fast, later = (
         float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True)
     )
-    return with_step_error(slow, estimate(fast, part=abs(fast - later)))
+    return of_no_step(slow, estimate(fast, part=abs(fast - later)))
 
 
 def swing(
@@ -343,7 +341,7 @@ def swing(
         yield result.row(
             lab,
             name,
-            with_step_error(coarse, estimate(fine, part=abs(fine - before))),
+            of_no_step(coarse, estimate(fine, part=abs(fine - before))),
             **conditions,
         )
 

@@ -39,7 +39,7 @@ from compare.kit.record import (
 )
 from compare.kit.scales import time_unit
 from compare.kit.settling import Patience, Settled
-from compare.kit.statistics import Estimate, estimate, settled_case
+from compare.kit.statistics import Estimate, estimate, settled_case, uniform
 from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
@@ -148,7 +148,7 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Estimate | None:
     if curve.by == "neighbours" and len(set(map(settling.physical_case, cases))) == 1:
         wide, near = (w[3] - w[0]) / (f[3] - f[0]), (w[2] - w[1]) / (f[2] - f[1])
         bent = (near - wide) / 3
-        return estimate(near + bent, curvature=abs(bent), states=2 * noise / (f[2] - f[1]))
+        return estimate(near + bent, curvature=uniform(abs(bent)), states=2 * noise / (f[2] - f[1]))
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
         secants, middles = np.diff(w[2:]) / np.diff(f[2:]), (f[2:-1] + f[3:]) / 2 - onset
         cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
@@ -157,7 +157,9 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Estimate | None:
         solved = 4 * math.sqrt(2) * noise / (f[3] - f[2])
         placed = parabola[-2] * curve.noise
         bent = abs(float(cubic[-1] - parabola[-1]))
-        return estimate(cubic[-1] - below, degree=bent, states=solved, threshold=abs(placed))
+        return estimate(
+            cubic[-1] - below, degree=uniform(bent), states=solved, threshold=abs(placed)
+        )
     if curve.by == "mean" and cases == [Case.RR, Case.RR, Case.SS]:
         first, rise = w[1] + (onset - f[1]) * (w[1] - w[0]) / (f[1] - f[0]), f[2] - onset
         return estimate((w[2] - first) / rise, 3 / rise, states=noise, threshold=curve.noise)
@@ -331,7 +333,7 @@ def unloading(
         # The difference may be small by chance: at least the median of all trials counts.
         usual = float(np.median([change for *_, change in alike]))
         for result, fine, change in alike:
-            value = fine.also(time_step=max(change, usual) * abs(fine.value))
+            value = fine.also(time_step=uniform(max(change, usual) * abs(fine.value)))
             row = result.row(lab, number.quantity, value, event=number.event)
             yield if_found(row, f"{number.trial}: no {number.quantity}")
 
@@ -367,7 +369,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
             name == BY_SPIN
         ):  # it leaves the floor at a whole step, up to one late or early, which changes its height
             late = step / 2 * float(run.v_y.max())
-            numbers = {Shown(name, "lift", "end"): estimate(run.y[-1], sampling=late)}
+            numbers = {Shown(name, "lift", "end"): estimate(run.y[-1], sampling=uniform(late))}
         return settling.physical_case(settled_case(run)), numbers
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
@@ -406,7 +408,7 @@ def _landed(run: Trajectory) -> dict[Shown, Estimate]:
     sampling = step / math.sqrt(12)
     return {
         Shown(LANDING, "time", "slip at B"): estimate(
-            cubic, degree=abs(cubic - quadratic), sampling=sampling
+            cubic, degree=uniform(abs(cubic - quadratic)), sampling=sampling
         ),
         Shown(LANDING, "time", "landing"): estimate(run.time[k] + wait, sampling=sampling),
         Shown(LANDING, "landing_speed", "landing"): Estimate(v_y, 0.0),
@@ -425,7 +427,7 @@ def first_top(run: Trajectory) -> Estimate:
     heights = (
         run.y[ends] + run.v_y[ends] ** 2 * (run.time[k] - run.time[k - 1]) / (before - after) / 2
     )
-    return estimate(heights.mean(), sampling=float(np.ptp(heights)) / 2)
+    return estimate(heights.mean(), sampling=uniform(float(np.ptp(heights)) / 2))
 
 
 PROTOCOLS = (

@@ -40,7 +40,7 @@ from compare.kit.record import (
 from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, carry_out, with_step_error
+from compare.kit.trials import Start, Trial, carry_out, of_no_step
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -476,12 +476,10 @@ def jumps(
         trial, coarse, fine = result.trial, result.coarse, result.fine
         if trial.flow is None:
             for quantity in ("jump_delay",) if trial.name == "RR" else ("jump_peak", "jump_height"):
-                row = result.row(
-                    lab, quantity, with_step_error(coarse[quantity].value, fine[quantity])
-                )
+                row = result.row(lab, quantity, of_no_step(coarse[quantity].value, fine[quantity]))
                 yield if_found(row, f"{quantity} in {trial.name}: no peak")
         elif math.isfinite(coarse) and math.isfinite(fine):
-            yield result.row(lab, "ramp_end", with_step_error(coarse, estimate(fine)))
+            yield result.row(lab, "ramp_end", of_no_step(coarse, estimate(fine)))
         else:
             why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
             yield Missing("unsteady", trial.set, why)

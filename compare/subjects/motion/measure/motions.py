@@ -22,8 +22,8 @@ import numpy as np
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.scales import time_unit
-from compare.kit.settling import PRESSES
-from compare.kit.statistics import Estimate, estimate
+from compare.kit.settling import PRESSES, SOLVED
+from compare.kit.statistics import Estimate, estimate, uniform
 from compare.kit.tasks import Task
 from compare.kit.trials import (
     DOUBT,
@@ -39,12 +39,13 @@ from compare.kit.trials import (
     lag_error,
     polynomials,
     random_state,
+    unlike,
 )
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import STOKES
-from model.kinematics import TURNING, VARIABLES, slip_velocities, state_units
+from model.kinematics import SLIP_XYZ, TURNING, VARIABLES, slip_velocities, state_units
 
 STATES_SEED = 53
 """Of the random states of the field of motion."""
@@ -127,8 +128,7 @@ def _values(
     `turns_or_hovers`.
 
     They are extrapolated to a vanishing step, and uncertain by what this and the degree of the
-    polynomials change. The largest relative change of the rates, or of the forces, is used for all
-    of them, since that of one may vanish by chance."""
+    polynomials change, see `trials.unlike`."""
     p, read = result.trial.p, []
     for run, times in zip((result.coarse, result.fine), lab.effort.halves, strict=True):
         near, half, middle = (
@@ -157,33 +157,26 @@ def _values(
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
     moving, held = MOVING[case], [_forces(case, row) for row in rows[:, 16:]]
-    rate_change, force_change = (
-        max(
-            (
-                abs(a - b) * DOUBT / EXTRAPOLATION + abs(b - c)
-                for a, b, c in np.transpose(each).tolist()
-            ),
-            default=0.0,
-        )
-        for each in (
-            (rows[:, 8:16] / scales)[:, moving],
-            [[w / weight for w in each.values()] for each in held],
-        )
-    )
-    rate_change, force_change = (
-        max(rate_change, lag_error(p) * (1 + p.j) / p.j),
-        max(force_change, lag_error(p)),
-    )
-    values = {
-        f"rate_{VARIABLES[k]}": estimate(
-            rows[0, 8 + k], scales[k], time_step_and_degree=rate_change
-        )
-        for k in moving
+    read_off = {f"rate_{VARIABLES[k]}": (rows[:, 8 + k], float(scales[k])) for k in moving}
+    read_off |= {
+        f"moving_force_{name}": (np.array([each[name] for each in held]), weight)
+        for name in held[0]
     }
-    values |= {
-        f"moving_force_{name}": estimate(w, weight, time_step_and_degree=force_change)
-        for name, w in held[0].items()
-    }
+    best, fine, lower = np.transpose([of / size for of, size in read_off.values()])
+    steps, degrees = unlike(best - fine), unlike(fine - lower)
+    # A contact that rolls is held by friction of a moment ago: its slip should not change at all, and
+    # what it changes comes from the rates of other variables.
+    slips = [k for k in range(8)[SLIP_XYZ] if VARIABLES[k] in TRAITS[case].constraints]
+    rolling = float(np.abs(rows[0, 8:16] / scales)[slips].max(initial=0.0))
+    values = {}
+    for k, (name, (of, size)) in enumerate(read_off.items()):
+        causes = {"rolling": uniform(rolling)} if name.startswith("rate") else {}
+        causes |= {
+            "time_step": float(steps[k]) * DOUBT / EXTRAPOLATION,
+            "degree": uniform(float(degrees[k])),
+            "solver": uniform(SOLVED),
+        }
+        values[name] = estimate(of[0], size, **causes)
     return constrained(case, rows[0, :8], p), values
 
 
@@ -294,7 +287,7 @@ def _turns_at_end(lab: Lab, piece: TrialResult) -> Iterator[Measurement | Missin
     for name, value, unit in zip(
         VARIABLES[TURNING], ends[1][TURNING].tolist(), units[TURNING].tolist(), strict=True
     ):
-        yield piece.row(lab, f"end_{name}", estimate(value, unit, time_step=change))
+        yield piece.row(lab, f"end_{name}", estimate(value, unit, time_step=uniform(change)))
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
@@ -407,7 +400,9 @@ def _landed(lab: Lab, landing: TrialResult) -> Iterator[Measurement | Missing]:
     changed = [VARIABLES.index(name) for name in LANDED]
     change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
     # The contact closes at a whole step, up to one late; until then weight and friction differ.
-    late = coarse_step(p) / REFINED / lab.refine / time_unit(p) / 2
+    late = uniform(coarse_step(p) / REFINED / lab.refine / time_unit(p) / 2)
     for quantity, k in zip(LANDED, changed, strict=True):
-        value = estimate(fine.x[2 * at, k], float(units[k]), time_step=change, closing=late)
+        value = estimate(
+            fine.x[2 * at, k], float(units[k]), time_step=uniform(change), closing=late
+        )
         yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))

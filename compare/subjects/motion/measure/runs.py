@@ -30,7 +30,7 @@ from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, Records, state_of
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
-from compare.kit.statistics import estimate
+from compare.kit.statistics import estimate, uniform
 from compare.kit.trials import Start, Trial, carry_out, lag_error
 from model import Flow, Parameters, State
 from model.drag import QUADRATIC
@@ -108,7 +108,7 @@ def measure(
                 VARIABLES, ends[1].tolist(), units.tolist(), strict=True
             ):
                 if variable == "omega_c" or not apart:
-                    row = estimate(value, size, time_step=change)
+                    row = estimate(value, size, time_step=uniform(change))
                     yield run.row(lab, f"end_{variable}", row, time=time)
 
 

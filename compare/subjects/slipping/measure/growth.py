@@ -22,7 +22,7 @@ from compare.kit import trials
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
 from compare.kit.scales import dragged_speed, slip_unit, time_unit
-from compare.kit.statistics import Estimate, estimate, slope_error
+from compare.kit.statistics import Estimate, estimate, slope_error, uniform
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Parameters, State, Trajectory
@@ -223,8 +223,8 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Estimate | None:
     return estimate(
         value,
         time_step=abs(float(step)),
-        degree=abs(float(value - lower)),
-        push=abs(float(size)),
+        degree=uniform(abs(float(value - lower))),
+        push=uniform(abs(float(size))),
         lag=least,
     )
 

@@ -27,6 +27,7 @@ from compare.kit.statistics import (
     estimate,
     extrapolated_zero,
     straight_line,
+    uniform,
     zero_and_slope,
 )
 from compare.kit.tasks import Task
@@ -204,7 +205,7 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
             coarse, fine, half = (push.rates(run) for run in runs)
             best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
             noise = math.hypot(
-                change * DOUBT, best[1] - best[0], lag_error(p, refine) * slip_unit(p)
+                change * DOUBT, uniform(best[1] - best[0]), lag_error(p, refine) * slip_unit(p)
             )
             points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
         found.append(Growths(np.reshape(points, (-1, 3)).T, used, strays))
@@ -380,7 +381,7 @@ def _force(run: Trajectory) -> Estimate | None:
     value, lower = (
         polynomials(time, force[:pressed], LIFT_DEGREES, begin)[0] / (p.m * p.g)
     ).tolist()
-    return estimate(value, degree=abs(value - lower))
+    return estimate(value, degree=uniform(abs(value - lower)))
 
 
 def _load(runs: Sequence[Trajectory]) -> Estimate | None:
