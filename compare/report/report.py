@@ -22,7 +22,7 @@ from compare.kit.drawing import Evidence
 from compare.kit.levels import Level
 from compare.kit.record import Check, Measurement, Records
 from compare.kit.workers import Spread
-from compare.report import results, wording
+from compare.report import deviations, results, wording
 from compare.report.results import Summary
 from model import storage
 from model.files import write_text
@@ -90,6 +90,7 @@ def render(
         lead=f"A ball rolls and slips round inside a cylinder. {_opening_sentence(ran)}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         engines=wording.engines(ran),
+        deviations=deviations.distribution(ran),
         tiles=[
             *wording.totals(ran),
             (str(len(measured)), f"simulations with {len(sets)} parameter sets"),

@@ -16,7 +16,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from compare import gallery
-from compare.claim import Claim, Outcome, Text, Verdict
+from compare.claim import Claim, EngineVerdict, Outcome, Text, Verdict
 from compare.commands import validate
 from compare.commands.bench import LEAGUE_PAGE
 from compare.kit.drawing import Drawing, Evidence, GapError
@@ -24,7 +24,7 @@ from compare.kit.levels import Level
 from compare.kit.pages import typeset
 from compare.kit.pictures import embedded, plain, svg
 from compare.kit.record import Check, Missing, Records
-from compare.report import report, results, wording
+from compare.report import deviations, report, results, wording
 from compare.report.results import Summary
 from model import Parameters, StorageError
 from tests import measured as made
@@ -449,3 +449,16 @@ def test_the_league_page_answers(browser, tab, tmp_path, capsys):
     dumb.goto(page.as_uri())
     assert dumb.locator("figure.plot svg").bounding_box()["height"] > 100
     dumb.context.close()
+
+
+def test_deviations_are_told_in_uncertainties_by_engine_and_quantity_each_number_once():
+    own = checks(4, 4.4e-9)
+    said = EngineVerdict(engine="mujoco", outcome=Outcome.REFUTED, checks=own)
+    twice = [
+        Verdict(claim=claim(name), outcome=Outcome.REFUTED, checks=own, engines=(said,))
+        for name in ("one", "two")
+    ]
+    whole, of_orbits = deviations.distribution(twice)
+    assert (whole.engine, whole.quantity, of_orbits.quantity) == ("mujoco", "", "ω_c")
+    assert whole.sizes == of_orbits.sizes == pytest.approx([1.1, 2.2, 3.3, 4.4], rel=1e-5)
+    assert [whole.beyond(n) for n in (1, 2, 3)] == [1.0, 0.75, 0.5]
