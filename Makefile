@@ -1,5 +1,6 @@
 # make validate   set everything up and run the main job: theory against MuJoCo, with a verdict
 # make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (two hours or more)
+# make blind SEED=n  a round with sets and faults that the seed draws, added to docs/blind.md (a quarter of an hour or more)
 # make test       set everything up and run the tests
 # make test-all   the slow tests, too
 # make benchmarks the figures of speed, as ratios in one run: writes the tables of docs/records/speed.md
@@ -16,7 +17,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 RESULTS ?= results
 
-.PHONY: help validate mutants verdicts league test test-all benchmarks docs wheel check lint lock clean
+.PHONY: help validate mutants blind verdicts league test test-all benchmarks docs wheel check lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
@@ -29,6 +30,9 @@ mutants: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet --engine mujoco-coulomb -o results/coulomb
 	$(BIN)/dualball validate --quiet -o results/default
 	$(BIN)/python -m tests.mutants results results/default --whole --engines --witness mujoco-plain --witness mujoco-coulomb=results/coulomb --least 0.95 --page docs/mutants.md
+
+blind: $(VENV)/installed
+	$(BIN)/python -m tests.mutants.blind $(SEED)
 
 test: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist worksteal

@@ -57,7 +57,7 @@ class Bracket:
     def place(self) -> Estimate:
         """The middle, with the uncertainty of a uniform distribution and the shift."""
         middle = (self.low + self.high) / 2
-        return estimate(middle, bracket=uniform(self.width / 2), time_step=uniform(self.shift / 2))
+        return estimate(middle, bracket=uniform(self.width / 2), time_step=uniform(self.shift))
 
 
 @dataclass(frozen=True, eq=False)

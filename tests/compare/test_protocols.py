@@ -25,9 +25,10 @@ from compare.kit.statistics import (
     estimate,
     extrapolated_maximum,
     hops,
+    uniform,
     zero_and_slope,
 )
-from compare.kit.trials import with_step_error
+from compare.kit.trials import of_no_step, unlike
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion.measure import laws, motions
@@ -195,6 +196,24 @@ def test_an_uncertainty_is_made_up_of_its_causes():
     assert Estimate(1.0, 3.0).also(bracket=4.0).budget == {"measured": 3.0, "bracket": 4.0}
 
 
+@pytest.mark.parametrize(("order", "off"), [(1.0, 3.0), (1.585, 0.0), (2.0, 1 / 3), (20.0, 3.0)])
+def test_a_limit_of_no_step_is_sure_whatever_the_order(order, off):
+    """The bounds of a uniform distribution are three variances off."""
+    coarse, fine = (7.0 + 0.1 * h**order for h in (1.0, 0.5))
+    limit = of_no_step(coarse, estimate(fine))
+    deviation = (limit.value - 7.0) / limit.uncertainty
+    assert abs(deviation) <= math.sqrt(3) * (1 + 1e-5)
+    assert deviation**2 == pytest.approx(off, abs=1e-3)
+    assert limit.budget == {"time_step": pytest.approx((coarse - fine) / math.sqrt(12))}
+
+
+def test_what_changes_by_little_among_what_changes_by_much_is_not_sure():
+    assert unlike(np.array([4e-3, -1e-9, 0.0])) == pytest.approx(
+        [math.hypot(4, 1) / 1e3, 1e-3, 1e-3]
+    )
+    assert unlike(np.zeros(0)).size == 0
+
+
 def test_first_top_lies_between_samples():
     """Claims predict with it, too: they would not notice if it were wrong."""
     p = QUICK["thick-fluid"]
@@ -203,7 +222,11 @@ def test_first_top_lies_between_samples():
         for interval in (0.01, 1e-4)
     )
     top = flowmeter.first_top(run)
-    assert abs(top.value - float(fine.y.max())) <= top.uncertainty < p.g * 0.01**2 * p.c * 0.01
+    assert (
+        uniform(abs(top.value - float(fine.y.max())))
+        <= top.uncertainty
+        < p.g * 0.01**2 * p.c * 0.01
+    )
 
 
 def make(patch, **effort):
@@ -340,7 +363,7 @@ def test_bisection_closes_in_on_the_change_unless_runs_are_undecided_or_break_do
         lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4
     )  # with the time step
     assert moves.low < 0.3 < moves.high
-    assert moves.place.uncertainty >= moves.shift > 0
+    assert moves.place.uncertainty >= uniform(moves.shift) > 0
 
     def answer(run):
         value, attempt = run
@@ -462,12 +485,10 @@ def test_where_hopping_begins_and_ends():
     """At no height; and where disturbances neither grow nor shrink."""
     flows = (58.0, 56.0, 54.0)
     curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
-    place = with_step_error(
-        attractors.birth(flows, curved).value, attractors.birth(flows, straight)
-    )
-    assert place.value == pytest.approx(52.0, abs=1e-9)
-    assert 0 < place.uncertainty < 0.1
+    bent, exact = attractors.birth(flows, curved), attractors.birth(flows, straight)
+    assert exact.value == pytest.approx(52.0, abs=1e-9)
+    assert 0 < abs(bent.value - 52.0) < bent.uncertainty < 0.1
     place = attractors.death(
         [0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)]
     )
-    assert (place.value, place.uncertainty) == pytest.approx((0.1, 5e-3))
+    assert (place.value, place.uncertainty) == pytest.approx((0.1025, 5e-3 / math.sqrt(12)))

@@ -35,12 +35,15 @@ class _Disguised(mjsim.Run):
             yield from super().__iter__()
 
 
-def _wrong(
+def wrong_engine(
     name: str,
     ball: Callable[[Parameters], Parameters] = lambda p: p,
     fault: Stretch = nullcontext,
     **changes: Any,
 ) -> Engine:
+    """MuJoCo with one fault: it moves another ball than it says, under a fault that lasts as long as
+    a run, or with other settings."""
+
     def stream(
         p: Parameters, x0: Any, t_end: float, flow: Any, settings: ContactSettings, **more: Any
     ) -> mjsim.Run:
@@ -78,16 +81,16 @@ def _turn(model: Any) -> None:
 
 
 WRONG_ENGINES: tuple[Engine, ...] = (
-    _wrong("floor friction 1 % high", lambda p: p.replace(mu=1.01 * p.mu)),
-    _wrong("wall friction 1 % low", lambda p: p.replace(eta=0.99 * p.eta)),
-    _wrong("inertia 1 % high", lambda p: p.replace(j=1.01 * p.j)),
-    _wrong("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
-    _wrong("the friction of the floor is missing", fault=partial(_altered, _smooth)),
-    _wrong("the plane of the wall turned by 0.01 rad", fault=partial(_altered, _turn)),
-    _wrong("no servo of the margins", servo=0.0),
-    _wrong("no memory of friction", memory=False),
-    _wrong("forces taken at the beginning of a step", order=1),
-    _wrong(
+    wrong_engine("floor friction 1 % high", lambda p: p.replace(mu=1.01 * p.mu)),
+    wrong_engine("wall friction 1 % low", lambda p: p.replace(eta=0.99 * p.eta)),
+    wrong_engine("inertia 1 % high", lambda p: p.replace(j=1.01 * p.j)),
+    wrong_engine("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
+    wrong_engine("the friction of the floor is missing", fault=partial(_altered, _smooth)),
+    wrong_engine("the plane of the wall turned by 0.01 rad", fault=partial(_altered, _turn)),
+    wrong_engine("no servo of the margins", servo=0.0),
+    wrong_engine("no memory of friction", memory=False),
+    wrong_engine("forces taken at the beginning of a step", order=1),
+    wrong_engine(
         "landings left to the contacts",
         fault=partial(mock.patch.object, ContactSettings, "slowest_fall", return_value=math.inf),
     ),

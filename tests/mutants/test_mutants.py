@@ -1,9 +1,11 @@
 """Wrong theories are believed everywhere for a while, and forgotten without a trace."""
 
+import ast
 import contextlib
 import csv
 import dataclasses
 import importlib
+import json
 import os
 import subprocess
 import sys
@@ -21,8 +23,8 @@ from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.subjects.stationary import claims
 from docs.studies import mutants
-from model import Parameters
-from tests.mutants import trial
+from model import Case, Parameters
+from tests.mutants import blind, formulas, trial
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import believed, noting
 from tests.mutants.theories import FOR_TESTS, THEORIES
@@ -129,3 +131,32 @@ def test_what_no_measurement_shows_a_unit_test_sees(wrong, tmp_path):
         text=True,
     )
     assert "1 failed" in done.stdout, done.stdout
+
+
+def test_a_round_is_played_by_a_seed(tmp_path):
+    """One set, one protocol, and faults in what its claims call; the key is kept beside it."""
+    plan = blind.Plan(sets=1, theories=3, engines=0, protocols=("field",), by=(MUJOCO,))
+    said = blind.play(1, tmp_path, plan)
+    key = json.loads((tmp_path / blind.KEY).read_text("utf-8"))
+    assert len(key) == 3
+    assert all(f"| `{what}` | " in said for what in key)
+    assert "| mujoco | " in said
+    assert " | none | " in said  # false alarms
+
+
+def _formula(p):
+    return {"number": (p.mu + 2.0) * p.r**2, "case": Case.SS}
+
+
+@pytest.mark.parametrize("kind", formulas.KINDS)
+def test_faults_are_made_of_formulas(kind):
+    """A fault changes what it is about, and nothing else."""
+    p = P.replace(eta=0.3)
+    rng, nodes = np.random.default_rng(0), list(ast.walk(formulas.tree(_formula)))
+    places = [n for n, node in enumerate(nodes) if formulas.faulty(kind, node, rng)]
+    assert len(places) == (2 if kind == "argument" else 1)
+    for place in places:
+        wrong = formulas.wrong_theory(_formula, kind, place, rng).wrong(_formula, p)
+        right = _formula(p)
+        about = "case" if kind == "case" else "number"
+        assert {name for name in right if wrong[name] != right[name]} == {about}

@@ -1,0 +1,248 @@
+"""``python -m tests.mutants.blind SEED``: a round played blind.
+
+The seed draws parameter sets that nobody has seen, and plants faults in theories and engines, which
+are kept in a file that the judge doesn't read. Engines of the study measure; claims are judged by the
+right theory and by each wrong one. What came out, whatever it is, becomes a section of
+docs/blind.md."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import pkgutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+import numpy as np
+
+import analytic
+from compare import validation
+from compare.assessment import full_verdict
+from compare.catalogue import CLAIMS
+from compare.claim import EngineVerdict, Outcome, Verdict
+from compare.judge import forget
+from compare.kit import pages
+from compare.kit.campaign import Campaign
+from compare.kit.engines import ENGINES, MUJOCO, PLAIN, Engine
+from compare.kit.levels import HIGH, LOW, Level
+from compare.kit.progress import ValidationProgress, show_nothing
+from compare.kit.record import RecordsByEngine
+from compare.kit.workers import LateError, at_most
+from compare.report.deviations import distribution
+from compare.report.results import RUNS
+from model import Parameters
+from model.files import make_directory, write_text
+from model.versions import current_commit
+from tests.mutants import formulas
+from tests.mutants.engines import wrong_engine
+from tests.mutants.exchange import WrongTheory, believed
+from tests.mutants.trial import PATIENCE, PROVING
+
+PAGE, KEY = Path("docs/blind.md"), "key.json"
+ASKED = ("drake",)
+"""Engines beside MuJoCo that measure where they are installed."""
+Sets = Mapping[str, Parameters]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much a round is."""
+
+    sets: int = 2
+    theories: int = 20
+    engines: int = 3
+    protocols: Sequence[str] = ()
+    """All of the quick level for none."""
+    by: Sequence[Engine] = (MUJOCO, PLAIN)
+
+
+def drawn(rng: np.random.Generator, count: int) -> dict[str, Parameters]:
+    """Sets drawn evenly from the box of the study's design, by name."""
+    found = {}
+    for k in range(count):
+        values = {name: float(rng.uniform(LOW[name], HIGH[name])) for name in LOW}
+        ratio, kappa = values.pop("r/R"), values.pop("kappa")
+        c = kappa * math.sqrt(values["g"] / values["R"])
+        found[f"blind-{k + 1}"] = Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
+    return found
+
+
+def measured(
+    directory: Path, engines: Sequence[Engine], sets: Sets, protocols: Sequence[str]
+) -> RecordsByEngine:
+    """What engines measure on sets."""
+    study = validation.plan(directory, Level.QUICK, None, sets, None)
+    chosen = [each for each in study.protocols if not protocols or each.name in protocols]
+    study = replace(study, engines=list(engines), protocols=chosen)
+    with Campaign(directory / RUNS, 0, passing=True) as campaign:
+        *_, last = validation.measure(study, campaign, ValidationProgress(show_nothing, 0))
+    for name, error in last.broken.items():
+        print(f"{name}: {error}", file=sys.stderr)
+    return last.records
+
+
+@dataclass(frozen=True)
+class Said:
+    """A verdict by the right theory, and the code of the functions that its predictions call."""
+
+    verdict: Verdict
+    calls: frozenset[CodeType]
+
+    @property
+    def engines(self) -> dict[str, EngineVerdict]:
+        """What each engine says."""
+        return {each.engine: each for each in self.verdict.engines}
+
+
+def watched(act: Callable[[], Verdict]) -> Said:
+    """A verdict, and what was called for it."""
+    called = set[CodeType]()
+    forget()
+    sys.setprofile(lambda frame, event, of: called.add(frame.f_code) if event == "call" else None)
+    try:
+        verdict = act()
+    finally:
+        sys.setprofile(None)
+    return Said(verdict, frozenset(called))
+
+
+def formulas_called(said: Sequence[Said]) -> list[Callable[..., Any]]:
+    """The plain functions of `analytic` that predictions call: a fault elsewhere is not about
+    anything that was measured."""
+    known = frozenset[CodeType]().union(*(each.calls for each in said))
+    found = []
+    for name in sorted(each.name for each in pkgutil.walk_packages(analytic.__path__, "analytic.")):
+        for _, value in sorted(vars(importlib.import_module(name)).items()):
+            own = getattr(value, "__module__", "") == name
+            found += [value] if own and getattr(value, "__code__", None) in known else []
+    return found
+
+
+@dataclass
+class Fate:
+    """What became of a fault."""
+
+    by: dict[str, str] = field(default_factory=dict)
+    """Which claim found it, by engine."""
+    changes: bool = False
+    """Whether some prediction, or measurement, is another."""
+    broke: bool = False
+    """Whether some prediction broke down, or was given up: that alone finds nothing."""
+
+    def hear(self, said: Said, now: Verdict) -> None:
+        """Take in a verdict under the fault."""
+        for each in now.engines:
+            before = said.engines[each.engine]
+            theirs = [[check.predicted for check in of.checks] for of in (before, each)]
+            self.broke |= each.outcome is Outcome.ERROR
+            same = len(theirs[0]) == len(theirs[1]) and np.allclose(
+                *theirs, rtol=1e-9, atol=0.0, equal_nan=True
+            )
+            self.changes |= not same
+            if each.outcome is Outcome.REFUTED is not before.outcome:
+                self.by.setdefault(each.engine, now.claim.id)
+
+
+def tried(wrong: WrongTheory, said: Sequence[Said], records: RecordsByEngine) -> Fate:
+    """Judge the claims that call a wrong function, until every engine has found the fault."""
+    fate, code = Fate(), getattr(importlib.import_module(wrong.module), wrong.function).__code__
+    forget()
+    with believed(wrong):
+        for each in (each for each in said if code in each.calls):
+            if each.engines.keys() <= fate.by.keys():
+                continue
+            try:
+                with at_most(PATIENCE):
+                    fate.hear(each, full_verdict(each.verdict.claim, records))
+            except LateError:
+                fate.broke = fate.changes = True
+    return fate
+
+
+def tried_engine(wrong: Engine, said: Sequence[Said], directory: Path, sets: Sets) -> Fate:
+    """Measure with a wrong engine, and judge by the right theory."""
+    ENGINES[wrong.name] = wrong  # tasks name it
+    records, fate = measured(directory, [wrong], sets, sorted(PROVING)), Fate(changes=True)
+    own = {MUJOCO.name: records[wrong.name]}
+    forget()
+    for each in (each for each in said if each.verdict.claim.protocols <= PROVING):
+        fate.hear(each, full_verdict(each.verdict.claim, own))
+    return fate
+
+
+def play(seed: int, directory: Path, plan: Plan = Plan()) -> str:
+    """Play a round in a directory; the section about it, in Markdown."""
+    rng = np.random.default_rng(seed)
+    sets = drawn(rng, plan.sets)
+    make_directory(directory)
+    there = [*plan.by, *(ENGINES[name] for name in ASKED if not ENGINES[name].missing)]
+    records = measured(directory / "measured", there, sets, plan.protocols)
+    rows = [m for steps in records.values() for own in steps.values() for m in own.measurements]
+    names = {m.protocol for m in rows}
+    claims = [claim for claim in CLAIMS if claim.protocols <= names]
+    said = [watched(lambda of=claim: full_verdict(of, records)) for claim in claims]
+    planted = formulas.planted(rng, formulas_called(said))
+    wrongs = [next(planted) for _ in range(plan.theories)]
+    balls = [formulas.of_ball(rng) for _ in range(plan.engines)]
+    key = [*(each.what for each in wrongs), *(what for what, _ in balls)]
+    write_text(directory / KEY, json.dumps(key, ensure_ascii=False, indent=1))
+    fates, first = [tried(wrong, said, records) for wrong in wrongs], dict([*sets.items()][:1])
+    for n, (_, ball) in enumerate(balls):
+        wrong = wrong_engine(f"blind-engine-{n}", ball)
+        fates.append(tried_engine(wrong, said, directory / wrong.name, first))
+    return section(seed, json.loads((directory / KEY).read_text("utf-8")), sets, said, fates)
+
+
+def section(
+    seed: int, key: Sequence[str], sets: Sets, said: Sequence[Said], fates: Sequence[Fate]
+) -> str:
+    """What came out, once the key is opened."""
+    off = {row.engine: row for row in distribution([e.verdict for e in said]) if not row.quantity}
+    names = list(dict.fromkeys(name for each in said for name in each.engines))
+    head = ["engine", "found", "confirmed", "false alarms", "numbers", "beyond 1", "beyond 2", "3"]
+    counts, faults = [head], [["fault", *names, ""]]
+    for name in names:
+        own = [(e.verdict.claim, e.engines[name].outcome) for e in said if name in e.engines]
+        alarms = [c.id for c, o in own if o is Outcome.REFUTED is not c.expected]
+        confirmed = sum(outcome is Outcome.CONFIRMED for _, outcome in own)
+        row = [name, str(sum(name in fate.by for fate in fates)), f"{confirmed} of {len(own)}"]
+        beyond = [f"{off[name].beyond(n):.1%}" if name in off else "–" for n in (1, 2, 3)]
+        numbers = str(len(off[name].sizes)) if name in off else "0"
+        counts.append([*row, ", ".join(alarms) or "none", numbers, *beyond])
+    for what, fate in zip(key, fates, strict=True):
+        notes = ["changes no prediction"] * (not fate.changes) + ["breaks down"] * fate.broke
+        shown = "`" + what.replace("|", "\\|") + "`"
+        faults.append([shown, *(fate.by.get(name, "–") for name in names), ", ".join(notes)])
+    live, found = sum(fate.changes for fate in fates), sum(bool(fate.by) for fate in fates)
+    where = "; ".join(
+        ", ".join(f"{n} = {getattr(p, n):.4g}" for n in ("mu", "eta", "j", "r", "R", "m", "g", "c"))
+        for p in sets.values()
+    )
+    return f"""
+## Seed {seed}
+
+Found: **{found} of the {live} faults that change a prediction or a measurement**, of {len(fates)}
+that were planted. Rules as
+of the commit {current_commit()[:12] or "unknown"}. Sets, SI: {where}.
+
+{pages.markdown(counts)}
+
+{pages.markdown(faults)}
+"""
+
+
+def main(seed: str, directory: str = "results/blind") -> None:
+    """Play a round, and add its section to the page."""
+    before = PAGE.read_text("utf-8")
+    if f"## Seed {seed}\n" in before:
+        sys.exit(f"seed {seed} was played already: {PAGE}")
+    write_text(PAGE, before + play(int(seed), Path(directory) / seed))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
