@@ -53,7 +53,7 @@ Sets = Mapping[str, Parameters]
 class Plan:
     """How much a round is."""
 
-    sets: int = 2
+    sets: int = 1
     theories: int = 20
     engines: int = 3
     protocols: Sequence[str] = ()
