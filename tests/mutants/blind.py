@@ -14,6 +14,7 @@ import pkgutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -68,7 +69,8 @@ def drawn(rng: np.random.Generator, count: int) -> dict[str, Parameters]:
         values = {name: float(rng.uniform(LOW[name], HIGH[name])) for name in LOW}
         ratio, kappa = values.pop("r/R"), values.pop("kappa")
         c = kappa * math.sqrt(values["g"] / values["R"])
-        found[f"blind-{k + 1}"] = Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
+        more: dict[str, Any] = values | {"r": ratio * values["R"], "c": c, "omega_0": 1.0}
+        found[f"blind-{k + 1}"] = Parameters(**more)
     return found
 
 
@@ -138,12 +140,10 @@ class Fate:
         """Take in a verdict under the fault."""
         for each in now.engines:
             before = said.engines[each.engine]
-            theirs = [[check.predicted for check in of.checks] for of in (before, each)]
+            one, other = ([check.predicted for check in of.checks] for of in (before, each))
             self.broke |= each.outcome is Outcome.ERROR
-            same = len(theirs[0]) == len(theirs[1]) and np.allclose(
-                *theirs, rtol=1e-9, atol=0.0, equal_nan=True
-            )
-            self.changes |= not same
+            alike = len(one) == len(other)
+            self.changes |= not alike or not np.allclose(one, other, 1e-9, 0.0, equal_nan=True)
             if each.outcome is Outcome.REFUTED is not before.outcome:
                 self.by.setdefault(each.engine, now.claim.id)
 
@@ -185,7 +185,7 @@ def play(seed: int, directory: Path, plan: Plan = Plan()) -> str:
     rows = [m for steps in records.values() for own in steps.values() for m in own.measurements]
     names = {m.protocol for m in rows}
     claims = [claim for claim in CLAIMS if claim.protocols <= names]
-    said = [watched(lambda of=claim: full_verdict(of, records)) for claim in claims]
+    said = [watched(partial(full_verdict, claim, records)) for claim in claims]
     planted = formulas.planted(rng, formulas_called(said))
     wrongs = [next(planted) for _ in range(plan.theories)]
     balls = [formulas.of_ball(rng) for _ in range(plan.engines)]

@@ -98,7 +98,8 @@ def wrong_theory(
     new = faulty(kind, old, rng)
     assert new
     what = f"{plain.__name__}: {ast.unparse(old)} → {ast.unparse(new)}"
-    module = ast.Module([_Exchange(old, new).visit(known)], [])
+    changed: Any = _Exchange(old, new).visit(known)
+    module = ast.Module([changed], [])
     defined: dict[str, Any] = {}
     exec(compile(ast.fix_missing_locations(module), what, "exec"), plain.__globals__, defined)
     put = defined[plain.__name__]
