@@ -75,7 +75,8 @@ def render(
             dict.fromkeys(own, claim.id) | shown
         )  # a figure of several claims stands beside the first
         sections.setdefault(claim.section, []).append(row)
-    apart = [figures[name] for name in free]
+    first = "characteristic"  # a meter's reading by theory and every engine: what all is about
+    apart = [figures[name] for name in sorted(free, key=lambda name: name != first)]
     measured = {name for m in evidence.records.measurements for name in m.runs}
     sets = {m.set for m in evidence.records.measurements}
     known = summary.provenance
@@ -91,6 +92,7 @@ def render(
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         engines=wording.engines(ran),
         deviations=deviations.distribution(ran),
+        answers=wording.answers(ran),
         tiles=[
             *wording.totals(ran),
             (str(len(measured)), f"simulations with {len(sets)} parameter sets"),

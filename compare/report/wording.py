@@ -213,6 +213,45 @@ def engines(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
     return rows
 
 
+QUESTIONS = {
+    "mujoco-plain": "What does MuJoCo get right by itself?",
+    "mujoco": "What does it get right with Coulomb's law?",
+    "mujoco-defaults": "What does it get right as it comes?",
+}
+"""What a reader who simulates robots wants to know first, by the engine that answers."""
+
+
+def answers(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """The answers of the report's first screen, by engine: how many claims agree, the subjects of
+    which all do, and what is wrong."""
+    found = {each["engine"]: each for each in engines(ran) if each["asked"] != "0"}
+    order = [*(name for name in QUESTIONS if name in found), *found]
+    return [found[name] | _subjects(ran, name) for name in dict.fromkeys(order)]
+
+
+def _subjects(ran: Sequence[Verdict], engine: str) -> dict[str, Any]:
+    """A question, and by an engine what is right throughout, and what is wrong, by subject."""
+    outcomes: dict[str, list[Outcome]] = {}
+    wrong = []
+    for verdict in ran:
+        for each in verdict.engines:
+            if each.engine == engine and each.outcome is not Outcome.NOT_ASKED:
+                outcomes.setdefault(verdict.claim.section, []).append(each.outcome)
+                if (
+                    each.outcome is Outcome.REFUTED
+                    and verdict.claim.expected is not Outcome.REFUTED
+                ):
+                    wrong.append(verdict.claim)
+    return {
+        "question": QUESTIONS.get(engine, f"What does {engine} get right?"),
+        "subjects": [
+            f"{section} {own.count(Outcome.CONFIRMED)}/{len(own)}"
+            for section, own in outcomes.items()
+        ],
+        "wrong": wrong,
+    }
+
+
 def headline(ran: Sequence[Verdict]) -> str:
     """All verdicts in a sentence: the claims that failed or are undecided, or that the engine
     agrees."""

@@ -177,6 +177,26 @@ def test_a_claim_has_one_line_of_a_terminal():
     assert len(validate.head().plain) <= validate.WIDTH
 
 
+def test_the_first_screen_answers_what_engines_get_right():
+    def by(engine: str, outcome: Outcome) -> EngineVerdict:
+        return EngineVerdict(engine=engine, outcome=outcome, deviations=(0.01,))
+
+    right, wrong = (
+        dataclasses.replace(RAN[0], claim=claim(name), engines=beside)
+        for name, beside in (
+            ("good", (by("mujoco-plain", Outcome.CONFIRMED),)),
+            ("bad", (by("mujoco-plain", Outcome.REFUTED),)),
+        )
+    )
+    first, *others = wording.answers([right, wrong])
+    assert first["question"] == wording.QUESTIONS["mujoco-plain"]
+    assert (first["confirmed"], first["asked"]) == ("1", "2")
+    assert [each.id for each in first["wrong"]] == ["bad"]
+    assert first["subjects"] == ["Stationary states 1/2"]
+    false = dataclasses.replace(wrong, claim=claim("bad", expected=Outcome.REFUTED))
+    assert wording.answers([false])[0]["wrong"] == []  # as it should be
+
+
 def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(page):
     text, summary = (
         html.unescape(page.read_text("utf-8")),
