@@ -188,7 +188,7 @@ def test_the_first_screen_answers_what_engines_get_right():
             ("bad", (by("mujoco-plain", Outcome.REFUTED),)),
         )
     )
-    first, *others = wording.answers([right, wrong])
+    first = wording.answers([right, wrong])[0]
     assert first["question"] == wording.QUESTIONS["mujoco-plain"]
     assert (first["confirmed"], first["asked"]) == ("1", "2")
     assert [each.id for each in first["wrong"]] == ["bad"]
