@@ -230,25 +230,23 @@ def answers(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
 
 
 def _subjects(ran: Sequence[Verdict], engine: str) -> dict[str, Any]:
-    """A question, and by an engine what is right throughout, and what is wrong, by subject."""
-    outcomes: dict[str, list[Outcome]] = {}
-    wrong = []
+    """A question, and by an engine how much of each subject came out as it should, what is wrong,
+    and how many false claims it refutes."""
+    outcomes: dict[str, list[bool]] = {}
+    wrong, due = [], 0
     for verdict in ran:
         for each in verdict.engines:
             if each.engine == engine and each.outcome is not Outcome.NOT_ASKED:
-                outcomes.setdefault(verdict.claim.section, []).append(each.outcome)
-                if (
-                    each.outcome is Outcome.REFUTED
-                    and verdict.claim.expected is not Outcome.REFUTED
-                ):
+                right = each.outcome is verdict.claim.expected
+                outcomes.setdefault(verdict.claim.section, []).append(right)
+                due += right and each.outcome is Outcome.REFUTED
+                if each.outcome is Outcome.REFUTED and not right:
                     wrong.append(verdict.claim)
     return {
         "question": QUESTIONS.get(engine, f"What does {engine} get right?"),
-        "subjects": [
-            f"{section} {own.count(Outcome.CONFIRMED)}/{len(own)}"
-            for section, own in outcomes.items()
-        ],
+        "subjects": [f"{section} {sum(own)}/{len(own)}" for section, own in outcomes.items()],
         "wrong": wrong,
+        "due": due,
     }
 
 

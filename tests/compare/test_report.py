@@ -194,7 +194,8 @@ def test_the_first_screen_answers_what_engines_get_right():
     assert [each.id for each in first["wrong"]] == ["bad"]
     assert first["subjects"] == ["Stationary states 1/2"]
     false = dataclasses.replace(wrong, claim=claim("bad", expected=Outcome.REFUTED))
-    assert wording.answers([false])[0]["wrong"] == []  # as it should be
+    (as_it_should,) = wording.answers([false])
+    assert (as_it_should["wrong"], as_it_should["due"]) == ([], 1)
 
 
 def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(page):
