@@ -188,7 +188,8 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
             block["language"] = "console"
         elif first.startswith("%%writefile "):
             block[:] = [nodes.Text(rest)]
-            block["language"] = first.rpartition(".")[2]
+            suffix = first.rpartition(".")[2]
+            block["language"] = {"csv": "text"}.get(suffix, suffix)  # tables have no highlighter
         elif first.startswith("%config "):
             block[:] = [nodes.Text(rest.lstrip())]
         block.rawsource = block.astext()
