@@ -119,6 +119,7 @@ def row(text: str, name: str) -> str:
         ("", "Not drawn: The user&#39;s own: it was not measured"),
         ("", r"Not part of this run: <code[^>]*>deeper</code>"),
         ("good", "What good states of slip &amp; &lt;roll&gt;."),
+        ("", "Out of sight, so that an error of theory there would go unnoticed"),
         ("good", "dualball validate --claim good --quick -o"),
         (
             "good",
