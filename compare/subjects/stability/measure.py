@@ -37,6 +37,7 @@ from compare.kit.statistics import (
     exponents,
     matched,
     propagator,
+    uniform,
 )
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
@@ -106,7 +107,7 @@ def measure(
         row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
         modes = spectrum(state, answers, step)
         yield from _modes(state, modes, step, row)
-        yield from _responses(state, answers, float(modes.uncertainty.max()), row)
+        yield from _responses(state, answers, row)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +145,13 @@ class Pushed:
         largest first."""
         size = PUSH.get(self.case, USUAL_PUSH if self.start.p.drag == STOKES else SLIGHT_PUSH)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
+
+    @property
+    def noise(self) -> float:
+        """What the accuracy to which forces are solved makes of a response; more where slip is
+        fast."""
+        slip = np.abs(self.start.x0 / state_units(self.start.p))[SLIP_XYZ].max()
+        return SOLVED * max(1.0, float(slip)) / max(self.sizes)
 
     def steps(self, lab: Lab) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
@@ -325,14 +333,12 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> Spectrum:
     bent, size = np.abs(values - plain), max(state.sizes)
     bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size**order, 1.0)
     stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
-    slip = np.abs(state.start.x0 / state_units(state.start.p))[SLIP_XYZ].max()
-    solved = SOLVED * max(1.0, slip) / (size * interval)
     budget = {
         "time_step": np.abs(correction),
-        "record": half,
-        "push": bent,
-        "fastest_motion": stepped,
-        "solver": np.full(len(values), solved),
+        "record": half * uniform(1.0),
+        "push": bent * uniform(1.0),
+        "fastest_motion": stepped * uniform(1.0),
+        "solver": np.full(len(values), uniform(state.noise / interval)),
     }
     uncertainty = np.sqrt(sum(u**2 for u in budget.values()))
     # Relative errors of one propagator have the same causes; that of one exponent may vanish by
@@ -378,26 +384,28 @@ def _modes(
         yield row(quantity=name, value=Estimate(value, max(sure[k], least), budget), mode=mode)
 
 
-def _responses(
-    state: Pushed, answers: Sequence[Array], turns: float, row: Row
-) -> Iterator[Measurement]:
+def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Measurement]:
     """Measurements of how each active variable follows a push of each, in `units`, a third of the
     record later.
 
     This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum`
-    does, to a vanishing push and step; what the exponents may be off, s-1, turns it."""
+    does, to a vanishing push and step, and uncertain by what they change, by what two thirds of the record
+    say, and by the accuracy of the solver."""
     names, (lasts, samples), length = (
         TRAITS[state.case].active,
         state.record,
         min(map(len, answers)),
     )
-    coarse, large, small = (propagator(answers[k][:length], length // 3) for k in (0, 1, -1))
+    lag = length // 3
+    coarse, large, small = (propagator(answers[k][:length], lag) for k in (0, 1, -1))
+    shorter = propagator(answers[-1][: 2 * lag], lag)
     bent, late = (small - large) / (2**state.order - 1), (small - coarse) / 3
-    value, time = small + bent + late, length // 3 * lasts * coarse_step(state.start.p) / samples
+    value, time = small + bent + late, lag * lasts * coarse_step(state.start.p) / samples
     budget = {
-        "push": float(np.abs(bent).max()),
+        "push": uniform(float(np.abs(bent).max())),
         "time_step": float(np.abs(late).max()),
-        "exponents": float(turns * time * np.abs(value).max()),
+        "record": uniform(float(np.abs(small - shorter).max())),
+        "solver": uniform(state.noise * lag),  # as often as it turns the motion
     }
     for (i, of), (j, by) in product(enumerate(names), repeat=2):
         yield row(
