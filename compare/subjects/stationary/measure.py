@@ -12,15 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numpy as np
-
 from compare.kit import settling
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.scales import time_unit
-from compare.kit.settling import Patience, Settled
+from compare.kit.settling import SOLVED, Patience, Settled
 from compare.kit.statistics import Estimate, estimate
 from compare.kit.trials import Start
 from model import Case, Parameters, State
@@ -131,21 +129,27 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
                 for n in sizes
             ]
             for n, size in sizes.items():
-                yield _row(lab, fine, n, _with_changes(lab, fine.values[n], max(changes) * size, p))
+                yield _row(
+                    lab, fine, n, _with_changes(lab, fine.values[n], max(changes) * size, p, size)
+                )
 
 
-def _with_changes(lab: Lab, value: Estimate, change: float, p: Parameters) -> Estimate:
-    """A value of a settled state, of which half the step and other starts change so much.
+def _with_changes(lab: Lab, value: Estimate, change: float, p: Parameters, size: float) -> Estimate:
+    """A value of a settled state, of which half the step and other starts change so much; `size` is its
+    natural size.
 
-    Errors of solving for forces add up from step to step: with half the step they are twice as
-    large, and that of the value about twice the change. That is measured, and takes the place of what
-    `settling` allows for them. Rounding in each step adds up at random, for a time 1/c."""
+    Errors of solving for forces add up from step to step, for a time 1/c. What adds up with one sign
+    is twice as much with half the step, so that it is about twice the change; what adds up at random
+    the change may not show. Both take the place of what `settling` allows for them. (The second was
+    added after a round played blind, where two claims were refuted without it.)"""
     if lab.effort.settled_refine == 1:
         return value.also(start=change)
     steps = lab.effort.settled_refine / (p.c * coarse_step(p))
-    rounding = np.finfo(float).eps * math.sqrt(steps) * abs(value.value)
     return estimate(
-        value.value, drift=value.budget["drift"], solver_or_start=2 * change, rounding=rounding
+        value.value,
+        drift=value.budget["drift"],
+        solver_or_start=2 * change,
+        solver_at_random=SOLVED * math.sqrt(steps) * size,
     )
 
 
