@@ -14,7 +14,7 @@ from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit import levels, settling
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
-from compare.kit.lab import Lab
+from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
@@ -212,6 +212,17 @@ def test_what_changes_by_little_among_what_changes_by_much_is_not_sure():
         [math.hypot(4, 1) / 1e3, 1e-3, 1e-3]
     )
     assert unlike(np.zeros(0)).size == 0
+
+
+def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it(lab):
+    """Also where neither half the step nor other starts change it; what is measured takes the place
+    of what errors of one sign could come to."""
+    p = Parameters.named("reference")
+    value = estimate(12.0, drift=0.0, solver=1.0)
+    sure = settled._with_changes(lab, value, 0.0, p, 12.0).uncertainty
+    steps = 2 / (p.c * coarse_step(p))
+    assert sure == pytest.approx(12.0 * settling.SOLVED * math.sqrt(steps))
+    assert settled._with_changes(lab, value, 3.0, p, 12.0).uncertainty == pytest.approx(6.0)
 
 
 def test_first_top_lies_between_samples():
