@@ -17,11 +17,11 @@ from statistics import median
 
 from compare.claim import Claim, EngineVerdict, Outcome, Verdict
 from compare.convergence import Ends, zero_step_limits
-from compare.judge import checks_of, lost_to, outcome, per_bearing, undecided_bearings, verdict
+from compare.judge import checks_of, lost_to, outcome, per_criterion, undecided_criteria, verdict
 from compare.kit.engines import Engine, engine
-from compare.kit.lab import coarse_step
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records, RecordsByEngine, Relation
+from compare.kit.runner import coarse_step
 
 USUAL_STEP = 2e-3
 """MuJoCo's own time step, s, at which users meet its deviations."""
@@ -62,7 +62,7 @@ def assess(
     """What an engine says of a claim by its measurements at each step divisor; `ends` are measured
     thresholds, `trial` the checks of the engine on trial.
 
-    Of a bearing it should have as many numbers as with any of its steps, and where the engine on
+    Of a criterion it should have as many numbers as with any of its steps, and where the engine on
     trial has some, one, or one for each set that was asked of both.
 
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves
@@ -74,7 +74,7 @@ def assess(
         reason = f"{type(error).__name__}: {error}"
         return EngineVerdict(engine=by.name, outcome=Outcome.ERROR, reason=reason)
     shared = {
-        (c.bearing, m.set) for c in trial if ((m := c.measurement).protocol, m.set) in given.asked
+        (c.criterion, m.set) for c in trial if ((m := c.measurement).protocol, m.set) in given.asked
     }
     if not shared and not any(found.values()):
         why = "at this level nothing that bears on the claim was asked of it"
@@ -86,8 +86,8 @@ def assess(
         limits = zero_step_limits(found, given.finest, ends)
         checks = tuple(check for check, _ in limits)
         orders = [order for _, order in limits if math.isfinite(order)]
-    most = reduce(or_, map(per_bearing, found.values()))
-    wanted = most | Counter(n for n, _ in shared) | Counter({check.bearing for check in trial})
+    most = reduce(or_, map(per_criterion, found.values()))
+    wanted = most | Counter(n for n, _ in shared) | Counter({check.criterion for check in trial})
     lost = given.lost
     few = _too_few(claim, checks, wanted, given.missing)
     usual = (
@@ -162,18 +162,18 @@ def _loosened(checks: Sequence[Check], share: float) -> tuple[Check, ...]:
 def _too_few(
     claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]
 ) -> str:
-    """In words of which bearings too few numbers can tell, and what was not measured of these;
+    """In words of which criteria too few numbers can tell, and what was not measured of these;
     empty if of none."""
-    if not (few := undecided_bearings(checks, wanted)):
+    if not (few := undecided_criteria(checks, wanted)):
         return ""
     symbols: dict[str, list[str]] = {}
     for n, told in sorted(few.items()):
-        symbol = quantity(claim.bearings[n].quantity).symbol
+        symbol = quantity(claim.criteria[n].quantity).symbol
         symbols.setdefault(f"{told} of {wanted[n]}", []).append(symbol)
     counts = " and ".join(
         f"{count} in {', '.join(dict.fromkeys(those))}" for count, those in symbols.items()
     )
-    protocols = {claim.bearings[n].protocol for n in few}
+    protocols = {claim.criteria[n].protocol for n in few}
     gone = [str(each) for each in missing if each.protocol in protocols]
     return "; ".join([f"too few numbers can tell: {counts}", *gone[:SEVERAL]])
 

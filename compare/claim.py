@@ -1,6 +1,6 @@
 """Statements of the paper that can be checked, and the verdicts on them.
 
-A claim says what is stated and where, and which measurements bear on it: a `Bearing` picks
+A claim says what is stated and where, and which measurements bear on it: a `Criterion` picks
 measurements by protocol, quantity and conditions, and predicts each by a function of `analytic`.
 The verdict is computed from the numbers. That the paper's text had to be corrected is another
 matter: `Claim.text`."""
@@ -60,7 +60,7 @@ def all_of(*whens: When) -> When:
 
 
 @dataclass(frozen=True)
-class Bearing:
+class Criterion:
     """Measurements that bear on a claim, and what theory says they should be."""
 
     protocol: str
@@ -87,7 +87,7 @@ class Claim:
     source: str
     """Proposition, equation, figure or table."""
     statement: str
-    bearings: tuple[Bearing, ...]
+    criteria: tuple[Criterion, ...]
     _: KW_ONLY
     text: Text = Text.PRINTED
     reason: str = ""
@@ -101,45 +101,45 @@ class Claim:
     """FILE:LINE where it is written."""
 
     def __post_init__(self) -> None:
-        if not self.bearings:
+        if not self.criteria:
             raise ValueError(f"claim {self.id}: no measurement bears on it")
 
     @cached_property
     def numbers(self) -> frozenset[int]:
-        """Which bearings predict a number, and not a case, a count, or a bound on one side only."""
-        sides = {(each.protocol, each.quantity, each.relation) for each in self.bearings}
+        """Which criteria predict a number, and not a case, a count, or a bound on one side only."""
+        sides = {(each.protocol, each.quantity, each.relation) for each in self.criteria}
 
-        def predicts(of: Bearing) -> bool:
+        def predicts(of: Criterion) -> bool:
             if of.relation is Relation.EQUAL:
                 return quantity(of.quantity).resolution > 0
             both = Relation.AT_MOST, Relation.AT_LEAST
             return all((of.protocol, of.quantity, each) in sides for each in both)
 
-        return frozenset(n for n, each in enumerate(self.bearings) if predicts(each))
+        return frozenset(n for n, each in enumerate(self.criteria) if predicts(each))
 
     @property
     def protocols(self) -> frozenset[str]:
         """Names of the protocols whose measurements bear on it."""
-        return frozenset(bearing.protocol for bearing in self.bearings)
+        return frozenset(criterion.protocol for criterion in self.criteria)
 
 
-def bearings(
+def criteria(
     protocol: str,
     quantities: Iterable[str],
     predict: Callable[[Measurement], Prediction],
     **more: Any,
-) -> tuple[Bearing, ...]:
-    """A `Bearing` for each of several quantities of one protocol, all predicted by one function."""
-    return tuple(Bearing(protocol, quantity, predict, **more) for quantity in quantities)
+) -> tuple[Criterion, ...]:
+    """A `Criterion` for each of several quantities of a protocol, all predicted by one function."""
+    return tuple(Criterion(protocol, quantity, predict, **more) for quantity in quantities)
 
 
-def claim(id: str, source: str, statement: str, *bearings: Bearing, **more: Any) -> Claim:
-    """A claim with the bearings of the measurements that bear on it; `more` are other fields of
+def claim(id: str, source: str, statement: str, *criteria: Criterion, **more: Any) -> Claim:
+    """A claim with the criteria of the measurements that bear on it; `more` are other fields of
     `Claim`."""
     written = sys._getframe(1)
     file = Path(written.f_code.co_filename).relative_to(Path(__file__).parents[1])
     place = f"{file.as_posix()}:{written.f_lineno}"
-    return Claim(id, source, statement, bearings, place=place, **more)
+    return Claim(id, source, statement, criteria, place=place, **more)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,9 +20,9 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
-from compare.kit.lab import coarse_step
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement
+from compare.kit.runner import coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import COVERAGE, Estimate
 from model.arrays import Array
@@ -259,7 +259,7 @@ class Alike:
     conditions."""
 
     protocol: str
-    bearing: int
+    criterion: int
     set: str
     texts: tuple[tuple[str, str], ...]
 
@@ -268,7 +268,7 @@ class Alike:
         """What a check shares with those of the same thing with other steps."""
         m = check.measurement
         texts = sorted((name, v) for name, v in m.conditions.items() if isinstance(v, str))
-        return cls(m.protocol, check.bearing, m.set, tuple(texts))
+        return cls(m.protocol, check.criterion, m.set, tuple(texts))
 
 
 def _pair_nearest(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tuple[int, int]]:

@@ -11,7 +11,7 @@ from typing import ParamSpec, TypeVar
 
 import analytic
 from analytic.orbits.periodic import NoOrbitError
-from compare.claim import Bearing, Claim, Outcome, Verdict
+from compare.claim import Claim, Criterion, Outcome, Verdict
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records
 from compare.kit.statistics import COVERAGE, Estimate
@@ -28,7 +28,7 @@ UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 breakdown."""
 
 ENOUGH = 2 / 3
-"""Part of the numbers of each bearing that must be able to tell."""
+"""Part of the numbers of each criterion that must be able to tell."""
 SILENT = "its protocol measured nothing, and does not say why"
 
 _computed = functools.cache(lambda function, *args, **options: function(*args, **options))
@@ -72,7 +72,7 @@ def forget() -> None:
 def verdict(claim: Claim, records: Records) -> Verdict:
     """The verdict on a claim: each measurement beside its prediction, and the outcome.
 
-    Refuted if one check deviates beyond its tolerance; else inconclusive if of a bearing too few
+    Refuted if one check deviates beyond its tolerance; else inconclusive if of a criterion too few
     checks are fine enough to tell, see `ENOUGH`; else not run if the claim predicts numbers and has
     none, since counts confirm no number; else inconclusive if planned numbers are lost without a
     reason that their protocol gave; else confirmed. A check that is too coarse confirms nothing, and is
@@ -99,7 +99,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         )
     return Verdict(
         claim=claim,
-        outcome=outcome(claim, checks, per_bearing(checks), lost),
+        outcome=outcome(claim, checks, per_criterion(checks), lost),
         checks=checks,
         missing=missing,
     )
@@ -108,21 +108,21 @@ def verdict(claim: Claim, records: Records) -> Verdict:
 def outcome(
     claim: Claim, checks: Sequence[Check], wanted: Counter[int], lost: Sequence[Missing] = ()
 ) -> Outcome:
-    """The outcome of a claim by its checks; `wanted` is how many were to be made for each bearing.
-    See `verdict`."""
+    """The outcome of a claim by its checks; `wanted` is how many were to be made for each
+    criterion. See `verdict`."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
-    if undecided_bearings(checks, wanted):
+    if undecided_criteria(checks, wanted):
         return Outcome.INCONCLUSIVE
-    if not checks or (claim.numbers and claim.numbers.isdisjoint(per_bearing(checks))):
+    if not checks or (claim.numbers and claim.numbers.isdisjoint(per_criterion(checks))):
         return Outcome.NOT_RUN
     return Outcome.INCONCLUSIVE if lost else Outcome.CONFIRMED
 
 
 def lost_to(claim: Claim, records: Records) -> tuple[Missing, ...]:
     """What a claim misses of the planned numbers, though no protocol said why."""
-    asked = {(each.protocol, each.quantity) for each in claim.bearings}
-    asked |= {(each.protocol, "") for each in claim.bearings}
+    asked = {(each.protocol, each.quantity) for each in claim.criteria}
+    asked |= {(each.protocol, "") for each in claim.criteria}
     return tuple(
         Missing(protocol, of, f"{name} was measured and is lost" if name else SILENT, rows)
         for (protocol, of, name), rows in sorted(records.lost.items())
@@ -130,33 +130,33 @@ def lost_to(claim: Claim, records: Records) -> tuple[Missing, ...]:
     )
 
 
-def per_bearing(checks: Iterable[Check]) -> Counter[int]:
-    """How many checks there are of each bearing, by its number."""
-    return Counter(check.bearing for check in checks)
+def per_criterion(checks: Iterable[Check]) -> Counter[int]:
+    """How many checks there are of each criterion, by its number."""
+    return Counter(check.criterion for check in checks)
 
 
-def undecided_bearings(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
-    """Bearings of which too few of the checks that are wanted can tell, and how many can."""
-    told = per_bearing(check for check in checks if check.conclusive)
+def undecided_criteria(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
+    """Criteria of which too few of the checks that are wanted can tell, and how many can."""
+    told = per_criterion(check for check in checks if check.conclusive)
     return {n: told[n] for n, count in wanted.items() if told[n] < ENOUGH * count}
 
 
 def checks_of(claim: Claim, records: Records) -> list[Check]:
     """Every measurement that bears on a claim beside its prediction."""
     return [
-        replace(check(bearing, m), bearing=n)
-        for n, bearing in enumerate(claim.bearings)
-        for m in records.select(bearing.protocol, bearing.quantity, bearing.when)
+        replace(check(criterion, m), criterion=n)
+        for n, criterion in enumerate(claim.criteria)
+        for m in records.select(criterion.protocol, criterion.quantity, criterion.when)
     ]
 
 
-def check(bearing: Bearing, m: Measurement) -> Check:
+def check(criterion: Criterion, m: Measurement) -> Check:
     """One measurement beside its prediction; the scale of what must be exactly equal is 1."""
     known = quantity(m.quantity)
     try:
-        prediction = bearing.predict(m)
+        prediction = criterion.predict(m)
         own = prediction if isinstance(prediction, Estimate) else Estimate(float(prediction), 0.0)
-        size = bearing.size(m) if bearing.size else known.size(m.parameters, own.value)
+        size = criterion.size(m) if criterion.size else known.size(m.parameters, own.value)
     except UNKNOWN:
         own, size = Estimate(math.nan, 0.0), 1.0
     return Check(
@@ -164,7 +164,7 @@ def check(bearing: Bearing, m: Measurement) -> Check:
         predicted=own.value,
         tolerance=COVERAGE * math.hypot(m.uncertainty, own.uncertainty),
         scale=1.0 if known.resolution == 0 else size,
-        relation=bearing.relation,
+        relation=criterion.relation,
     )
 
 

@@ -18,13 +18,13 @@ from compare.judge import forget, select
 from compare.kit import programme
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import Evidence
-from compare.kit.engines import WITNESSES, Engine
-from compare.kit.lab import Lab
+from compare.kit.engines import USUAL_ENGINES, Engine
 from compare.kit.levels import Level
 from compare.kit.plan import planned
 from compare.kit.programme import Job, Protocol
 from compare.kit.progress import Show, ValidationProgress, show_nothing
 from compare.kit.record import Missing, Records, RecordsByEngine
+from compare.kit.runner import Runner
 from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes
 from compare.report import results
 from compare.report.results import Summary
@@ -105,16 +105,16 @@ class Study:
 
     def jobs(self, campaign: Campaign, protocols: Sequence[Protocol] | None = None) -> list[Job]:
         """Every protocol by every engine with every step that is planned."""
-        labs = [
-            Lab(campaign, each, self.level, divisor)
+        runners = [
+            Runner(campaign, each, self.level, divisor)
             for each in self.engines
             for divisor in each.refine
         ]
         return [
-            Job(protocol, lab, self.output, self.sets)
-            for lab in labs
+            Job(protocol, runner, self.output, self.sets)
+            for runner in runners
             for protocol in protocols or self.protocols
-            if planned(protocol.name, lab.engine, lab.refine, lab.level)
+            if planned(protocol.name, runner.engine, runner.refine, runner.level)
         ]
 
     def files(self, campaign: Campaign) -> results.Files:
@@ -126,7 +126,7 @@ class Study:
         for job in self.jobs(campaign, PROTOCOLS):
             if job.file.exists():
                 name = job.file.relative_to(self.output).as_posix()
-                files[job.lab.engine.name][job.lab.refine].append(name)
+                files[job.runner.engine.name][job.runner.refine].append(name)
         return files
 
 
@@ -148,7 +148,7 @@ def plan(
         names = [protocol.name for protocol in PROTOCOLS]
     results.open_directory(output)
     needed = programme.with_needed(PROTOCOLS, names)
-    return Study(output, level, [engine] if engine else [*WITNESSES], chosen, needed, sets)
+    return Study(output, level, [engine] if engine else [*USUAL_ENGINES], chosen, needed, sets)
 
 
 @dataclass
@@ -165,17 +165,17 @@ class SoFar:
 
     def take(self, job: Job, found: Records | Exception) -> None:
         """Take in what a protocol has measured, or its error."""
-        name, engine = job.protocol.name, job.lab.engine.name
+        name, engine = job.protocol.name, job.runner.engine.name
         self.waiting[name] -= 1
         if not isinstance(found, Exception):
-            self.records[engine][job.lab.refine] += found
+            self.records[engine][job.runner.refine] += found
             return
         why = f"{type(found).__name__}: {found}"
         if engine == next(iter(self.records)):
             self.broken[name] = f"{name}: {why}"
         else:
             rows = (Missing(name, each, f"{job.name}: {why}") for each in job.sets)
-            self.records[engine][job.lab.refine] += Records(missing=tuple(rows))
+            self.records[engine][job.runner.refine] += Records(missing=tuple(rows))
 
     def verdict(self, claim: Claim) -> Verdict:
         """The verdict on a claim, an error if one of its protocols broke down."""

@@ -17,7 +17,7 @@ from scipy.integrate import BDF, LSODA
 from scipy.optimize import brentq
 
 from analytic.simulation import equations, hybrid
-from analytic.simulation.charts import TURNING, least_slip
+from analytic.simulation.coordinates import TURNING, least_slip
 from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP
 from analytic.simulation.integrator import Pace, finish_straight
 from analytic.simulation.solvers import DONE, EPS, FIRED, PAUSED, STUCK, Stretch

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
-from compare.claim import Bearing, Claim
+from compare.claim import Claim, Criterion
 from compare.kit.record import Condition, Measurement, Records
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.trajectory import SAMPLE
@@ -35,15 +35,15 @@ def measured(
     )
 
 
-def claim(name: str = "it", *bearings: Bearing, **others: Any) -> Claim:
-    """A claim, that a ball in a stationary state goes round with the flow unless bearings are
+def claim(name: str = "it", *criteria: Criterion, **others: Any) -> Claim:
+    """A claim, that a ball in a stationary state goes round with the flow unless criteria are
     given."""
-    own = bearings or (Bearing("settled", "omega_c", lambda m: m.parameters.omega_0),)
+    own = criteria or (Criterion("settled", "omega_c", lambda m: m.parameters.omega_0),)
     given = {
         "section": "Stationary states",
         "source": "(1)",
         "statement": "So it is.",
-        "bearings": own,
+        "criteria": own,
     }
     return Claim(id=name, **(given | others))
 

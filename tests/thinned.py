@@ -44,9 +44,9 @@ def thinned(records: Records, thin: Thin) -> Records:
     return replace(records, measurements=left)
 
 
-def without_bearing(claim: Claim, records: Records) -> Records:
-    """Records without what bears on the last bearing of a claim."""
-    last = claim.bearings[-1]
+def without_criterion(claim: Claim, records: Records) -> Records:
+    """Records without what bears on the last criterion of a claim."""
+    last = claim.criteria[-1]
     gone = {id(m) for m in records.select(last.protocol, last.quantity, last.when)}
     left = tuple(m for m in records.measurements if id(m) not in gone)
     return replace(records, measurements=left)
@@ -76,11 +76,11 @@ def main(directory: str) -> None:
     for way, thin in WAYS.items():
         left = changed(testimony, lambda records, thin=thin: thinned(records, thin))
         report(way, confirmed, {claim.id: outcomes(claim, left) for claim in asked})
-    bearing = {
-        claim.id: outcomes(claim, changed(testimony, lambda r, of=claim: without_bearing(of, r)))
+    criterion = {
+        claim.id: outcomes(claim, changed(testimony, lambda r, of=claim: without_criterion(of, r)))
         for claim in asked
     }
-    report("the last bearing of each claim gone", confirmed, bearing)
+    report("the last criterion of each claim gone", confirmed, criterion)
 
 
 def report(way: str, confirmed: set[tuple[str, str]], after: dict[str, dict[str, Outcome]]) -> int:

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation.motion import Moment
+from analytic.simulation.motion import HybridState
 from analytic.simulation.settings import (
     ENDLESS,
     LANDED,
@@ -188,11 +188,11 @@ def _run_event_driven(run: _Run) -> tuple[float, str]:
     did."""
     from analytic.simulation import hybrid  # here, since scipy and numba take a while to load
 
-    blow = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
-    each = run.times, run.x, run.case, run.landings, hybrid.Stop(blow, run.quiet, run.over)
+    impact = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
+    each = run.times, run.x, run.case, run.landings, hybrid.Stop(impact, run.quiet, run.over)
     given = hybrid.prepare(run.p, run.flow, run.settings, float(run.times[-1]))
     rows, failure = hybrid.carry_out(
-        Moment(0.0, 0.0, run.x0), *given, partial(hybrid.Record.of, *each, whole=False)
+        HybridState(0.0, 0.0, run.x0), *given, partial(hybrid.Record.of, *each, whole=False)
     )
     last = int(rows.taken[0]) - 1
     if failure:

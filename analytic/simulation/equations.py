@@ -1,4 +1,4 @@
-"""Rates of the coordinates of `charts`, and what ends a case, on plain floats, compiled by numba.
+"""Rates of what `coordinates` has, and what ends a case, on plain floats, compiled by numba.
 
 At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with
 h = 0; away from it both are written in the resting frame. `dynamics` has them for arrays of states,
@@ -220,7 +220,7 @@ def rates(t: float, z: Any, k: Motion, out: Any) -> None:
 
 
 def guards(t: float, z: Any, k: Motion, out: Any) -> None:
-    """What is positive while a case lasts, in natural units, in the order of `charts.ENDS`."""
+    """What is positive while a case lasts, in natural units, in the order of `coordinates.ENDS`."""
     if k.case % 3 == AWAY:
         return _guards_away(t, z, k, out)
     omega_c, v_y, w_x, _, q_A, s_A, c_A, q_B, s_B, c_B, _ = _wall_state(z, k)

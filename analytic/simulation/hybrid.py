@@ -1,6 +1,6 @@
 """Event-driven simulation: each case by its own equations, from one change of case to the next.
 
-`follow` goes along the coordinates of `charts` up to the guard that turns negative first, and
+`follow` goes along the coordinates of `coordinates` up to the guard that turns negative first, and
 `transitions` says how to go on. All is compiled together, so that a run is one call, which threads
 can make at once."""
 
@@ -17,11 +17,11 @@ import numpy.typing as npt
 
 from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import Forces
-from analytic.simulation import charts, compiling, equations, motion, transitions
-from analytic.simulation.charts import NONE
+from analytic.simulation import compiling, coordinates, equations, motion, transitions
+from analytic.simulation.coordinates import NONE
 from analytic.simulation.equations import A_LANDS, AWAY, Motion
 from analytic.simulation.integrator import StalledError, first_pace, stretch
-from analytic.simulation.motion import Moment, Recorder
+from analytic.simulation.motion import HybridState, Recorder
 from analytic.simulation.settings import ENDLESS, Settings
 from analytic.simulation.solvers import DONE, FIRED, STUCK, Stretch
 from model import Case, Contact, Flow, Parameters, State
@@ -38,7 +38,7 @@ STRIDES, STEPS = 20, 1000
 class Stage(NamedTuple):
     """How far a run has come: the moment, the case, and what is counted."""
 
-    at: Moment
+    at: HybridState
     case: int = NONE
     begun: int = 0
     """Pieces of the flow that have begun."""
@@ -49,7 +49,7 @@ class Stage(NamedTuple):
 class Stop(NamedTuple):
     """What stops a run before its end."""
 
-    blow: float
+    impact: float
     """Normal impulse from which a landing counts, N s."""
     quiet: float
     """For how long nothing must land for the run to be stopped, s."""
@@ -86,7 +86,7 @@ class Record(NamedTuple):
         """A new record that fills the arrays given; paths and events are kept only if the `whole`
         run is wanted."""
         n, events = (len(times), 3 * STRIDES) if whole else (0, 0)
-        path, z = np.empty((n, 5)), np.empty(len(times) * charts.MOST)
+        path, z = np.empty((n, 5)), np.empty(len(times) * coordinates.MOST)
         reached = [0.0, _quiet_from(0.0, times, stop.quiet)]
         landings[:] = 0
         taken = np.zeros(2, np.int64)
@@ -95,23 +95,26 @@ class Record(NamedTuple):
         )
 
 
-def _moment_parts(at: Moment) -> tuple[Any, ...]:
+def _state_parts(at: HybridState) -> tuple[Any, ...]:
     """The fields of a moment as a plain tuple."""
     return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
 
 
 def follow(
-    case: int, at: Moment, until: float, k: Motion, run: Record, steps: int
-) -> tuple[int, Moment]:
+    case: int, at: HybridState, until: float, k: Motion, run: Record, steps: int
+) -> tuple[int, HybridState]:
     """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and
     the moment then."""
-    room = np.empty((6, charts.MOST))
-    k, n = charts.begin(case, at, k, room[0], room[1])
-    z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], charts.count_guards(k)
+    room = np.empty((6, coordinates.MOST))
+    k, n = coordinates.begin(case, at, k, room[0], room[1])
+    z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], coordinates.count_guards(k)
     values, arm, level = room[3, :count], room[4, :count], room[5, :count]
     lands, until = k.fall.landing <= until, min(until, k.fall.landing)
     equations.guards(at.time, z, k, values)
-    opens, lasts = charts.arm_guards(values, k, arm, level), charts.rebound_time(at, z, k, rate)
+    opens, lasts = (
+        coordinates.arm_guards(values, k, arm, level),
+        coordinates.rebound_time(at, z, k, rate),
+    )
     pace = first_pace(
         at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0
     )
@@ -128,33 +131,39 @@ def follow(
         raise InterruptedError("nobody wants the run any more")
     if why == STUCK:
         raise StalledError("steps become too short")
-    fired = charts.ENDS[case][guard] if why == FIRED else A_LANDS if lands and why == DONE else NONE
-    return fired, _with_nearest_azimuth(charts.moment(now, z, at, k), k, near)
+    fired = (
+        coordinates.ENDS[case][guard]
+        if why == FIRED
+        else A_LANDS
+        if lands and why == DONE
+        else NONE
+    )
+    return fired, _with_nearest_azimuth(coordinates.hybrid_state(now, z, at, k), k, near)
 
 
-def _with_nearest_azimuth(at: Moment, k: Motion, near: float) -> Moment:
+def _with_nearest_azimuth(at: HybridState, k: Motion, near: float) -> HybridState:
     """The same moment; of the azimuths that it may have off the wall that which is nearest to
     another."""
     if k.case % 3 != AWAY:
         return at
     theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
-    return Moment(at.time, theta, at.x, at.alpha, at.beta, at.work)
+    return HybridState(at.time, theta, at.x, at.alpha, at.beta, at.work)
 
 
-def _keep_samples(of: Stretch, at: Moment, taken: int, run: Record) -> float:
+def _keep_samples(of: Stretch, at: HybridState, taken: int, run: Record) -> float:
     """Store samples up to number `taken` of a stretch that began at `at`; return the azimuth at the
     last, or `at`'s."""
     near = at.theta
     for row in range(run.taken[0], taken):
         m = _with_nearest_azimuth(
-            charts.moment(run.times[row], of.samples[row], at, of.k), of.k, near
+            coordinates.hybrid_state(run.times[row], of.samples[row], at, of.k), of.k, near
         )
         near = m.theta
         _keep_sample(m, of.k, run)
     return near
 
 
-def _keep_sample(at: Moment, k: Motion, run: Record) -> None:
+def _keep_sample(at: HybridState, k: Motion, run: Record) -> None:
     """Store a moment as the next sample."""
     row = run.taken[0]
     for i in range(8):
@@ -167,9 +176,9 @@ def _keep_sample(at: Moment, k: Motion, run: Record) -> None:
     run.taken[0] += 1
 
 
-def _keep_event(run: Record, at: Moment, case: int, after: int, impulse: Forces) -> None:
+def _keep_event(run: Record, at: HybridState, case: int, after: int, impulse: Forces) -> None:
     """Store a change of case or an impact, and count landings."""
-    if max(impulse.A_y, impulse.B_x) > run.stop.blow:
+    if max(impulse.A_y, impulse.B_x) > run.stop.impact:
         run.landings[min(run.taken[0], len(run.times) - 1)] += 1
         run.reached[1] = _quiet_from(at.time, run.times, run.stop.quiet)
     if run.taken[1] < len(run.events):
@@ -217,7 +226,7 @@ def run_through_flow(
                 case = after
         while at.time < min(end, run.reached[1]):
             if strides == 0:
-                return False, _moment_parts(at), case, begun, at_once
+                return False, _state_parts(at), case, begun, at_once
             strides -= 1
             since = at.time
             guard, at = follow(case, at, min(end, run.reached[1]), k, run, steps)
@@ -229,7 +238,7 @@ def run_through_flow(
             at_once = at_once + 1 if at.time - since <= 1e-14 * end else 0
             if at_once > MAX_EVENTS_AT_ONCE:
                 raise StalledError("no way on: one change of case follows the other")
-    return True, _moment_parts(at), case, begun, at_once
+    return True, _state_parts(at), case, begun, at_once
 
 
 @lru_cache
@@ -251,7 +260,7 @@ def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tupl
 
 
 def carry_out(
-    start: Moment,
+    start: HybridState,
     k: Motion,
     pieces: Array,
     rows: Callable[[], Record],
@@ -271,7 +280,7 @@ def carry_out(
                 done, (time, theta, x, *rest), *far = run_through_flow(
                     stage, k._replace(rtol=rtol), pieces, run, STRIDES if look else ENDLESS, STEPS
                 )
-                stage = Stage(Moment(time, theta, State(*x), *rest), *far)
+                stage = Stage(HybridState(time, theta, State(*x), *rest), *far)
                 if look:
                     look(run)
             return run, None
@@ -303,7 +312,7 @@ def run(
         recorder.note(run.events[:count], float(run.reached[0]))
 
     done, failure = carry_out(
-        Moment(0.0, theta_0, x0), *prepare(p, flow, settings, float(times[-1])), rows, look
+        HybridState(0.0, theta_0, x0), *prepare(p, flow, settings, float(times[-1])), rows, look
     )
     events += done.events[: done.taken[1]].tolist()
     recorder.time = max(recorder.time, float(done.reached[0]))

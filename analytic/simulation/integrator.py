@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from analytic.simulation import charts, equations
+from analytic.simulation import coordinates, equations
 from analytic.simulation.equations import ONSET_SLIP, PATIENCE, SMALL_SLIP
 from analytic.simulation.solvers import (
     DONE,
@@ -38,7 +38,7 @@ def first_pace(
 ) -> Pace:
     """How steps begin in a stretch (a `Pace`); if a contact `opens`, a straight line is tried at
     once."""
-    small = charts.least_slip(z, scale, case) < ONSET_SLIP
+    small = coordinates.least_slip(z, scale, case) < ONSET_SLIP
     return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 
 
@@ -96,7 +96,7 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
             total += value
         if not abs(total) < math.inf:
             why = STUCK
-        slow = 0 if charts.least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP else slow + 1
+        slow = 0 if coordinates.least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP else slow + 1
         if why == OTHER:
             start, tau, h, small = start + tau, 0.0, 0.0, not small
     return why, (start, tau, h, small, slow), guard, taken

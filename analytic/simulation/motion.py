@@ -20,7 +20,7 @@ from model.drag import STOKES
 from model.trajectory import samples
 
 
-class Moment(NamedTuple):
+class HybridState(NamedTuple):
     """A state with its time and azimuth, the directions of slip, and the work done so far."""
 
     time: float

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import DOP853
 
-from analytic.simulation import charts, equations
+from analytic.simulation import coordinates, equations
 from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, Motion
 from model.arrays import Array
 
@@ -63,8 +63,8 @@ class Stretch(NamedTuple):
     samples: Array
     """Coordinates then (m, n)."""
     arm: Array
-    """Above which values guards are armed, and at which they fire (guards,), as `charts.arm_guards`
-    says."""
+    """Above which values guards are armed, and at which they fire (guards,), as
+    `coordinates.arm_guards` says."""
     level: Array
 
 
@@ -211,7 +211,7 @@ def _first_length(share: float, rate: Array, left: float, of: Stretch) -> float:
 def _time_to_stop(rate: Array, rtol: float, of: Stretch) -> float:
     """The time that a slip which dies has left, along a straight line; inf if a direction turns too
     much for it."""
-    left, (first, end) = math.inf, charts.TURNING[of.k.case]
+    left, (first, end) = math.inf, coordinates.TURNING[of.k.case]
     for i in range(first, end, 2):
         if of.z[i] < DYING * of.scale[i] and rate[i] < 0:
             left = min(left, -of.z[i] / rate[i])
@@ -309,7 +309,7 @@ def explicit_steps(
         grow = GROW if error == 0 else min(GROW, SAFETY * error**-0.125)
         h *= min(grow, 1.0) if rejected else grow
         rejected = False
-        least = charts.least_slip(z, scale, k.case)
+        least = coordinates.least_slip(z, scale, k.case)
         slow = slow + 1 if least <= SMALL_SLIP else 0
         left = _time_to_stop(K[0], rtol, of) if least < DYING else math.inf
         if tau + left <= span and (
@@ -401,7 +401,7 @@ def implicit_steps(
     A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times
     that for a slip."""
     k, until, z, scale, times, samples, arm, level = of
-    n, span, (first, end) = len(z), until - start, charts.TURNING[k.case]
+    n, span, (first, end) = len(z), until - start, coordinates.TURNING[k.case]
     table, J, here, rate = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty(n), np.empty(n)
     now, values = np.empty(n), np.empty(len(arm))
     for _ in range(PATIENCE):
@@ -461,6 +461,6 @@ def implicit_steps(
             h = length * min(
                 4.0, 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns)
             )
-        if charts.least_slip(z, scale, k.case) > GROWN_SLIP:
+        if coordinates.least_slip(z, scale, k.case) > GROWN_SLIP:
             return OTHER, tau, 0.0, -1, taken
     return PAUSED, tau, h, -1, taken

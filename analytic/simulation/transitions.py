@@ -36,7 +36,7 @@ from analytic.simulation.equations import (
     SS,
     Motion,
 )  # fmt: skip
-from analytic.simulation.motion import Moment
+from analytic.simulation.motion import HybridState
 from model import State
 
 LEAST_ACCELERATION = 1e-9
@@ -53,7 +53,7 @@ leaves less."""
 UNSETTLED = "the contact problem doesn't settle"
 
 
-def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
+def react(guard: int, case: int, at: HybridState, k: Motion) -> tuple[int, HybridState, Forces]:
     """What follows when a guard has fired: the next case, the moment at its start, and impulses of
     an impact."""
     x, A, B = at.x, case // 3, case % 3
@@ -103,7 +103,7 @@ def react(guard: int, case: int, at: Moment, k: Motion) -> tuple[int, Moment, Fo
     )
 
 
-def settle(at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
+def settle(at: HybridState, k: Motion) -> tuple[int, HybridState, Forces]:
     """Collide if the ball moves into something it touches, then find the case."""
     x, impulse = at.x, NOTHING
     if (x.y == 0 and x.v_y < 0) or (x.h == 0 and x.v_h < 0):
@@ -112,12 +112,12 @@ def settle(at: Moment, k: Motion) -> tuple[int, Moment, Forces]:
     return case, at, impulse
 
 
-def with_directions(at: Moment, x: State, alpha: float, beta: float) -> Moment:
+def with_directions(at: HybridState, x: State, alpha: float, beta: float) -> HybridState:
     """The moment with another state and directions of slip."""
-    return Moment(at.time, at.theta, x, alpha, beta, at.work)
+    return HybridState(at.time, at.theta, x, alpha, beta, at.work)
 
 
-def choose(at: Moment, k: Motion) -> tuple[int, Moment]:
+def choose(at: HybridState, k: Motion) -> tuple[int, HybridState]:
     """The case in which a ball goes on, and the moment with the directions of slip filled in.
 
     Contacts are closed where gap and normal speed are exactly zero, and still where the slip is.
@@ -138,7 +138,7 @@ def choose(at: Moment, k: Motion) -> tuple[int, Moment]:
     return leave(at, k)
 
 
-def leave(at: Moment, k: Motion) -> tuple[int, Moment]:
+def leave(at: HybridState, k: Motion) -> tuple[int, HybridState]:
     """The case that follows RR where slip or lift lasts, and the moment with its slip directions.
 
     Friction is full where slip sets in and opposes it: forces and rates pass continuously from
@@ -171,8 +171,8 @@ def _contact(closed: bool, s: float, t: float) -> Closed:
 
 
 def _by_accelerations(
-    at: Moment, A: Closed, B: Closed, start: Forces, k: Motion
-) -> tuple[int, Moment]:
+    at: HybridState, A: Closed, B: Closed, start: Forces, k: Motion
+) -> tuple[int, HybridState]:
     """Case and slip directions by the contact problem of the accelerations, solved from the forces
     `start`."""
     free = equations.smooth_rates(rigid_body.velocities(at.x, k), at.x.h, at.time, k)
@@ -200,7 +200,7 @@ def _contact_after(
     return (SLIPS, s, t) if math.hypot(s, t) > still else (ROLLS, 0.0, 0.0)
 
 
-def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
+def collide(at: HybridState, k: Motion) -> tuple[HybridState, Forces]:
     """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's
     restitution.
 
@@ -250,4 +250,4 @@ def collide(at: Moment, k: Motion) -> tuple[Moment, Forces]:
     if B.closed and P.B_x > 0 and math.hypot(s_B, t_B) <= still:
         slip_y = slip_z = 0.0
     after = State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h)
-    return Moment(at.time, at.theta, after, math.nan, math.nan, work), P
+    return HybridState(at.time, at.theta, after, math.nan, math.nan, work), P

@@ -97,7 +97,7 @@ class Bodies(Free):
 class Lawful(Bodies):
     """Rigid contacts under Coulomb's law; of a cylinder a piece of wall that goes with the body.
 
-    A blow takes two steps, and what bore a body until then may let go in the first; so steps are
+    An impact takes two steps, and what bore a body until then may let go in the first; so steps are
     short round it."""
 
     FEATURES = (*FEATURES, "restitution")

@@ -43,7 +43,7 @@ class Surface:
     velocity: Vector = (0.0, 0.0, 0.0)
     """Of its material along itself, m/s; a belt has one."""
     restitution: float = 0.0
-    """Share of its normal speed with which the body leaves it after a blow."""
+    """Share of its normal speed with which the body leaves it after an impact."""
     across: float | None = None
     """Coulomb's coefficient along y on a level plane whose `friction` is that along x: the force is
     within an ellipse, and the one in it that takes the most power. None: the same in every

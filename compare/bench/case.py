@@ -27,7 +27,7 @@ of first order is wrong by about a step divided by the time that the motion take
 
 
 @dataclass(frozen=True, kw_only=True)
-class Case(Scene):
+class ContactCase(Scene):
     """A scene and its exact motion."""
 
     about: str
@@ -165,7 +165,7 @@ def reach(body: Body, normal: Array) -> Array:
     return np.full(len(normal), body.size[0] + (body.size[2] if body.shape == "tripod" else 0.0))
 
 
-def read(path: Path) -> Case:
+def read(path: Path) -> ContactCase:
     """A case from a file that `dualball cases -o` wrote, of this version or one before; without its
     wrong answers.
 
@@ -188,13 +188,13 @@ def read(path: Path) -> Case:
             )
         own = {
             each.name: data[each.name]
-            for each in fields(Case)
+            for each in fields(ContactCase)
             if each.name in data and each.name != "wrong"
         }
         own["scales"] = [math.inf if scale is None else scale for scale in own["scales"]]
         own["surfaces"] = [Surface(**_tuples(surface)) for surface in own["surfaces"]]
         own |= {name: Body(**_tuples(own[name])) for name in ("body", "under") if own.get(name)}
-        return Case(
+        return ContactCase(
             **_tuples(own) | {name: np.array(own[name], float) for name in ("times", "exact")}
         )
 

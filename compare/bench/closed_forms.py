@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from compare.adapters.scene import Body, Surface, Vector
-from compare.bench.case import Case
+from compare.bench.case import ContactCase
 from model import Parameters, State
 from model.arrays import Array
 
@@ -23,7 +23,7 @@ G, J = 9.81, 0.4
 RADIUS, BLOCK, MU = 0.1, (0.1, 0.1, 0.05), 0.5
 """Radius of the spheres and half edges of the blocks, m; all weigh 1 kg; friction of most
 surfaces."""
-CLOSED_FORMS: list[Callable[[], Case]] = []
+CLOSED_FORMS: list[Callable[[], ContactCase]] = []
 """Functions that make these cases, in the order in which they are listed."""
 CLOSED = 1e-14
 """Round-off of a closed form, in units of the scales."""
@@ -52,12 +52,12 @@ def closed_form(
     source: str,
     under: Mapping[str, Any] | None = None,
     **forces: Any,
-) -> Case:
+) -> ContactCase:
     """A case whose course is a closed form, sampled 25 times; `wrong` are other constants of the
     course.
 
-    `contacts` are the letters of `Case.contacts`, with the times at which they change, s, between
-    them."""
+    `contacts` are the letters of `ContactCase.contacts`, with the times at which they change, s,
+    between them."""
     times: Array = np.arange(1.0, 26.0) * (until / 25)
     letters, changes = contacts[::2], contacts[1::2]
 
@@ -67,7 +67,7 @@ def closed_form(
         )
 
     start: Any = [tuple(np.broadcast_to(part, (1, 3))[0].tolist()) for part in course(np.zeros(1))]
-    return Case(
+    return ContactCase(
         name=name,
         about=about,
         body=Body(*start[:3], **body),
@@ -85,7 +85,9 @@ def closed_form(
     )
 
 
-def case(forms: list[Callable[[], Case]], *row: Any, **given: Any) -> Callable[[Course], Course]:
+def case(
+    forms: list[Callable[[], ContactCase]], *row: Any, **given: Any
+) -> Callable[[Course], Course]:
     """A decorator that adds the case of a course to `forms`, with what else `closed_form` takes."""
 
     def add(course: Course) -> Course:

@@ -15,7 +15,7 @@ import numpy as np
 
 import analytic
 from compare.adapters.vessel import scene_fields
-from compare.bench.case import TOLERANCE, VERSION, Case
+from compare.bench.case import TOLERANCE, VERSION, ContactCase
 from compare.bench.closed_forms import CLOSED_FORMS
 from compare.bench.mechanisms import MECHANISMS
 from compare.bench.oblique import OBLIQUE
@@ -37,7 +37,7 @@ tolerance."""
 
 
 @cache
-def cases() -> tuple[Case, ...]:
+def cases() -> tuple[ContactCase, ...]:
     """All exact cases: those of version 1 first, of these those in closed form."""
     first, second, third = (
         [form() for form in those] for those in (CLOSED_FORMS, MECHANISMS, OBLIQUE)
@@ -120,7 +120,7 @@ def _in_vessel(
     x0: State,
     until: float,
     wrong: Mapping[str, Mapping[str, float]],
-) -> Case:
+) -> ContactCase:
     """A case of the ball between floor and wall, as in `VESSEL`, by event-driven simulation,
     sampled 25 times."""
 
@@ -133,7 +133,7 @@ def _in_vessel(
         return np.concatenate(to_world(found.x, found.theta, other), axis=1)[1:], found
 
     exact, motion = run(SHARP)
-    return Case(
+    return ContactCase(
         name=name,
         about=f"a ball in a vessel: {about}",
         **scene_fields(p, x0),

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk, ellipkinc
 
 from compare.adapters.scene import Surface
-from compare.bench.case import Case
+from compare.bench.case import ContactCase
 from compare.bench.closed_forms import (
     BLOCK,
     SPEED_ALONE,
@@ -32,7 +32,7 @@ from compare.bench.closed_forms import (
 )
 from model.arrays import Array
 
-MECHANISMS: list[Callable[[], Case]] = []
+MECHANISMS: list[Callable[[], ContactCase]] = []
 """Functions that make these cases, in the order in which they are listed."""
 _case = partial(case, MECHANISMS)
 _Motion = tuple[Array, ...]
@@ -219,9 +219,12 @@ _KEPT = 1 - _ARM**2 / _MOMENT_OF_EDGE * (1 - math.cos(2 * _ALPHA))
 
 @_case(
     "rocking-block", "a block rocks from edge to edge, and loses the same share of its speed at "
-                     "every blow",
+                     "every impact",
     _ROCKING, (Surface("floor", 1.0),),
-    wrong={"nothing is lost in a blow": {"kept": 1.0}, "inertia of a point": {"moment": _ARM**2}},
+    wrong={
+        "nothing is lost in an impact": {"kept": 1.0},
+        "inertia of a point": {"moment": _ARM**2},
+    },
     until=0.8, scales=(0.2, 1.0, 1.0), contacts=("T",),
     source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, momentum about the "
            "new edge")
@@ -230,7 +233,7 @@ def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _M
     slower, beyond.
 
     With the angle psi of the centre from straight below the edge, psi = pi - alpha + lean, it is
-    sin(psi/2) = k sn(K - p t, k), p^2 = m g arm/moment. Each blow on the other edge leaves `kept`
+    sin(psi/2) = k sn(K - p t, k), p^2 = m g arm/moment. Each impact on the other edge leaves `kept`
     of the angular velocity. """
     arm, alpha, lean = _ARM, _ALPHA, _LEANS
     p, side = math.sqrt(G * arm / moment), 1.0
@@ -263,7 +266,7 @@ def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _M
     until=2.0, scales=(1.0, 6.0, 10.0), contacts=("N",), source="Newton's law of restitution, "
                                                                 "parabolas between")
 def _bounces(t: Array, share: float = 0.7, drop: float = 1.8) -> _Motion:
-    """A ball falls and bounces in parabolas: each blow leaves `share` of the speed."""
+    """A ball falls and bounces in parabolas: each impact leaves `share` of the speed."""
     speed, begin = math.sqrt(2 * G * drop), math.sqrt(2 * drop / G)
     z, v = drop - G * t**2 / 2, -G * t
     while begin < t[-1]:

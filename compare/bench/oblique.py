@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from compare.adapters.scene import Surface
-from compare.bench.case import Case
+from compare.bench.case import ContactCase
 from compare.bench.closed_forms import (
     BLOCK,
     MU,
@@ -32,7 +32,7 @@ from compare.bench.closed_forms import (
 from compare.bench.mechanisms import BALANCE, TRIPOD, WRONG_TRIPODS, integrated, tripod
 from model.arrays import Array
 
-OBLIQUE: list[Callable[[], Case]] = []
+OBLIQUE: list[Callable[[], ContactCase]] = []
 """Functions that make these cases, in the order in which they are listed."""
 _case = partial(case, OBLIQUE)
 _Motion = tuple[Array, ...]

@@ -10,7 +10,7 @@ An engine is anything with three functions, a module most simply:
   world axes, then those of the one under it, if there is one.
 
 ``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It
-is not asked for cases that need what version 1 of them had not (`Case.needs`) unless its
+is not asked for cases that need what version 1 of them had not (`ContactCase.needs`) unless its
 ``FEATURES`` name that. It may say of itself: ``NAME``, ``PRECISION`` (``f64`` or ``f32``),
 ``DECLARED`` (in words, all that isn't a free body in plain geometry under the engine's own
 settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
@@ -39,7 +39,7 @@ import numpy as np
 
 from compare import adapters
 from compare.adapters.scene import TIME_STEPS
-from compare.bench.case import TOLERANCE, Case
+from compare.bench.case import TOLERANCE, ContactCase
 from model import InputError
 from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number
@@ -69,7 +69,7 @@ class About:
     """Of its package, and the version with which it is known to work if that is another."""
     steps: tuple[float, ...] = TIME_STEPS
     features: tuple[str, ...] = ()
-    """Of `Case.needs`, what it can do."""
+    """Of `ContactCase.needs`, what it can do."""
     missing: str = ""
     """Why it can't be used here; empty if it can."""
 
@@ -119,7 +119,7 @@ class Result:
 
 
 def run(
-    case: Case, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
+    case: ContactCase, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
 ) -> Result:
     """Run an engine on one case: ``engine`` is a module or its name, ``module:object``, or a
     picklable object.
@@ -140,7 +140,10 @@ def check(engine: Any) -> None:
 
 
 def run_all(
-    cases: Iterable[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
+    cases: Iterable[ContactCase],
+    engine: Any,
+    steps: Sequence[float] | None = None,
+    limit: float = LIMIT,
 ) -> Iterator[Result]:
     """Run an engine on many cases, one after the other in one process, that is begun anew where it
     hangs or dies."""
@@ -203,7 +206,7 @@ class EngineProcess:
             self._process.kill()
         self._pipe.close()
 
-    def result(self, case: Case, steps: Sequence[float] | None = None) -> Result:
+    def result(self, case: ContactCase, steps: Sequence[float] | None = None) -> Result:
         """The result of the engine on a case, at all steps; shorter ones are not tried where one
         hangs."""
         about, found = self.about, Result(case.name, self.about)
@@ -332,7 +335,7 @@ def serve_engine(handle: int) -> None:
             pipe.send(_attempt(adapter, case, step))
 
 
-def _attempt(engine: Any, case: Case, step: float) -> Any:
+def _attempt(engine: Any, case: ContactCase, step: float) -> Any:
     """States (n, 9) or None, processor time divided by simulated time, and why there are no
     states."""
     states, spent, done = np.empty_like(case.exact), 0.0, 0

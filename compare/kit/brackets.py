@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compare.kit.lab import Lab
+from compare.kit.runner import Runner
 from compare.kit.statistics import Estimate, estimate, uniform
 from compare.kit.tasks import Task
 from model import Trajectory
@@ -85,7 +85,7 @@ class Reply:
     answer: bool | None
 
 
-def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
+def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
     """Narrow every search down to its width, or as far as runs show it, all of them together, round
     by round.
 
@@ -97,7 +97,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
 
     With `careful` the ends of the brackets are asked once more with half the time step: one that
     doesn't hold is as uncertain as the bracket before it was wide, see `Bracket.shift`."""
-    failures, sections = dict[Search, str](), lab.effort.sections
+    failures, sections = dict[Search, str](), runner.effort.sections
     brackets = [search.bracket for search in searches]
     before, todo = list(brackets), list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].width > searches[k].width]:
@@ -106,7 +106,9 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             for k in todo
         }
         replies = _answers(
-            lab, [(searches[k], value, brackets[k]) for k in todo for value in inside[k]], failures
+            runner,
+            [(searches[k], value, brackets[k]) for k in todo for value in inside[k]],
+            failures,
         )
         for n, k in enumerate(todo):
             before[k] = brackets[k]
@@ -118,10 +120,10 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
         (k, end)
         for k, b in enumerate(brackets)
         for end in (0, 1)
-        if not (b.runs[end] or lab.effort.granted)
+        if not (b.runs[end] or runner.effort.granted)
     ]
     replies = _answers(
-        lab, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures
+        runner, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures
     )
     for (k, end), reply in zip(granted, replies, strict=True):
         if reply.answer is (end == 0):
@@ -129,7 +131,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             brackets[k] = replace(brackets[k], runs=(yes, reply.run) if end else (reply.run, no))
     if careful:
         asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in b.ends]
-        replies = _answers(lab, asked, failures, FINER)
+        replies = _answers(runner, asked, failures, FINER)
         for k, (low, high) in enumerate(zip(replies[::2], replies[1::2], strict=True)):
             if low.answer is False or high.answer is True or not (low.run and high.run):
                 brackets[k] = replace(brackets[k], shift=before[k].width)
@@ -140,12 +142,12 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
 
 
 def _answers(
-    lab: Lab, questions: Sequence[Question], failures: dict[Search, str], how: Attempt = USUAL
+    runner: Runner, questions: Sequence[Question], failures: dict[Search, str], how: Attempt = USUAL
 ) -> list[Reply]:
     """Carry out a run for each question: its answer, those without one run anew for longer; errors
     into `failures`."""
     tasks, replies = [search.task(value, bracket, how) for search, value, bracket in questions], []
-    for (search, *_), task, run in zip(questions, tasks, lab.each(tasks), strict=True):
+    for (search, *_), task, run in zip(questions, tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):
             failures[search] = run
             replies.append(Reply(task, None, None))
@@ -153,7 +155,7 @@ def _answers(
             replies.append(Reply(task, run, search.answer(run)))
     unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
     if how is USUAL and unclear:
-        longer = _answers(lab, [questions[n] for n in unclear], failures, LONGER)
+        longer = _answers(runner, [questions[n] for n in unclear], failures, LONGER)
         for n, reply in zip(unclear, longer, strict=True):
             replies[n] = reply
     return replies

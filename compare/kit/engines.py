@@ -280,10 +280,10 @@ _OTHERS = (
     *_adapted(_PACKAGES["rapier"], ">4"),
     *_adapted(_PACKAGES["sapien"], "hH"),
 )
-WITNESSES = (MUJOCO, PLAIN, NEWCOMER)
+USUAL_ENGINES = (MUJOCO, PLAIN, NEWCOMER)
 """Who is heard of a claim where no engine is named: the one on trial, and two beside it."""
 ENGINES: dict[str, Engine] = {
-    each.name: each for each in (*WITNESSES, COULOMB, EVENT, MOREAU, *_OTHERS)
+    each.name: each for each in (*USUAL_ENGINES, COULOMB, EVENT, MOREAU, *_OTHERS)
 }
 """Every engine by name."""
 

@@ -2,7 +2,8 @@
 durations and grids.
 
 An engine other than the one on trial, with time steps of its own, measures as much as the quick
-level at every level, but for what `WITNESS` says, and looks where the one on trial found something.
+level at every level, but for what `OWN_STEPS` says, and looks where the one on trial found
+something.
 
 A few sets are chosen by hand, and a design fills a box evenly. Friction is greater on the floor in
 some, on the wall in others, and the wall's is below and above the inertia j; drag is weak in some
@@ -102,8 +103,8 @@ class Effort:
     recurrent_flows: Flows = (1.0,)  # of the staircase in units of that of the set
     choice_sets: int = 1  # the contacts of the second hover for long
 
-    # Parts of a step of `trials.REFINED`. Contacts with much friction answer more slowly: with
-    # whole steps the slope of gamma was too coarse on 11 of the 24 sets of the default level.
+    # Parts of a step of `step_pairs.STEP_RATIO`. Contacts with much friction answer more slowly:
+    # with whole steps the slope of gamma was too coarse on 11 of the 24 sets of the default level.
     bounds_refined: int = 2
     growth_more: int = 1  # multiples of the numbers of directions in growth.PUSHES
     steepest_states: int = 1  # random states of every set out of which slip is pushed all round
@@ -159,7 +160,7 @@ AT_FULL = replace(
     laws_refined=(16, 32),
     motions_pieces=32,
 )
-WITNESS = replace(
+OWN_STEPS = replace(
     # the same run twice: all numbers are extrapolated to no step from several steps
     AT_QUICK, halves=(2, 2), granted=True, slow=False,
     settling_rounds=(0.45, 1.0, 1.0), settling_steps=512,
@@ -178,8 +179,8 @@ WITNESS = replace(
     field_starts=2, field_kept=2,
 )
 # fmt: on
-WITNESS_ABOVE_QUICK = replace(
-    WITNESS, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0
+OWN_STEPS_ABOVE_QUICK = replace(
+    OWN_STEPS, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0
 )
 """At the levels above quick, on whose rarer sets motions die out more slowly."""
 

@@ -17,7 +17,7 @@ ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
 """One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
 DRAG_LAWS = (*ONE_BALL, "wake", "blunt")
 """One for each law of drag."""
-WITNESSED = (*ENDS_OF_ROLLING, "rough-floor", "wake")
+LIMIT_SETS = (*ENDS_OF_ROLLING, "rough-floor", "wake")
 """Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at
 one flow, a law of drag."""
 VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
@@ -25,7 +25,7 @@ VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubb
 the wall at one flow; drag so strong that nothing folds; two other laws of drag; friction of the
 wall above that of the floor and the inertia. On them all wrong theories are noticed that are
 noticed on all nine sets chosen by hand."""
-MOST_WITNESSED = 12
+MOST_LIMIT_SETS = 12
 """Sets, at most, that engines in the limit of no time step measure above the quick level."""
 
 
@@ -37,7 +37,7 @@ class Entry:
     """Sets that the engine on trial measures at the quick level; at the others all of them."""
     limit: Names = ()
     """Sets that an engine in the limit of no time step measures at the quick level. At the others
-    these are the first `MOST_WITNESSED`, and `reference` alone where none is named here."""
+    these are the first `MOST_LIMIT_SETS`, and `reference` alone where none is named here."""
     steps: tuple[int, int] = (3, 3)
     """With how many of its time steps it does, the coarsest first: at the quick level, and
     above."""
@@ -68,8 +68,8 @@ PLAN: dict[str, Entry] = {
     "stepped":    Entry(ONE_BALL, only=HOPS, by=MOREAU),
     "choice":     Entry(ONE_BALL,         ONE_BALL,        (4, 4),
                         only="it is one of balls with mu > 1"),
-    "thresholds": Entry(VARIED,           WITNESSED,       (3, 4), seeded=True, seconds=20),
-    "settled":    Entry(VARIED,           WITNESSED,       (4, 4), ONE_BALL, seconds=11),
+    "thresholds": Entry(VARIED,           LIMIT_SETS,       (3, 4), seeded=True, seconds=20),
+    "settled":    Entry(VARIED,           LIMIT_SETS,       (4, 4), ONE_BALL, seconds=11),
     "edge":       Entry(("reference", "rough-floor"), seconds=8),
     "rates":      Entry((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL, seconds=7),
     "pulsation":  Entry(DRAG_LAWS,        ONE_BALL, seconds=7),
@@ -82,10 +82,10 @@ PLAN: dict[str, Entry] = {
     "birth":      Entry(VARIED, seconds=3),
     "bounds":     Entry(VARIED,           ONE_BALL, seconds=2),
     "mirrored":   Entry(ONE_BALL,         ONE_BALL),
-    "growth":     Entry(VARIED,           WITNESSED, settles=False),
-    "steepest":   Entry(VARIED,           WITNESSED, settles=False),
+    "growth":     Entry(VARIED,           LIMIT_SETS, settles=False),
+    "steepest":   Entry(VARIED,           LIMIT_SETS, settles=False),
     "lift":       Entry(VARIED,           ENDS_OF_ROLLING, (4, 4), settles=False),
-    "field":      Entry(VARIED,           WITNESSED, settles=False),
+    "field":      Entry(VARIED,           LIMIT_SETS, settles=False),
     "motions":    Entry(ONE_BALL,         ONE_BALL, settles=False),
     "runs":       Entry(DRAG_LAWS,        ONE_BALL, settles=False),
     "torque":     Entry(ONE_BALL,         ONE_BALL,        (4, 4)),
@@ -109,7 +109,7 @@ def planned(protocol: str, engine: Engine, divisor: int, level: Level) -> dict[s
     if engine.role is Role.AS_IT_COMES:
         names = entry.as_it_comes
     elif engine.role is Role.IN_THE_LIMIT:
-        names = tuple(known)[: MOST_WITNESSED if entry.limit else 1] if above else entry.limit
+        names = tuple(known)[: MOST_LIMIT_SETS if entry.limit else 1] if above else entry.limit
         if divisor not in engine.refine[: entry.steps[above]]:
             names = ()
     if level < entry.level or (entry.by and engine.refine != (1,)):

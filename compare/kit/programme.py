@@ -1,6 +1,6 @@
 """How protocols are carried out, and where their measurements are kept.
 
-A protocol is a function of a lab, the parameter sets, and what was measured before it; it yields
+A protocol is a function of a runner, the parameter sets, and what was measured before it; it yields
 measurements, and what it could not measure. To add one, write such a function, and add a line to
 the `PROTOCOLS` of its subject and one to `compare.kit.plan.PLAN`."""
 
@@ -18,10 +18,10 @@ from pathlib import Path
 
 from compare.kit import record
 from compare.kit.engines import Engine
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.plan import PLAN, planned
 from compare.kit.record import Measurement, Missing, Origin, Planned, Records
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
 from model import Parameters, StorageError
@@ -33,7 +33,7 @@ LONGEST_WAIT = 3e4
 """Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or
 more at a time; and contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c
 is three times that: as much as `omega_c` may be off in a state that counts as settled."""
-Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
+Measure = Callable[[Runner, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Job:
     """A protocol, and by whom, on which sets, and where it is carried out."""
 
     protocol: Protocol
-    lab: Lab
+    runner: Runner
     results: Path
     """The results directory."""
     chosen: Mapping[str, Parameters] | None = None
@@ -64,29 +64,31 @@ class Job:
     def name(self) -> str:
         """The name of the protocol, and of the engine and its step where these are not those on
         trial."""
-        return self.beside(self.protocol.name) if self.lab.is_witness else self.protocol.name
+        return self.beside(self.protocol.name) if self.runner.has_own_steps else self.protocol.name
 
     def beside(self, protocol: str) -> str:
         """The name of another protocol by the same engine with the same step."""
-        return f"{protocol} by {self.lab.engine.name}, step/{self.lab.refine}"
+        return f"{protocol} by {self.runner.engine.name}, step/{self.runner.refine}"
 
     @property
     def sets(self) -> Mapping[str, Parameters]:
         """What is measured, by name."""
         if self.chosen is not None:
             return self.chosen
-        return planned(self.protocol.name, self.lab.engine, self.lab.refine, self.lab.level)
+        return planned(
+            self.protocol.name, self.runner.engine, self.runner.refine, self.runner.level
+        )
 
     @property
     def by(self) -> Engine:
         """Who measures."""
-        return PLAN[self.protocol.name].by or self.lab.engine
+        return PLAN[self.protocol.name].by or self.runner.engine
 
     @property
     def cost(self) -> float:
         """About its processor time at the quick level, relative to others."""
-        name, engine, divisor = self.protocol.name, self.lab.engine, self.lab.refine
-        if not self.lab.is_witness:
+        name, engine, divisor = self.protocol.name, self.runner.engine, self.runner.refine
+        if not self.runner.has_own_steps:
             return PLAN[name].seconds
         share = len(planned(name, engine, divisor, Level.QUICK)) / len(PLAN[name].trial)
         return PLAN[name].seconds * share * divisor
@@ -97,17 +99,17 @@ class Job:
         subject, measure, _ = self.protocol.measure.__module__.partition(".measure")
         plan = [
             self.by.name,
-            self.lab.refine,
-            self.lab.level.name,
+            self.runner.refine,
+            self.runner.level.name,
             {name: asdict(p) for name, p in self.sets.items()},
             sources(*self.by.sources, "compare.kit", *([subject + measure] if measure else [])),
         ]
         return Origin(
             protocol=self.protocol.name,
-            engine=self.lab.engine.name,
+            engine=self.runner.engine.name,
             by=self.by.name,
-            step=self.lab.refine,
-            level=self.lab.level.name,
+            step=self.runner.refine,
+            level=self.runner.level.name,
             plan=hashlib.sha256(json.dumps(plan).encode()).hexdigest()[:16],
         )
 
@@ -154,7 +156,7 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
     found: dict[str, Records] = {}
     broken: dict[str, Exception] = {}
     running: dict[Future[Records], str] = {}
-    workers = jobs[0].lab.campaign.fleet
+    workers = jobs[0].runner.campaign.fleet
     # Two jobs more than workers at once, as some wait for a single long run.
     with threads(workers.count + 2 if workers.count > 1 else 1) as pool:
         try:
@@ -198,9 +200,9 @@ def carry_out(job: Job, before: Records) -> Records:
     """
     path, protocol, entry = job.file, job.protocol, PLAN[job.protocol.name]
     label = f"{protocol.name}-{path.parent.name}"
-    campaign = job.lab.campaign.part(label, job.name)
+    campaign = job.runner.campaign.part(label, job.name)
     if not path.exists():
-        lab = replace(job.lab, engine=job.by, campaign=campaign)
+        runner = replace(job.runner, engine=job.by, campaign=campaign)
         strong, rows = dict(job.sets), list[Measurement | Missing]()
         for name, p in job.sets.items():
             weak = UNDAMPED if p.c == 0 else ""
@@ -213,11 +215,11 @@ def carry_out(job: Job, before: Records) -> Records:
         if entry.only and "reference" not in strong:
             rows.insert(0, Missing(protocol.name, next(iter(strong), ""), entry.only, 0))
         else:
-            rows = [*protocol.measure(lab, strong, before), *rows]
+            rows = [*protocol.measure(runner, strong, before), *rows]
         make_directory(path.parent)
         place = f"{campaign.directory.name}/{label}.h5"
         for k, row in enumerate(rows):
-            if isinstance(row, Measurement) and protocol.drawn(row) and not lab.is_witness:
+            if isinstance(row, Measurement) and protocol.drawn(row) and not runner.has_own_steps:
                 rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         records = Records.of(rows)
         said = {row.set for row in rows}

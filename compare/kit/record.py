@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compare.kit.lab import Lab
 from compare.kit.quantities import quantity
+from compare.kit.runner import Runner
 from compare.kit.statistics import Estimate
 from compare.kit.tasks import Task
 from model import Parameters, StorageError
@@ -84,7 +84,7 @@ class Measurement:
 
 
 def measurement(
-    lab: Lab,
+    runner: Runner,
     protocol: str,
     set: str,
     p: Parameters,
@@ -93,7 +93,7 @@ def measurement(
     tasks: Iterable[Task] = (),
     **conditions: Condition,
 ) -> Measurement:
-    """A measurement by the lab's engine; a plain number is exact."""
+    """A measurement by the runner's engine; a plain number is exact."""
     sure = value if isinstance(value, Estimate) else Estimate(float(value), 0.0)
     return Measurement(
         protocol=protocol,
@@ -101,7 +101,7 @@ def measurement(
         value=sure.value,
         uncertainty=sure.uncertainty,
         budget=sure.budget,
-        engine=lab.engine.name,
+        engine=runner.engine.name,
         set=set,
         parameters=p,
         conditions=conditions,
@@ -146,8 +146,8 @@ class Check:
     relation: Relation = Relation.EQUAL
     ceiling: float | None = None
     """What it may overlook, where that isn't what its quantity says."""
-    bearing: int = 0
-    """Number of the bearing of its claim that chose it."""
+    criterion: int = 0
+    """Number of the criterion of its claim that chose it."""
 
     @property
     def deviation(self) -> float:

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed
 from compare.kit.statistics import COVERAGE, Estimate, estimate, steady_mean
+from compare.kit.step_pairs import Start
 from compare.kit.tasks import Task
-from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -56,7 +56,7 @@ them."""
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class SteadyState:
     """Where a run has come to; `failure` says why it doesn't count as settled, empty if it does."""
 
     start: Start
@@ -71,7 +71,7 @@ class Settled:
 
 
 @dataclass(frozen=True)
-class Patience:
+class SettlingCriteria:
     """For how long a state is waited for, and how well it must be settled."""
 
     refine: float = 1
@@ -87,16 +87,18 @@ class Patience:
     """Lengths of successive rounds in units of `span`; those of the level if none are given."""
 
 
-def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -> list[Settled]:
+def settle(
+    runner: Runner, starts: Sequence[Start], criteria: SettlingCriteria = SettlingCriteria()
+) -> list[SteadyState]:
     """Run the ball from each start until it is settled; the states, in order.
 
     Of an engine as it comes every state counts, for what it is when time is up. What isn't settled
     goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land."""
-    span, loose = patience.span, math.inf if lab.engine.relative_tolerance else patience.loose
-    rounds, steps = patience.rounds or lab.effort.settling_rounds, lab.effort.settling_steps
+    span, loose = criteria.span, math.inf if runner.engine.relative_tolerance else criteria.loose
+    rounds, steps = criteria.rounds or runner.effort.settling_rounds, runner.effort.settling_steps
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
-    states: dict[int, Settled] = {}
+    states: dict[int, SteadyState] = {}
     todo = dict(enumerate(starts))
     while todo:
         tasks = []
@@ -104,17 +106,19 @@ def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -
             step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0), steps)
             samples = round(t_end / (STEPS_A_SAMPLE * step))
             tasks.append(
-                lab.task(start.p, start.x0, t_end, step / patience.refine, samples=samples)
+                runner.task(start.p, start.x0, t_end, step / criteria.refine, samples=samples)
             )
         under_way, todo = list(todo), {}
-        for n, task, run in zip(under_way, tasks, lab.each(tasks), strict=True):
+        for n, task, run in zip(under_way, tasks, runner.each(tasks), strict=True):
             start = starts[n]
             if isinstance(run, str):
-                states[n] = Settled(start, Case.NN, {}, start.x0, task, failure=f"the run {run}")
+                states[n] = SteadyState(
+                    start, Case.NN, {}, start.x0, task, failure=f"the run {run}"
+                )
                 continue
             state = states[n] = judge_run(start, task, run, loose)
             part = task.t_end / duration(start.p, span, steps)
-            if left[n] and state.excess > min(part, 1.0) * min(loose, patience.sharp):
+            if left[n] and state.excess > min(part, 1.0) * min(loose, criteria.sharp):
                 # A part of a round may end on the way to where the ball settles: it goes on as it
                 # is.
                 x = State.of(run.x[-1] if part < 1 else state.mean)
@@ -125,17 +129,17 @@ def settle(lab: Lab, starts: Sequence[Start], patience: Patience = Patience()) -
 
 
 def settle_groups(
-    lab: Lab,
+    runner: Runner,
     groups: Sequence[Sequence[Start]],
-    patience: Patience = Patience(),
-) -> list[list[Settled]]:
+    criteria: SettlingCriteria = SettlingCriteria(),
+) -> list[list[SteadyState]]:
     """Settle groups of starts as `settle` does, all of them together."""
-    states = iter(settle(lab, [start for group in groups for start in group], patience))
+    states = iter(settle(runner, [start for group in groups for start in group], criteria))
     return [[next(states) for _ in group] for group in groups]
 
 
-def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
-    """The state to which a run has settled, or why it has not; `loose` as in `Patience`.
+def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> SteadyState:
+    """The state to which a run has settled, or why it has not; `loose` as in `SettlingCriteria`.
 
     A run is settled once its drift lets each check resolve twice as much as it should, with no
     quantity swinging by more than a thousandth of its scale, in a window with 98 % of its samples
@@ -180,20 +184,20 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
         elif max(excess, solving) > loose:
             way = "drifts" if max(drifting, solving) > loose else "swings"
             failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
-        states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
+        states.append(SteadyState(start, case, values, means[len(series) :], task, excess, failure))
     return min(states, key=lambda state: state.excess)
 
 
 def settled_readings(
-    lab: Lab, protocol: str, starts: Sequence[Start]
+    runner: Runner, protocol: str, starts: Sequence[Start]
 ) -> Iterator[Measurement | Missing]:
     """Case and omega_c to which the ball settles from each start."""
-    for start, settled in zip(starts, settle(lab, starts), strict=True):
+    for start, settled in zip(starts, settle(runner, starts), strict=True):
         if settled.failure:
             yield Missing(protocol, start.set, settled.failure)
             continue
         for name, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
-            yield measurement(lab, protocol, start.set, start.p, name, value, [settled.task])
+            yield measurement(runner, protocol, start.set, start.p, name, value, [settled.task])
 
 
 def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
@@ -217,7 +221,7 @@ def rounded_duration(p: Parameters, units: float) -> float:
     return float(2.0 ** round(math.log2(units / p.c)))
 
 
-def named_start(set: str, p: Parameters, how: str) -> Start:
+def initial_condition(set: str, p: Parameters, how: str) -> Start:
     """A start at the flow of p by its name: from rest, with the fluid or half as fast, or so high
     up on the wall."""
     orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)

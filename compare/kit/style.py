@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from compare.kit.engines import ENGINES
-from compare.kit.lab import coarse_step
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement
+from compare.kit.runner import coarse_step
 from compare.kit.statistics import COVERAGE
 from model import Case, Parameters, Trajectory
 from model.drag import STOKES

@@ -14,7 +14,7 @@ from typing import Any
 
 from compare import judge
 from compare.catalogue import PROTOCOLS
-from compare.claim import Bearing, Claim, Verdict
+from compare.claim import Claim, Criterion, Verdict
 from compare.kit import plan
 from compare.kit.engines import ENGINES
 from compare.kit.levels import Level
@@ -49,9 +49,9 @@ def links(claim: Claim, verdict: Verdict | None, summary: Summary) -> list[Link]
     chain = [Link("statement", text, claim.place), Link("source", f"{claim.source}, {claim.text}")]
     for name in sorted(claim.protocols):
         chain += _measured(name, verdict, summary)
-    for n, bearing in enumerate(claim.bearings):
-        checks = [each for each in verdict.checks if each.bearing == n] if verdict else []
-        chain += _judged(bearing, checks)
+    for n, criterion in enumerate(claim.criteria):
+        checks = [each for each in verdict.checks if each.criterion == n] if verdict else []
+        chain += _judged(criterion, checks)
     if verdict is None:
         return [*chain, Link("verdict", f"none: 'dualball validate --claim {claim.id}' measures")]
     for said in verdict.engines:
@@ -86,12 +86,13 @@ def _measured(name: str, verdict: Verdict | None, summary: Summary) -> list[Link
     return chain
 
 
-def _judged(bearing: Bearing, checks: list[Check]) -> list[Link]:
+def _judged(criterion: Criterion, checks: list[Check]) -> list[Link]:
     """A criterion: what is predicted by which function, and the numbers."""
-    known = quantity(bearing.quantity)
-    text = f"{known.symbol} of {bearing.protocol} {bearing.relation} {bearing.by or 'prediction'}"
-    chain = [Link("criterion", text, place(bearing.predict))]
-    for name, at in asked_of_theory(bearing, checks[0].measurement) if checks else ():
+    known = quantity(criterion.quantity)
+    by = criterion.by or "prediction"
+    text = f"{known.symbol} of {criterion.protocol} {criterion.relation} {by}"
+    chain = [Link("criterion", text, place(criterion.predict))]
+    for name, at in asked_of_theory(criterion, checks[0].measurement) if checks else ():
         chain.append(Link("predicted by", name, at))
     if checks:
         text = f"{len(checks)} numbers, {sum(each.conclusive for each in checks)} can tell"
@@ -115,7 +116,7 @@ def numbers(checks: list[Check]) -> Rows:
     return rows
 
 
-def asked_of_theory(bearing: Bearing, m: Measurement) -> list[tuple[str, str]]:
+def asked_of_theory(criterion: Criterion, m: Measurement) -> list[tuple[str, str]]:
     """The functions of `analytic` that a prediction calls from outside of it, with their places."""
     found: dict[CodeType, str] = {}
 
@@ -132,7 +133,7 @@ def asked_of_theory(bearing: Bearing, m: Measurement) -> list[tuple[str, str]]:
     before = sys.getprofile()
     sys.setprofile(note)
     try:
-        bearing.predict(m)
+        criterion.predict(m)
     except judge.UNKNOWN:
         pass
     finally:

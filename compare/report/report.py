@@ -134,7 +134,7 @@ def _row(verdict: Verdict) -> dict[str, Any]:
         "mark": "other" if verdict.passed and mark == "fail" else mark,
         "symbol": symbol,
         "predicted": list(
-            dict.fromkeys(bearing.by for bearing in verdict.claim.bearings if bearing.by)
+            dict.fromkeys(criterion.by for criterion in verdict.claim.criteria if criterion.by)
         ),
         "missing": [*map(str, verdict.missing[:REASONS]), *unseen],
         "checks": wording.ranked(verdict.checks)[:ROWS],

@@ -19,7 +19,7 @@ from analytic.mechanics.contact_problem import Closed, solve
 from analytic.mechanics.rigid_body import Forces, slip_at_A, slip_at_B, velocities
 from analytic.simulation import transitions
 from analytic.simulation.equations import smooth_rates
-from analytic.simulation.motion import Moment, of_ball
+from analytic.simulation.motion import HybridState, of_ball
 from analytic.simulation.settings import Settings
 from model import Case, Contact, Flow, State
 from tests.random_motions import UNIT, P, random_start
@@ -150,7 +150,7 @@ def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
         if margin(0) <= 0 or margin(3) >= 0:
             continue
         fluid = omega_c + brentq(margin, 0, 3, xtol=1e-14) * lag
-        at = Moment(0.0, 0.0, State(omega_c=omega_c))
+        at = HybridState(0.0, 0.0, State(omega_c=omega_c))
         number, onset = transitions.leave(at, of_ball(p, Flow.steady(fluid), Settings()))
         case = Case(number)
         ends.add((case, sense))

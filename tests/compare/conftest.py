@@ -14,9 +14,9 @@ from compare.kit import record
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import GapError
 from compare.kit.engines import EVENT
-from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Origin, Records
+from compare.kit.runner import Runner
 from compare.report import report, results
 from compare.report.results import Summary
 from model import Parameters, storage
@@ -74,10 +74,10 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
+def runner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runner]:
     """Where protocols run the event-driven simulation, the quickest engine, at the quick level."""
     with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
-        yield Lab(campaign, EVENT, Level.QUICK)
+        yield Runner(campaign, EVENT, Level.QUICK)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.assessment import full_verdict
-from compare.claim import Bearing, Outcome
+from compare.claim import Criterion, Outcome
 from compare.convergence import COARSEST, LOOSER, StepSeries, extrapolated, zero_step_limit
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records
@@ -183,8 +183,8 @@ def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
 def test_an_engine_is_asked_every_bearing_on_every_set_that_it_shares(lost, outcome):
     """The engine on trial has a count and a flow on three sets, the other one all counts, but not all
     flows."""
-    flow = Bearing("thresholds", "omega_03", lambda m: m.parameters.omega_0)
-    of = claim("it", Bearing("thresholds", "lifts", lambda m: 1.0), flow)
+    flow = Criterion("thresholds", "omega_03", lambda m: m.parameters.omega_0)
+    of = claim("it", Criterion("thresholds", "lifts", lambda m: 1.0), flow)
     sets = ("one", "another", "third")
     counts = tuple(measured("thresholds", "lifts", 1.0, 0.0, P, name) for name in sets)
     flows = tuple(measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)

@@ -21,7 +21,7 @@ SHARP = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_case_is_whole_and_no_sample_near_a_blow(name):
+def test_a_case_is_whole_and_no_sample_near_an_impact(name):
     case, n = CASES[name], len(CASES[name].times)
     assert case.exact.shape == (n, 9 * len(case.bodies))
     assert len(case.contacts) == n
@@ -40,7 +40,7 @@ def test_a_case_is_whole_and_no_sample_near_a_blow(name):
     assert case.wrong
     for text, states in case.wrong.items():
         assert case.error(states) > 2.5 * TOLERANCE, text
-    # No sample is near a blow: where an engine is late by a step, it is not to be wrong by the
+    # No sample is near an impact: where an engine is late by a step, it is not to be wrong by the
     # whole jump.
     blows = [time for time, jumps in zip(*changes(case), strict=True) if jumps]
     if what := {"rocking-block": 7, "bounce": 5}.get(name):  # what jumps there of a state
@@ -220,7 +220,7 @@ def disc(case):
 
 
 def rocking(case):
-    """On an edge, to the side that is the last of the state; a blow on the other one has no moment
+    """On an edge, to the side that is the last of the state; a hit of the other one has no moment
     about that."""
     body = case.body
 
@@ -232,17 +232,17 @@ def rocking(case):
             newton(case, floor(lambda place: [corner(place, state[13])]), [None])(t, state[:13]), 0
         )
 
-    def blow(state):
+    def impact(state):
         arm, moment = corner(state, -state[13]), body.inertia[1]
         about = moment * state[11] - body.mass * np.cross(arm, state[7:10])[1]
         spin = np.array([0, about / (moment + body.mass * arm @ arm), 0])
         return np.concatenate([state[:7], -np.cross(spin, arm), spin, [-state[13]]])
 
-    return moved(case, rates, [1.0], lambda x: x[5] * x[13], blow)
+    return moved(case, rates, [1.0], lambda x: x[5] * x[13], impact)
 
 
 def bouncing(case):
-    """A fall, from blow to blow."""
+    """A fall, from impact to impact."""
     back = np.where(np.arange(13) == 9, -case.surfaces[0].restitution, 1.0)
     return moved(
         case, newton(case), (), lambda x: x[2] - case.body.size[0], lambda state: back * state

@@ -14,7 +14,7 @@ import pytest
 from compare import validation
 from compare.assessment import full_verdict
 from compare.catalogue import CLAIMS, PROTOCOLS
-from compare.claim import Bearing, Claim, Outcome, Text
+from compare.claim import Claim, Criterion, Outcome, Text
 from compare.judge import judge, select, theory
 from compare.kit.levels import Level, sets
 from compare.kit.plan import PLAN
@@ -34,7 +34,7 @@ def measured(value, uncertainty, name="omega_c"):
 
 
 def claim(predict=lambda m: m.parameters.omega_0, quantity="omega_c", **more):
-    return made.claim("it", Bearing("settled", quantity, predict, **more))
+    return made.claim("it", Criterion("settled", quantity, predict, **more))
 
 
 def outcome(of, records):
@@ -77,7 +77,7 @@ GONE = {
     "every second": lambda m: m.conditions["n"] % 2,
     "one number": lambda m: m.conditions["n"] != 1,
     "one set": lambda m: m.set == "mine",
-    "one bearing": lambda m: m.quantity == "omega_c",
+    "one criterion": lambda m: m.quantity == "omega_c",
     "another claim's": lambda m: m.quantity != "v_y",
 }
 
@@ -87,8 +87,8 @@ def test_what_was_measured_must_be_there(gone):
     """Numbers that are gone without a reason leave a claim undecided, whoever measured."""
     both = made.claim(
         "it",
-        Bearing("settled", "omega_c", lambda m: m.parameters.omega_0),
-        Bearing("settled", "wall_spin", lambda m: m.parameters.omega_0),
+        Criterion("settled", "omega_c", lambda m: m.parameters.omega_0),
+        Criterion("settled", "wall_spin", lambda m: m.parameters.omega_0),
     )
     whole = Records(
         rows(4) + rows(4, set="other") + rows(2, name="wall_spin") + rows(2, name="v_y")
@@ -99,8 +99,8 @@ def test_what_was_measured_must_be_there(gone):
     (verdict,) = judge([both], less)
     assert verdict.outcome is expected
     assert verdict.planned == 10
-    bearing = [m for m in whole.measurements if m.quantity != "v_y"]
-    assert verdict.left_out == sum(not GONE[gone](m) for m in bearing)
+    criterion = [m for m in whole.measurements if m.quantity != "v_y"]
+    assert verdict.left_out == sum(not GONE[gone](m) for m in criterion)
     steps = dict.fromkeys((1, 2, 3), less)
     for engine, own in ("mujoco-plain", steps), ("mujoco-defaults", {2: less}):
         said = full_verdict(both, {"mujoco": {1: whole}, engine: own}).engines[1]
@@ -111,7 +111,7 @@ def test_what_was_measured_must_be_there(gone):
 def test_a_set_of_which_a_protocol_says_nothing_leaves_its_claims_undecided():
     silent = Counter([Planned("settled", "other", "")])
     for of, expected in ("settled", Outcome.INCONCLUSIVE), ("lift", Outcome.CONFIRMED):
-        about = made.claim("it", Bearing(of, "omega_c", lambda m: m.parameters.omega_0))
+        about = made.claim("it", Criterion(of, "omega_c", lambda m: m.parameters.omega_0))
         whole = Records(rows(2, of))
         assert outcome(about, replace(whole, planned=whole.planned + silent)) is expected
 
@@ -204,8 +204,8 @@ def test_every_claim_predicts_a_number_that_could_refute_it():
     asked = (each for each in CLAIMS if each.expected is Outcome.CONFIRMED)
     assert [each.id for each in asked if not each.numbers] == []
     sides = (Relation.AT_MOST, Relation.AT_LEAST)
-    low, high = (Bearing("settled", "omega_c", lambda m: 1.0, relation=each) for each in sides)
-    counts = Bearing("plane", "cases", lambda m: 1.0)
+    low, high = (Criterion("settled", "omega_c", lambda m: 1.0, relation=each) for each in sides)
+    counts = Criterion("plane", "cases", lambda m: 1.0)
     for own, numbers in ((low, high), {0, 1}), ((low, counts), set()), ((high,), set()):
         assert made.claim("it", *own).numbers == numbers
 

@@ -14,10 +14,10 @@ from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit import levels, settling
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import (
     COVERAGE,
@@ -28,7 +28,7 @@ from compare.kit.statistics import (
     uniform,
     zero_and_slope,
 )
-from compare.kit.trials import of_no_step, unlike
+from compare.kit.step_pairs import of_no_step, unlike
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion.measure import laws, motions
@@ -45,13 +45,15 @@ QUICK = sets(Level.QUICK)
 SETS, WALL, THICK = {"reference": P}, {"rough-wall": QUICK["rough-wall"]}, P.replace(c=10.0)
 ROUGH, SAMPLES = QUICK["high-wall-friction"], 50
 PROTOCOLS = {
-    "field": lambda lab: motions.field(lab, SETS, Records()),
-    "growth": lambda lab: growth.measure(lab, SETS, Records()),
-    "bounds": lambda lab: onset.bounds(lab, SETS, known("reference", P, "omega_01", "omega_02")),
-    "lift": lambda lab: onset.lift(lab, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
-    "impacts": lambda lab: motions.impacts(lab, SETS, Records()),
-    "pulsation": lambda lab: unsteady.pulsation(
-        lab,
+    "field": lambda runner: motions.field(runner, SETS, Records()),
+    "growth": lambda runner: growth.measure(runner, SETS, Records()),
+    "bounds": lambda runner: onset.bounds(
+        runner, SETS, known("reference", P, "omega_01", "omega_02")
+    ),
+    "lift": lambda runner: onset.lift(runner, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
+    "impacts": lambda runner: motions.impacts(runner, SETS, Records()),
+    "pulsation": lambda runner: unsteady.pulsation(
+        runner,
         WALL,
         known(
             "rough-wall", QUICK["rough-wall"], "omega_01", "omega_02", "omega_04", uncertainty=0.0
@@ -61,19 +63,19 @@ PROTOCOLS = {
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)
-def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, monkeypatch):
+def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name, monkeypatch):
     """The first group is said to, in pulsations the first run; validation shows what all of them
     measure."""
-    groups, tried = Lab.groups, []
+    groups, tried = Runner.groups, []
 
-    def breaking(lab, asked):
-        for group, runs in zip(asked, groups(lab, asked), strict=True):
+    def breaking(runner, asked):
+        for group, runs in zip(asked, groups(runner, asked), strict=True):
             if len(group) > 1 or name == "pulsation":  # not a run that has to settle first
                 tried.append(group)
             yield "diverged at once" if tried == [group] else runs
 
-    monkeypatch.setattr(Lab, "groups", breaking)
-    left = Records.of(PROTOCOLS[name](lab))
+    monkeypatch.setattr(Runner, "groups", breaking)
+    left = Records.of(PROTOCOLS[name](runner))
     assert ["the run diverged at once" in missing.reason for missing in left.missing].count(
         True
     ) == 1
@@ -112,9 +114,9 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(lab, name, mo
         ),
     ],
 )
-def test_what_is_not_there_is_said(lab, measure, p, said):
+def test_what_is_not_there_is_said(runner, measure, p, said):
     """Without friction, slip, settled states, or a change from slipping to riding."""
-    rows = list(measure(lab, {"mine": p}, Records()))
+    rows = list(measure(runner, {"mine": p}, Records()))
     assert {(type(row), row.set) for row in rows} == {(Missing, "mine")}
     assert any(said in row.reason for row in rows)
 
@@ -132,7 +134,7 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
 
 
 @pytest.mark.slow
-def test_a_mean_may_depend_on_more_than_the_state(lab):
+def test_a_mean_may_depend_on_more_than_the_state(runner):
     """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is
     none, blind."""
     p, f, a = sets(Level.DEFAULT)["design-5"].replace(omega_0=11.7694), 4.0, 199.89
@@ -141,7 +143,7 @@ def test_a_mean_may_depend_on_more_than_the_state(lab):
     assert late - early > 0.015 * abs(early)
     begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
     driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, lead=float(begin) / a)
-    (row,) = unsteady.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
+    (row,) = unsteady.mean_errors(replace(runner, level=Level.DEFAULT), [(driven, a)])
     assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolution * 0.9 * abs(row.value)
 
 
@@ -214,15 +216,15 @@ def test_what_changes_by_little_among_what_changes_by_much_is_not_sure():
     assert unlike(np.zeros(0)).size == 0
 
 
-def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it(lab):
+def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it(runner):
     """Also where neither half the step nor other starts change it; what is measured takes the place
     of what errors of one sign could come to."""
     p = Parameters.named("reference")
     value = estimate(12.0, drift=0.0, solver=1.0)
-    sure = settled._with_changes(lab, value, 0.0, p, 12.0).uncertainty
+    sure = settled._with_changes(runner, value, 0.0, p, 12.0).uncertainty
     steps = 2 / (p.c * coarse_step(p))
     assert sure == pytest.approx(12.0 * settling.SOLVED * math.sqrt(steps))
-    assert settled._with_changes(lab, value, 3.0, p, 12.0).uncertainty == pytest.approx(6.0)
+    assert settled._with_changes(runner, value, 3.0, p, 12.0).uncertainty == pytest.approx(6.0)
 
 
 def test_first_top_lies_between_samples():
@@ -245,18 +247,18 @@ def make(patch, **effort):
     patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, **effort))
 
 
-def measure_settled(lab, patch, p, *flows):
+def measure_settled(runner, patch, p, *flows):
     make(
         patch,
         settled_starts=tuple((how, flows) for how in ("rest", "with the fluid", "on the wall")),
     )
-    return Records.of(settled.measure(lab, {"thick": p}, Records()))
+    return Records.of(settled.measure(runner, {"thick": p}, Records()))
 
 
-def test_what_does_not_settle_is_missing(lab, monkeypatch):
+def test_what_does_not_settle_is_missing(runner, monkeypatch):
     make(monkeypatch, settling_rounds=(1.0,))
     monkeypatch.setattr(settling, "SOLVED", 1e-3)
-    found = measure_settled(lab, monkeypatch, THICK, 0.6)
+    found = measure_settled(runner, monkeypatch, THICK, 0.6)
     assert not found.measurements
     starts = [each for each in found.missing if " still drifts" in each.reason]
     states = [each for each in found.missing if "no values of it" in each.reason]
@@ -266,15 +268,15 @@ def test_what_does_not_settle_is_missing(lab, monkeypatch):
     assert all(each.rows > 10 for each in states)
 
 
-def test_a_state_that_depends_on_the_step_is_missing(lab, monkeypatch):
+def test_a_state_that_depends_on_the_step_is_missing(runner, monkeypatch):
     right = settling.settle
 
-    def other_case(lab, starts, patience):
-        states = right(lab, starts, patience)
-        return [replace(each, case=Case.SN) for each in states] if patience.refine == 2 else states
+    def other_case(runner, starts, criteria):
+        states = right(runner, starts, criteria)
+        return [replace(each, case=Case.SN) for each in states] if criteria.refine == 2 else states
 
     monkeypatch.setattr(settling, "settle", other_case)
-    found = measure_settled(lab, monkeypatch, THICK, 0.6)
+    found = measure_settled(runner, monkeypatch, THICK, 0.6)
     assert {m.quantity for m in found.measurements} == {"case"}
     assert len(found.missing) == 3
     assert all(
@@ -282,20 +284,22 @@ def test_a_state_that_depends_on_the_step_is_missing(lab, monkeypatch):
     )
 
 
-def test_what_quadratic_drag_does_not_settle_has_no_values(lab, monkeypatch):
+def test_what_quadratic_drag_does_not_settle_has_no_values(runner, monkeypatch):
     """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
-    found = measure_settled(lab, monkeypatch, QUICK["blunt"], 0.6, 2.0)
+    found = measure_settled(runner, monkeypatch, QUICK["blunt"], 0.6, 2.0)
     cases = {m.conditions["case"] for m in found.measurements if m.quantity == "omega_c"}
     assert cases == {"SS", "NS"}
     assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 
 
-def test_what_swings_for_ever_settles_by_going_on_from_its_mean(lab, monkeypatch):
+def test_what_swings_for_ever_settles_by_going_on_from_its_mean(runner, monkeypatch):
     """A ball that sinks along the wall: also where a round is rounded to another length than the
     usual one."""
     make(monkeypatch, settling_rounds=(0.45, 1.0, 1.0), settling_steps=512)
     p = QUICK["rough-floor"].replace(omega_0=21.74)
-    (state,) = settling.settle(lab, [settling.named_start("rough-floor", p, "on the wall")])
+    (state,) = settling.settle(
+        runner, [settling.initial_condition("rough-floor", p, "on the wall")]
+    )
     assert (state.case, state.failure) == (Case.NS, "")
 
 
@@ -355,10 +359,10 @@ def test_numbers_that_no_quick_set_has_are_judged_too():
 
 
 def narrowed(answer, width, task=lambda v, b, attempt: (v, attempt), careful=True):
-    """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a lab whose tasks
+    """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a runner whose tasks
     are their runs."""
-    lab = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
-    (bracket,) = narrow(lab, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
+    runner = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
+    (bracket,) = narrow(runner, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
     return bracket
 
 
@@ -422,7 +426,7 @@ def test_a_line_has_no_maximum(bend):
     assert not math.isfinite(extrapolated_maximum(where - bend * where**2, order).value)
 
 
-def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):
+def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(runner, monkeypatch):
     """Of a set without fold, and the cases in which balls settle there."""
     monkeypatch.setattr(thresholds, "extrapolated", lambda *what: None)
     p, rows = QUICK["thick-fluid"], []
@@ -444,7 +448,7 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monke
                     case=case.name,
                 )
             )
-    records = Records.of(thresholds.measure(lab, {"thick-fluid": p}, Records(tuple(rows))))
+    records = Records.of(thresholds.measure(runner, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
     assert [m.value for m in records.select("thresholds", "folds")] == [
         1.0

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from compare import validation
-from compare.claim import Bearing, Outcome, Verdict
+from compare.claim import Criterion, Outcome, Verdict
 from compare.kit import programme, record
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
@@ -26,27 +26,27 @@ SETS = {
 }
 
 
-def going_round(lab, sets, records):
+def going_round(runner, sets, records):
     """A measurement of every set, made up."""
     for name, p in sets.items():
         yield dataclasses.replace(
-            measured("round", "omega_c", p.omega_0, 1e-9, p, name), engine=lab.engine.name
+            measured("round", "omega_c", p.omega_0, 1e-9, p, name), engine=runner.engine.name
         )
 
 
-def after(lab, sets, records):
+def after(runner, sets, records):
     """Goes out from what was measured before."""
     for m in records.select("round"):
         yield Missing("after", m.set, f"nothing comes after {m.value:g} rad/s")
 
 
-def broken(lab, sets, records):
+def broken(runner, sets, records):
     raise ArithmeticError("it can't be done")
     yield
 
 
 def about(protocol):
-    return claim(f"of-{protocol}", Bearing(protocol, "omega_c", lambda m: m.parameters.omega_0))
+    return claim(f"of-{protocol}", Criterion(protocol, "omega_c", lambda m: m.parameters.omega_0))
 
 
 MEASURED = {"round": going_round, "broken": broken, "next": going_round, "after": after}
@@ -60,9 +60,9 @@ def counted(monkeypatch):
     done = []
 
     def counting(name, measure):
-        def carried_out(lab, sets, records):
+        def carried_out(runner, sets, records):
             done.append(name)
-            yield from measure(lab, sets, records)
+            yield from measure(runner, sets, records)
 
         monkeypatch.setitem(PLAN, name, Entry())
         return Protocol(name, carried_out, NEEDS.get(name, ()))
@@ -163,7 +163,7 @@ def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
         seen.append(verdict.claim.id)
         first.set()
 
-    def waiting(lab, sets, before):
+    def waiting(runner, sets, before):
         assert first.wait(30)
         yield from ()
 
@@ -176,10 +176,10 @@ def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
     assert seen[0] != "of-waiting"
 
 
-def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab, monkeypatch):
+def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, runner, monkeypatch):
     seen = []
 
-    def measure(lab, sets, before):
+    def measure(runner, sets, before):
         seen.extend(sets)
         yield from ()
 
@@ -187,39 +187,39 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, lab, monkeypatch
     for settles in (True, False):
         protocol = Protocol(f"settles-{settles}", measure)
         monkeypatch.setitem(PLAN, protocol.name, Entry(settles=settles))
-        missing = programme.carry_out(Job(protocol, lab, tmp_path, named), Records()).missing
+        missing = programme.carry_out(Job(protocol, runner, tmp_path, named), Records()).missing
         assert [m.set for m in missing] == ["air"] * settles
         assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
     assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
-def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, lab, monkeypatch):
+def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, runner, monkeypatch):
     monkeypatch.setitem(PLAN, "round", Entry())
     named = {name: Parameters.named("reference") for name in ("one", "other", "third")}
 
-    def measure(lab, sets, before):
-        yield from going_round(lab, {"one": named["one"]}, before)
+    def measure(runner, sets, before):
+        yield from going_round(runner, {"one": named["one"]}, before)
         yield Missing("round", "other", "it has a reason", 0)
 
-    found = programme.carry_out(Job(Protocol("round", measure), lab, tmp_path, named), Records())
+    found = programme.carry_out(Job(Protocol("round", measure), runner, tmp_path, named), Records())
     assert found.lost == {("round", "third", ""): 1}
 
 
 def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
-    tmp_path, lab, monkeypatch
+    tmp_path, runner, monkeypatch
 ):
     for engine in (None, MUJOCO):  # what one measured is not taken for the other's
         monkeypatch.setitem(PLAN, "round", Entry(by=engine))
         protocol = Protocol("round", going_round)
         (row,) = programme.carry_out(
-            Job(protocol, lab, tmp_path, {"mine": SETS["mine"]}), Records()
+            Job(protocol, runner, tmp_path, {"mine": SETS["mine"]}), Records()
         ).measurements
         assert row.engine == (engine or EVENT).name
     for name, count in (("mine", 1), ("reference", 0)):
-        protocol = Protocol(f"of-{name}", lambda lab, sets, records: ())
+        protocol = Protocol(f"of-{name}", lambda runner, sets, records: ())
         monkeypatch.setitem(PLAN, protocol.name, Entry(only="it is that of the reference"))
         missing = programme.carry_out(
-            Job(protocol, lab, tmp_path, {name: SETS["mine"]}), Records()
+            Job(protocol, runner, tmp_path, {name: SETS["mine"]}), Records()
         ).missing
         assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
 

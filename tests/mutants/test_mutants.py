@@ -19,8 +19,8 @@ from analytic.stationary import solutions as stationary
 from compare.claim import Outcome
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO
-from compare.kit.lab import Lab
 from compare.kit.levels import Level
+from compare.kit.runner import Runner
 from compare.subjects.stationary import claims
 from docs.studies import mutants
 from model import Case, Parameters
@@ -70,8 +70,8 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(wrong, tmp_path, mon
     start, runs = [0.02, 0.0, 14.0, -1.0, 2.0, 7.0, 0.0, 0.0], {}
     with Campaign(tmp_path, workers=0) as campaign:
         for engine in (MUJOCO, wrong):
-            lab = Lab(campaign, engine, Level.QUICK)
-            (runs[engine.name],) = lab.campaign.run([lab.task(P, start, 0.4, 4e-3)])
+            runner = Runner(campaign, engine, Level.QUICK)
+            (runs[engine.name],) = runner.campaign.run([runner.task(P, start, 0.4, 4e-3)])
     right, other = runs[MUJOCO.name], runs[wrong.name]
     assert other.header.parameters == right.header.parameters == P
     assert np.abs(other.x - right.x).max() > 1e-6

@@ -498,14 +498,14 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         ),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": swapped},
-    "simulation.charts._begin_on_wall": {
+    "simulation.coordinates._begin_on_wall": {
         "motions at the wall have 2 % more inertia": other(j=1.02),
         "one contact slips with 3 % more floor friction": in_case(other(mu=1.03), Case.RS, Case.SR),
         "two-point rolling with 5 % more drag": in_case(other(c=1.05), Case.RR),
         "both contacts slip with 3 % more wall friction": in_case(other(eta=1.03), Case.SS),
         "off the floor there is 3 % more drag": in_case(other(c=1.03), Case.NR, Case.NS),
     },
-    "simulation.charts._begin_off_wall": {
+    "simulation.coordinates._begin_off_wall": {
         "rolling off the wall with 5 % more drag": in_case(other(c=1.05), Case.RN),
         "slipping off the wall with 3 % more friction": in_case(other(mu=1.03), Case.SN),
         "flight with 5 % more drag": in_case(other(c=1.05), Case.NN),

@@ -13,7 +13,7 @@ from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import Orbit
-from compare.claim import Bearing, bearings, claim
+from compare.claim import Criterion, claim, criteria
 from compare.judge import simulated, theory
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, state
@@ -63,13 +63,13 @@ def _of_orbit(quantity: str, orbit: Orbit) -> float:
     return _ORBIT[quantity.partition("_")[2]](orbit)
 
 
-def _orbit_bearings(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
-    """Bearings on quantities of the periodic orbit that theory has near the measured one."""
+def _orbit_criteria(protocol: str, *quantities: str) -> tuple[Criterion, ...]:
+    """Criteria on quantities of the periodic orbit that theory has near the measured one."""
 
     def predict(m: Measurement) -> float:
         return _of_orbit(m.quantity, theory(orbits.refine, m.parameters, state(m), m.at("period")))
 
-    return bearings(protocol, quantities, predict, by=_REFINED)
+    return criteria(protocol, quantities, predict, by=_REFINED)
 
 
 def _after_rest(m: Measurement) -> float:
@@ -95,8 +95,8 @@ CLAIMS = (
         "Definitions 1-3",
         "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip "
         "grows.",
-        *bearings("choice", ("case", "omega_c"), _after_rest, by=_RULE),
-        *bearings("choice", ("case", "omega_c"), _only_lasting, by="analytic.stable_solutions"),
+        *criteria("choice", ("case", "omega_c"), _after_rest, by=_RULE),
+        *criteria("choice", ("case", "omega_c"), _only_lasting, by="analytic.stable_solutions"),
     ),
     claim(
         "hopping",
@@ -104,15 +104,15 @@ CLAIMS = (
         "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on "
         "the wall. The engine "
         "and Moreau-Jean time stepping come to the closed orbit of the event-driven simulation.",
-        *_orbit_bearings("recurrent", *_HOP),
-        *_orbit_bearings("stepped", *_HOP),
+        *_orbit_criteria("recurrent", *_HOP),
+        *_orbit_criteria("stepped", *_HOP),
     ),
     claim(
         "hopping-multiplier",
         _PERIODIC,
         "Disturbances of a hop shrink from one to the next by a factor: the largest Floquet "
         "multiplier of its orbit.",
-        *_orbit_bearings("recurrent", "orbit_multiplier"),
+        *_orbit_criteria("recurrent", "orbit_multiplier"),
         level=Level.DEFAULT,
     ),
     claim(
@@ -120,15 +120,15 @@ CLAIMS = (
         _PERIODIC,
         "Between the Hopf points of SS the ball swings for ever and slips all the time (very rough "
         "floor).",
-        *_orbit_bearings("swing", "swing_period", "swing_omega_c", "swing_size"),
+        *_orbit_criteria("swing", "swing_period", "swing_omega_c", "swing_size"),
         level=Level.DEFAULT,
     ),
     claim(
         "calm",
         _PERIODIC,
         "In strong drag, κ > 2, no ball was found that hops on: each settles to a stationary motion.",
-        Bearing("calm", "hops", _hops, by="analytic.simulate"),
-        Bearing(
+        Criterion("calm", "hops", _hops, by="analytic.simulate"),
+        Criterion(
             "calm",
             "end_omega_c",
             lambda m: solution_of(m).state.omega_c,
@@ -140,7 +140,7 @@ CLAIMS = (
         "hopping-birth",
         f"{_PERIODIC}, (85)",
         "Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",
-        Bearing(
+        Criterion(
             "recurrent",
             "orbit_birth",
             lambda m: analytic.thresholds(m.parameters).omega_02,
@@ -156,8 +156,8 @@ CLAIMS = (
         "of Floquet multipliers leaves the unit circle; beyond, the hops end. By continuation and "
         "time stepping: "
         "MuJoCo's contacts have no such coefficient.",
-        Bearing("rebounding", "hops", lambda m: float(_rebounding(m).stable), by=_REFINED),
-        *bearings(
+        Criterion("rebounding", "hops", lambda m: float(_rebounding(m).stable), by=_REFINED),
+        *criteria(
             "rebounding",
             ("orbit_period", "orbit_omega_c"),
             lambda m: _of_orbit(m.quantity, _rebounding(m)),
@@ -172,8 +172,8 @@ CLAIMS = (
         _PERIODIC,
         "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit "
         "circle.",
-        *_orbit_bearings("followed", "orbit_death"),
-        Bearing("followed", "hops", _hops, by="analytic.simulate"),
+        *_orbit_criteria("followed", "orbit_death"),
+        Criterion("followed", "hops", _hops, by="analytic.simulate"),
         level=Level.DEFAULT,
     ),
 )

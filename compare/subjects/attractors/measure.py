@@ -25,16 +25,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compare.kit.engines import MOREAU
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
 from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top
+from compare.kit.step_pairs import Start, StepPair, carry_out, constrained, of_no_step
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, carry_out, constrained, of_no_step
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
@@ -66,7 +66,7 @@ SWUNG = 4.0
 
 
 def hopping(
-    lab: Lab,
+    runner: Runner,
     sets: Mapping[str, Parameters],
     records: Records,
     protocol: str = "recurrent",
@@ -80,11 +80,11 @@ def hopping(
     p = Parameters.named(SET)
     flows = [
         share * p.omega_0
-        for share in (lab.effort.recurrent_flows if protocol == "recurrent" else (1.0,))
+        for share in (runner.effort.recurrent_flows if protocol == "recurrent" else (1.0,))
     ]
     lasts, flow = HOLD * len(flows), Flow.staircase(flows, HOLD)
-    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / SAMPLE), flow=flow)
-    (result,) = carry_out(lab, protocol, [trial])
+    pair = StepPair(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / SAMPLE), flow=flow)
+    (result,) = carry_out(runner, protocol, [pair])
     if isinstance(result, Missing):
         yield result
         return
@@ -97,7 +97,9 @@ def hopping(
                 protocol, SET, f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more"
             )
             break
-        row = partial(measurement, lab, protocol, SET, q, tasks=result.tasks, **fine.conditions(q))
+        row = partial(
+            measurement, runner, protocol, SET, q, tasks=result.tasks, **fine.conditions(q)
+        )
         for quantity, value in fine.values.items():
             yield row(quantity=quantity, value=of_no_step(coarse.values[quantity].value, value))
         if k:
@@ -122,7 +124,7 @@ def hopping(
         coarse_birth, fine_birth = (
             birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)
         )
-        yield result.row(lab, "orbit_birth", of_no_step(coarse_birth.value, fine_birth))
+        yield result.row(runner, "orbit_birth", of_no_step(coarse_birth.value, fine_birth))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
@@ -210,7 +212,7 @@ are short: their starts are extrapolated from one or two hops, which attract fro
 
 
 def followed(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The wall friction beyond which disturbances of the hop grow, and whether balls hop on, on
     both sides of it."""
@@ -219,7 +221,7 @@ def followed(
     etas = [q.eta for q in walls]
 
     def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
-        return lab.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / SAMPLE))
+        return runner.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / SAMPLE))
 
     steady = [
         np.array([TOP.stacked()] * 2)
@@ -233,7 +235,7 @@ def followed(
             )
         both = zip(ahead, REFINED_MARGINAL, strict=True)
         tasks.append([task(q, x, FOLLOWED, refined) for x, refined in both])
-        (runs,) = lab.groups(tasks[-1:])
+        (runs,) = runner.groups(tasks[-1:])
         parts = [] if isinstance(runs, str) else [tops(run, DISTURBED, FOLLOWED) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
@@ -245,11 +247,11 @@ def followed(
         if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
             near = parts[1].conditions(q)
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
-    yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near)
+    yield measurement(runner, "followed", SET, walls[-4], "orbit_death", place, used, **near)
     again = [
         task(walls[k], np.array(tasks[k][1].x0), LEFT_ALONE, REFINED_MARGINAL[0]) for k in (-4, -1)
     ]
-    yield from _hops_at_end(lab, "followed", SET, again)
+    yield from _hops_at_end(runner, "followed", SET, again)
 
 
 RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
@@ -260,7 +262,7 @@ results had been seen: at 0.56 disturbances grow so slowly that this doesn't sho
 
 
 def rebounding(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Whether balls that rebound hop on, and their hops, followed from one coefficient of
     restitution to the next.
@@ -274,11 +276,11 @@ def rebounding(
         step = coarse_step(p) / refine
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
         return replace(
-            lab.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings
+            runner.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings
         )
 
     for e in RESTITUTIONS:
-        (run,) = lab.campaign.run([task(x, MEASURED, e)])
+        (run,) = runner.campaign.run([task(x, MEASURED, e)])
         if hops(run):
             last = tops(run, 0.0, MEASURED)
             x = last.x[-8:].mean(
@@ -289,15 +291,15 @@ def rebounding(
             return
         if not hops(run) or e in REBOUNDING:
             alone = [task(x, REBOUNDS_ALONE, e, refine) for refine in (80, 160)]
-            runs = lab.campaign.run(alone)
+            runs = runner.campaign.run(alone)
             at = last.conditions(p) | {"restitution": e, "duration": REBOUNDS_ALONE}
-            yield measurement(lab, "rebounding", SET, p, "hops", hops(runs[0]), alone[:1], **at)
+            yield measurement(runner, "rebounding", SET, p, "hops", hops(runs[0]), alone[:1], **at)
             if not hops(runs[0]):
                 return
             coarse, fine = (tops(run, REBOUNDS_ALONE / 2, REBOUNDS_ALONE).values for run in runs)
             for name in ("orbit_period", "orbit_omega_c"):
                 value = of_no_step(coarse[name].value, fine[name])
-                yield measurement(lab, "rebounding", SET, p, name, value, alone, **at)
+                yield measurement(runner, "rebounding", SET, p, name, value, alone, **at)
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate:
@@ -313,7 +315,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate
 
 
 def swing(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Period, mean and size of the swing of omega_c, from its turning points, on a very rough
     floor.
@@ -323,7 +325,7 @@ def swing(
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
     (result,) = carry_out(
-        lab, "swing", [Trial("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)]
+        runner, "swing", [StepPair("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)]
     )
     end = SWINGING - SWUNG
     if isinstance(result, Missing):
@@ -339,7 +341,7 @@ def swing(
         ("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True
     ):
         yield result.row(
-            lab,
+            runner,
             name,
             of_no_step(coarse, estimate(fine, part=abs(fine - before))),
             **conditions,
@@ -358,7 +360,7 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
 
 
 def calm(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Whether balls still hop after 60/c of the weakest drag, or how they go round: three of each of
     16 sets."""
@@ -370,9 +372,9 @@ def calm(
         for _ in range(3):
             slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
             x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
-            tasks.append(lab.task(p, x, lasts, coarse_step(p) / 4, samples=2000))
-    yield from _hops_at_end(lab, "calm", "strong drag", tasks)
-    for task, run in zip(tasks, lab.each(tasks), strict=True):
+            tasks.append(runner.task(p, x, lasts, coarse_step(p) / 4, samples=2000))
+    yield from _hops_at_end(runner, "calm", "strong drag", tasks)
+    for task, run in zip(tasks, runner.each(tasks), strict=True):
         if not isinstance(run, str) and not hops(run):
             last = run.omega_c[tail(run)]
             # By chance samples may be the same: no state is known better than a settled one.
@@ -380,20 +382,20 @@ def calm(
             end = estimate(last[-1], swing=max(float(np.ptp(last)), least))
             at = {"case": settled_case(run).name}
             p = task.parameters
-            yield measurement(lab, "calm", "strong drag", p, "end_omega_c", end, [task], **at)
+            yield measurement(runner, "calm", "strong drag", p, "end_omega_c", end, [task], **at)
 
 
 def _hops_at_end(
-    lab: Lab, protocol: str, set: str, tasks: list[Task]
+    runner: Runner, protocol: str, set: str, tasks: list[Task]
 ) -> Iterator[Measurement | Missing]:
     """Whether each ball hops at the end of a run from a state: 1 or 0."""
-    for task, run in zip(tasks, lab.each(tasks), strict=True):
+    for task, run in zip(tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):
             yield Missing(protocol, set, f"a run {run}")
         else:
             at = state_of(State.of(task.x0).stacked())
             yield measurement(
-                lab,
+                runner,
                 protocol,
                 set,
                 task.parameters,
@@ -406,7 +408,7 @@ def _hops_at_end(
 
 
 def choice(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
     p = sets["reference"]
@@ -419,7 +421,7 @@ def choice(
         ),
     }
     starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
-    yield from settled_readings(lab, "choice", starts[: lab.effort.choice_sets])
+    yield from settled_readings(runner, "choice", starts[: runner.effort.choice_sets])
 
 
 PROTOCOLS = (

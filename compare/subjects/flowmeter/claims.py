@@ -11,7 +11,7 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
-from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
+from compare.claim import Criterion, Text, When, all_of, claim, criteria, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, state
 from compare.kit.settling import physical_case
@@ -38,11 +38,11 @@ RTOL = 1e-9
 
 def _slope(
     by: str, predict: Callable[[Measurement], float], function: str, *cases: Case
-) -> tuple[Bearing]:
-    """A bearing on slopes of the characteristic curve that were measured in one way, in some
+) -> tuple[Criterion]:
+    """A criterion on slopes of the characteristic curve that were measured in one way, in some
     cases."""
     when = all_of(given(by=by), is_in(*cases))
-    return (Bearing("slope", "slope", predict, when=when, by=f"analytic.{function}"),)
+    return (Criterion("slope", "slope", predict, when=when, by=f"analytic.{function}"),)
 
 
 def _slope_at(m: Measurement) -> float:
@@ -247,13 +247,15 @@ CLAIMS = (
         "from rest the ball "
         "slips (η < j), and on the wall it stays (η > j).",
         # Slipping on the floor no ball sinks.
-        Bearing(
+        Criterion(
             "settled", "case", _only_rolling, when=all_of(from_floor, _does_not_sink, slips_first)
         ),
-        Bearing("settled", "case", _only_rolling, when=all_of(_does_not_sink, lifts_first)),
-        Bearing("settled", "omega_c", _reads_flow, when=_does_not_sink),
+        Criterion("settled", "case", _only_rolling, when=all_of(_does_not_sink, lifts_first)),
+        Criterion("settled", "omega_c", _reads_flow, when=_does_not_sink),
         *(
-            Bearing("thresholds", end, lambda m: analytic.operating_range(m.parameters), when=first)
+            Criterion(
+                "thresholds", end, lambda m: analytic.operating_range(m.parameters), when=first
+            )
             for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
         ),
     ),
@@ -262,7 +264,7 @@ CLAIMS = (
         "Section 5.3, (85)",
         "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and "
         "sinks.",
-        Bearing(
+        Criterion(
             "settled",
             "case",
             lambda m: (
@@ -272,7 +274,7 @@ CLAIMS = (
             ),
             when=given(start="on the wall"),
         ),
-        Bearing(
+        Criterion(
             "thresholds",
             "omega_02",
             lambda m: analytic.unloading_limit(m.parameters),
@@ -286,12 +288,12 @@ CLAIMS = (
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in "
         "between.",
         *(
-            Bearing(
+            Criterion(
                 "hysteresis", "case", _loop_case, when=_jumps(way), by="analytic.stable_solutions"
             )
             for way in (1, -1, 0)
         ),
-        Bearing("hysteresis", "omega_c", _loop_reading, by="(32), (38), (46)"),
+        Criterion("hysteresis", "omega_c", _loop_reading, by="(32), (38), (46)"),
         text=Text.CORRECTED,
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that "
         "is above ω₀₄.",
@@ -302,8 +304,8 @@ CLAIMS = (
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and "
         "ends slipping or "
         "rolling at both points.",
-        Bearing("unloading", "case", _end_case, when=given(start=UNLOADED), by=_SIMULATED),
-        *bearings(
+        Criterion("unloading", "case", _end_case, when=given(start=UNLOADED), by=_SIMULATED),
+        *criteria(
             "unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED
         ),
     ),
@@ -312,10 +314,10 @@ CLAIMS = (
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
         *(
-            Bearing("unloading", "case", _end_case, when=given(start=start), by=_SIMULATED)
+            Criterion("unloading", "case", _end_case, when=given(start=start), by=_SIMULATED)
             for start in (UPWARDS, BY_SPIN)
         ),
-        Bearing("unloading", "lift", _at_event, by=_SIMULATED),
+        Criterion("unloading", "lift", _at_event, by=_SIMULATED),
     ),
     claim(
         "design-limit",
@@ -325,15 +327,15 @@ CLAIMS = (
         "lowest or the highest limit of that tolerance. ω₀₂ follows the wall's friction by the "
         "design's sensitivity.",
         *(
-            Bearing("thresholds", end, _exact, when=all_of(first, _stokes), by=_DESIGN)
+            Criterion("thresholds", end, _exact, when=all_of(first, _stokes), by=_DESIGN)
             for end, first in _ENDS_OF_RANGES
         ),
         *(
-            Bearing("thresholds", end, predict, when=all_of(first, _stokes, _one_end), by=_DESIGN)
+            Criterion("thresholds", end, predict, when=all_of(first, _stokes, _one_end), by=_DESIGN)
             for end, first in _ENDS_OF_RANGES
             for predict in _WITHIN_TOLERANCES
         ),
-        Bearing(
+        Criterion(
             "thresholds", "omega_02", _by_sensitivity, by="analytic.flowmeter.design.sensitivities"
         ),
     ),
@@ -343,7 +345,7 @@ CLAIMS = (
         "Where a flow has several stable readings, the meter shows the lowest while the flow rises "
         "and the highest "
         "while it falls, as its design says.",
-        Bearing(
+        Criterion(
             "hysteresis",
             "omega_c",
             _loop_reading_of_design,
@@ -355,7 +357,7 @@ CLAIMS = (
         "Prop. 1, section 5.2",
         "The slowest disturbance of rolling dies out with the time constant that a design gives "
         "for a meter.",
-        Bearing(
+        Criterion(
             "rates",
             "slowest_decay",
             lambda m: 1 / design.response_time(m.parameters),

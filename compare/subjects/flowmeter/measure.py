@@ -26,7 +26,6 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from compare.kit import settling
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.record import (
     Condition,
@@ -37,10 +36,11 @@ from compare.kit.record import (
     measurement,
     state_of,
 )
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
-from compare.kit.settling import Patience, Settled
+from compare.kit.settling import SettlingCriteria, SteadyState
 from compare.kit.statistics import Estimate, estimate, settled_case, uniform
-from compare.kit.trials import Start, Trial, TrialResult, carry_out
+from compare.kit.step_pairs import Start, StepPair, StepPairResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 
@@ -51,11 +51,11 @@ NEIGHBOURS = (-1e-3, -5e-4, 5e-4, 1e-3)
 
 
 def slope(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there
     to unloading."""
-    most = lab.effort.slope_slipping
+    most = runner.effort.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
     # With a factor on the drift limit of settled states: for the jump they lie close together.
     for by, sharp in ("neighbours", 0.3), ("jump", 0.1), ("mean", 1.0):
@@ -63,14 +63,14 @@ def slope(
         starts = [
             [Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own
         ]
-        settled = settling.settle_groups(lab, starts, Patience(span=24.0, sharp=sharp))
+        settled = settling.settle_groups(runner, starts, SettlingCriteria(span=24.0, sharp=sharp))
         for curve, states in zip(own, settled, strict=True):
             where = f"{by} at omega_0 = {curve.p.omega_0:.4g} rad/s"
             if failure := next((each.failure for each in states if each.failure), ""):
                 yield Missing("slope", curve.set, f"{where}: {failure}")
             elif value := _slope(curve, states):
                 tasks, at = [each.task for each in states], {"case": states[-1].case.name, "by": by}
-                row = measurement(lab, "slope", curve.set, curve.p, "slope", value, tasks, **at)
+                row = measurement(runner, "slope", curve.set, curve.p, "slope", value, tasks, **at)
                 yield if_found(row, f"{where}: no slope")
             else:
                 cases = ", ".join(each.case.name for each in states)
@@ -131,7 +131,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
             yield Curve("mean", name, q, (*around[:2], holds.value), noise=noise)
 
 
-def _slope(curve: Curve, states: Sequence[Settled]) -> Estimate | None:
+def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
     """The slope of a curve, from its settled states; None where these are not of the cases that
     belong.
 
@@ -167,12 +167,12 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Estimate | None:
 
 
 def hysteresis(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Case and omega_c at every level of the loop, and the case at the level before."""
     loops: dict[str, list[Start]] = {}  # starts at all levels of a set, up and down
     for name, p in sets.items():
-        if rise := _levels(name, records, lab.effort.hysteresis_parts):
+        if rise := _levels(name, records, runner.effort.hysteresis_parts):
             sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
             loops[name] = [
                 Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides
@@ -186,17 +186,17 @@ def hysteresis(
     tasks = []
     for loop in loops.values():  # a run through all levels, each held for a time
         p, flows = loop[0].p, [level.p.omega_0 for level in loop]
-        step, hold = coarse_step(p), settling.duration(p, lab.effort.hysteresis_hold)
+        step, hold = coarse_step(p), settling.duration(p, runner.effort.hysteresis_hold)
         samples, flow = (
             round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows),
             Flow.staircase(flows, hold),
         )
         tasks.append(
-            lab.task(
+            runner.task(
                 p, State(omega_c=flows[0]), hold * len(flows), step, flow=flow, samples=samples
             )
         )
-    for (name, loop), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
+    for (name, loop), task, run in zip(loops.items(), tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):
             yield Missing("hysteresis", name, f"the run {run}")
             continue
@@ -215,7 +215,7 @@ def hysteresis(
                 run, **{column: getattr(run, column)[held] for column in columns(Trajectory)}
             )
             ended = settling.judge_run(
-                replace(level, x0=part.x[0]), task, part, lab.effort.settled_loose
+                replace(level, x0=part.x[0]), task, part, runner.effort.settled_loose
             )
             if ended.failure:
                 where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
@@ -227,7 +227,7 @@ def hysteresis(
                     "level": k + 1.0,
                     "before": before,
                 }
-                row = partial(measurement, lab, "hysteresis", name, level.p, tasks=[task], **at)
+                row = partial(measurement, runner, "hysteresis", name, level.p, tasks=[task], **at)
                 omega_c = ended.values["omega_c"]
                 yield row(quantity="case", value=ended.case)
                 value = omega_c.also(time_step=certainty * level.p.omega_0)
@@ -253,9 +253,9 @@ def _levels(name: str, records: Records, parts: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Shown:
-    """A quantity that a trial of unloading shows at an event, by names."""
+    """A quantity that a pair of unloading shows at an event, by names."""
 
-    trial: str
+    pair: str
     quantity: str
     event: str
 
@@ -266,7 +266,7 @@ LANDING, UNLOADED, UPWARDS, BY_SPIN = (
     "push upwards",
     "push by spin",
 )
-"""Names of the trials."""
+"""Names of the pairs."""
 
 
 UNLOADED_FROM = 1.02
@@ -278,11 +278,11 @@ WALL_PUSH = 1e-2
 
 
 def unloading(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """How a ball that rides the wall slips, falls and lands as the flow falls, or is lifted by a
     push."""
-    starts, trials = [], []
+    starts, pairs = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:
             yield Missing(
@@ -296,9 +296,14 @@ def unloading(
         lifts = records.threshold(name, "omega_03") or limit
         flows = UNLOADED_FROM * limit.value, 1.1 * max(limit.value, lifts.value)
         starts.append(
-            [settling.named_start(name, p.replace(omega_0=omega), "on the wall") for omega in flows]
+            [
+                settling.initial_condition(name, p.replace(omega_0=omega), "on the wall")
+                for omega in flows
+            ]
         )
-    for states in settling.settle_groups(lab, starts, Patience(loose=lab.effort.thresholds_loose)):
+    for states in settling.settle_groups(
+        runner, starts, SettlingCriteria(loose=runner.effort.thresholds_loose)
+    ):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
                 yield Missing(
@@ -307,39 +312,39 @@ def unloading(
                     f"no ball to begin with on the wall: {state.failure}",
                 )
             else:
-                trials += [_trial(lab, state, name) for name in names]
-    kinds: dict[Shown, list[tuple[TrialResult, Estimate, float]]] = {}
-    for result in carry_out(lab, "unloading", trials):
+                pairs += [_pair(runner, state, name) for name in names]
+    kinds: dict[Shown, list[tuple[StepPairResult, Estimate, float]]] = {}
+    for result in carry_out(runner, "unloading", pairs):
         if isinstance(result, Missing):
             yield result
             continue
-        name, (before, coarse), (case, fine) = result.trial.name, result.coarse, result.fine
+        name, (before, coarse), (case, fine) = result.pair.name, result.coarse, result.fine
         if name != LANDING and before is case:
-            yield result.row(lab, "case", case)
+            yield result.row(runner, "case", case)
         elif name != LANDING:
             yield Missing(
                 "unloading",
-                result.trial.set,
+                result.pair.set,
                 f"{name}: with half the time step the ball ends up otherwise",
             )
         if coarse.keys() != fine.keys() or (name == LANDING and not fine):
-            yield Missing("unloading", result.trial.set, f"{name}: the ball does not slip and land")
+            yield Missing("unloading", result.pair.set, f"{name}: the ball does not slip and land")
             continue
         for number, value in fine.items():
             kinds.setdefault(number, []).append(
                 (result, value, abs(coarse[number].value / value.value - 1))
             )
     for number, alike in kinds.items():
-        # The difference may be small by chance: at least the median of all trials counts.
+        # The difference may be small by chance: at least the median of all pairs counts.
         usual = float(np.median([change for *_, change in alike]))
         for result, fine, change in alike:
             value = fine.also(time_step=uniform(max(change, usual) * abs(fine.value)))
-            row = result.row(lab, number.quantity, value, event=number.event)
-            yield if_found(row, f"{number.trial}: no {number.quantity}")
+            row = result.row(runner, number.quantity, value, event=number.event)
+            yield if_found(row, f"{number.pair}: no {number.quantity}")
 
 
-def _trial(lab: Lab, state: Settled, name: str) -> Trial:
-    """A trial from a ball that rides the wall; one that lands is sampled at every step."""
+def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
+    """A pair from a ball that rides the wall; one that lands is sampled at every step."""
     p, x = state.start.p, State.of(state.mean)
     x0 = State(omega_c=x.omega_c, slip_x=x.slip_x)
     if name in (LANDING, UNLOADED):
@@ -349,7 +354,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
     else:
         x0 = x0._replace(slip_x=x.slip_x + WALL_PUSH * (x.slip_x + p.R / p.r * x.omega_c))
     coarse, fine = (
-        times if name == LANDING else times // 4 for times in lab.effort.unloading_refine
+        times if name == LANDING else times // 4 for times in runner.effort.unloading_refine
     )
     # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of
     # many kinds.
@@ -374,7 +379,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
 
     known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
     samples = None if name == LANDING else 1000
-    return Trial(
+    return StepPair(
         state.start.set,
         p,
         name,

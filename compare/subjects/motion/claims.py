@@ -13,7 +13,7 @@ from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
-from compare.claim import Bearing, Text, bearings, claim, given
+from compare.claim import Criterion, Text, claim, criteria, given
 from compare.judge import RTOL, simulated, theory
 from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
@@ -53,13 +53,13 @@ def _end_of_motion(m: Measurement) -> float:
     return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
 
 
-def _end_states(*starts: str) -> tuple[Bearing, ...]:
-    """Bearings on the state at the end of motions from starts whose names begin so."""
+def _end_states(*starts: str) -> tuple[Criterion, ...]:
+    """Criteria on the state at the end of motions from starts whose names begin so."""
 
     def starts_so(m: Measurement) -> bool:
         return str(m.conditions["start"]).startswith(starts)
 
-    return bearings(
+    return criteria(
         "runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN
     )
 
@@ -126,9 +126,9 @@ LAW_CLAIMS = (
         "times the normal force and opposes the slip. (That contacts press, and that friction "
         "stays within its limit, "
         "(12) and (13), is built into any solver of friction cones: it is not counted.)",
-        Bearing("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
+        Criterion("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
         *(
-            Bearing(
+            Criterion(
                 "laws", "friction_ratio", coefficient, when=given(contact=contact), by="(14), (15)"
             )
             for contact, coefficient in (
@@ -141,7 +141,7 @@ LAW_CLAIMS = (
         "eq-10",
         "(9), (10)",
         "A ball sinks freely at the speed at which Stokes' drag balances its weight less buoyancy.",
-        Bearing("laws", "v_y", _sinking, by="analytic.mechanics.drag.sinking_speed"),
+        Criterion("laws", "v_y", _sinking, by="analytic.mechanics.drag.sinking_speed"),
         text=Text.CORRECTED,
         reason="Table 1 gives the unit of m·c as kg m/s; it is kg/s.",
     ),
@@ -151,8 +151,8 @@ LAW_CLAIMS = (
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes "
         "through them as the "
         "equations of motion say.",
-        Bearing("motions", "case", lambda m: float(_motion_either(m).case[-1]), by=_RUN),
-        *bearings("motions", [f"end_{name}" for name in VARIABLES[TURNING]], _end_in_case, by=_RUN),
+        Criterion("motions", "case", lambda m: float(_motion_either(m).case[-1]), by=_RUN),
+        *criteria("motions", [f"end_{name}" for name in VARIABLES[TURNING]], _end_in_case, by=_RUN),
     ),
     claim(
         "flight",
@@ -160,7 +160,7 @@ LAW_CLAIMS = (
         "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and "
         "keeps its spin.",
         *_end_states("thrown"),
-        Bearing(
+        Criterion(
             "runs",
             "end_y",
             _fallen,
@@ -192,7 +192,7 @@ LAW_CLAIMS = (
         "spins about its axis, "
         "as long as slip at the floor dies out, and friction suffices; faster, it slips.",
         *(
-            Bearing(
+            Criterion(
                 "runs",
                 "case",
                 partial(_rolls_or_slips, holds),
@@ -201,7 +201,7 @@ LAW_CLAIMS = (
             )
             for holds, by in ((_is_stable, _HOLDS), (_exists, "analytic.stationary_solutions"))
         ),
-        Bearing("runs", "end_omega_c", _end_of_motion, when=given(start="smooth wall"), by=_RUN),
+        Criterion("runs", "end_omega_c", _end_of_motion, when=given(start="smooth wall"), by=_RUN),
     ),
     claim(
         "definition-1-2",
@@ -210,14 +210,14 @@ LAW_CLAIMS = (
         "and roll on beyond "
         "ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
         # Where slip lasts, theory's motion ends slipping at both points, or lifted.
-        Bearing(
+        Criterion(
             "runs",
             "case",
             lambda m: Case.RR if _is_stable(Case.RR, m) else float(_motion(m).case[-1]),
             when=given(start="rough floor"),
             by=_HOLDS,
         ),
-        Bearing("runs", "end_omega_c", _end_of_motion, when=given(start="rough floor"), by=_RUN),
+        Criterion("runs", "end_omega_c", _end_of_motion, when=given(start="rough floor"), by=_RUN),
     ),
     claim(
         "fluid-torque",
@@ -225,8 +225,8 @@ LAW_CLAIMS = (
         "A fluid that brakes the spin of a ball makes it roll slower than the fluid goes round, at "
         "first order in the "
         "torque.",
-        Bearing("torque", "case", _braked_rolls, by=_TORQUE),
-        Bearing(
+        Criterion("torque", "case", _braked_rolls, by=_TORQUE),
+        Criterion(
             "torque", "omega_c", lambda m: real_fluid.rolling(m.parameters).omega_c, by=_TORQUE
         ),
         reason="The paper leaves the torque out; so does all else here, unless parameters give it.",
@@ -236,8 +236,8 @@ LAW_CLAIMS = (
         "extension",
         "A ball that lands does not rebound, and friction acts on it during the impact by "
         "Coulomb's law for impulses.",
-        Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
-        *bearings("impacts", [f"after_{name}" for name in LANDED], _end_of_motion, by=_RUN),
+        Criterion("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
+        *criteria("impacts", [f"after_{name}" for name in LANDED], _end_of_motion, by=_RUN),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for "
         "the impulses.",
     ),
@@ -261,8 +261,8 @@ _FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
 """Where both contacts roll only A_z, B_z and the sums are determined, and measured."""
 
 
-def _motion_bearings(case: Case) -> Iterator[Bearing]:
-    """Bearings on rates of change and forces of a moving ball in a case."""
+def _motion_criteria(case: Case) -> Iterator[Criterion]:
+    """Criteria on rates of change and forces of a moving ball in a case."""
 
     def rate(m: Measurement) -> float:
         rates = theory(analytic.vector_field, case, state(m), m.parameters)
@@ -277,14 +277,14 @@ def _motion_bearings(case: Case) -> Iterator[Bearing]:
 
     when = given(case=case.name)
     if case in (Case.NR, Case.NS):  # into which a ball lifts off
-        yield Bearing(
+        yield Criterion(
             "field", "rate_v_y", lift, when=when, by="analytic.slip_stability.lift_acceleration"
         )
     for name in TRAITS[case].active:
         if name not in ("y", "h"):
-            yield Bearing("field", f"rate_{name}", rate, when=when, by="analytic.vector_field")
+            yield Criterion("field", f"rate_{name}", rate, when=when, by="analytic.vector_field")
     for name in _FORCES:
-        yield Bearing(
+        yield Criterion(
             "field", f"moving_force_{name}", force, when=when, by="analytic.contact_forces"
         )
 
@@ -295,7 +295,7 @@ EQUATIONS = tuple(
         _SOURCES.get(case, "(20)"),
         f"In case {case.name} the accelerations and contact forces are those of the equations of "
         f"motion.",
-        *_motion_bearings(case),
+        *_motion_criteria(case),
         text=Text.CORRECTED if case in _CORRECTED else Text.PRINTED,
         reason=_CORRECTED.get(case, "" if case in _SOURCES else _OWN),
     )

@@ -11,7 +11,7 @@ import numpy as np
 import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
-from compare.claim import Bearing, Outcome, Text, When, all_of, claim, given
+from compare.claim import Criterion, Outcome, Text, When, all_of, claim, given
 from compare.judge import simulated
 from compare.kit.record import Measurement, Relation, state
 from model import Case
@@ -88,8 +88,8 @@ def _bounds(
     bound: Callable[[Measurement], SlipBound | HeldBound],
     side: int = 0,
     from_rest: bool = False,
-) -> tuple[Bearing, Bearing]:
-    """Bearings on the zero and the slope of gamma over the flow, which a bound of the paper
+) -> tuple[Criterion, Criterion]:
+    """Criteria on the zero and the slope of gamma over the flow, which a bound of the paper
     predicts.
 
     `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly
@@ -98,7 +98,7 @@ def _bounds(
     power = "_square" if by == "stationary" else ""
     size = (lambda m: m.parameters.g / m.parameters.R) if from_rest else None
     return (
-        Bearing(
+        Criterion(
             "bounds",
             f"gamma_zero{power}",
             lambda m: bound(m).zero,
@@ -106,15 +106,15 @@ def _bounds(
             size=size,
             by="slip_bounds",
         ),
-        Bearing(
+        Criterion(
             "bounds", f"gamma_slope{power}", lambda m: bound(m).slope, when=when, by="slip_bounds"
         ),
     )
 
 
-def _neutral_flow(quantity: str, case: Case, by: str) -> Bearing:
-    """A bearing on a threshold: the flow at which the case is neutral with respect to slipping."""
-    return Bearing(
+def _neutral_flow(quantity: str, case: Case, by: str) -> Criterion:
+    """A criterion on a threshold: the flow at which a case is neutral with respect to slipping."""
+    return Criterion(
         "thresholds",
         quantity,
         lambda m: slip_stability.neutral_flow(case, m.parameters.replace(omega_0=1.0)),
@@ -145,7 +145,7 @@ CLAIMS = (
             "while forces admit it; else the ball passes into another case, as the equations of "
             "motion say.",
             *(
-                Bearing("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
+                Criterion("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
                 for gamma, by in (
                     (_gamma, "slip_stability.gamma"),
                     (_gamma_nr, "slip_bounds.gamma_nr"),
@@ -153,7 +153,7 @@ CLAIMS = (
                 if gamma is _gamma or arrow == _NR_NS
             ),
             *(
-                Bearing(
+                Criterion(
                     protocol,
                     "case",
                     _following_case,
@@ -173,7 +173,7 @@ CLAIMS = (
         "(58)",
         "A ball that rolls on the wall alone begins to slip the fastest in the direction β₁, "
         "whatever its state.",
-        Bearing("steepest", "steepest", _steepest, by="slip_bounds.steepest_nr"),
+        Criterion("steepest", "steepest", _steepest, by="slip_bounds.steepest_nr"),
     ),
     claim(
         "eq-13-gamma",
@@ -181,7 +181,7 @@ CLAIMS = (
         "On the wall alone slip in a direction grows in proportion to the friction that rolling "
         "needs in it, less "
         "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
-        Bearing(
+        Criterion(
             "growth",
             "gamma",
             _by_forces,
@@ -264,7 +264,7 @@ CLAIMS = (
         "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps "
         "slipping.",
         *_bounds(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
-        Bearing(
+        Criterion(
             "settled",
             "case",
             _case_on_wall,
@@ -277,7 +277,7 @@ CLAIMS = (
         "(69)",
         "Rolling moves as the mean of slipping to one side and to the other, weighted so that no "
         "slip is left.",
-        Bearing("growth", "filippov_share", _filippov_share, by="slip_bounds.filippov_share"),
+        Criterion("growth", "filippov_share", _filippov_share, by="slip_bounds.filippov_share"),
     ),
     claim(
         "definition-3",
@@ -285,7 +285,9 @@ CLAIMS = (
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and "
         "unstable beyond (on the "
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
-        Bearing("growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
+        Criterion(
+            "growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"
+        ),
         _neutral_flow("omega_01", Case.RR, "onset of slip"),
         _neutral_flow("omega_02", Case.NR, "onset of sliding on the wall"),
         _neutral_flow("omega_03", Case.RR, "loss of the floor"),
@@ -294,7 +296,7 @@ CLAIMS = (
         "extrema",
         "after (80)",
         "Out of RR into SS γ has its global extrema along (α, β) = (0, 0) and (π, π).",
-        Bearing(
+        Criterion(
             "growth",
             "gamma",
             _greatest_as_printed,
@@ -318,7 +320,7 @@ CLAIMS = (
             f"{outer.name}, would "
             "accelerate it upwards.",
             *(
-                Bearing(
+                Criterion(
                     "lift",
                     quantity,
                     predict,
@@ -341,7 +343,7 @@ CLAIMS = (
                 if quantity == "lifts" or inner is not Case.RS
             ),
             *(
-                Bearing(
+                Criterion(
                     "lift",
                     "moving_force_Ay",
                     lambda m: float(

@@ -8,7 +8,7 @@ import numpy as np
 import analytic
 from analytic import StationarySolution
 from analytic.mechanics import dynamics
-from compare.claim import Bearing, Text, claim, given
+from compare.claim import Criterion, Text, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement
 from compare.states import thresholds_of
@@ -86,12 +86,12 @@ def _propagator(case: Case, x: tuple[float, ...], p: Parameters, time: float) ->
     return np.asarray(expm(time * dynamics.jacobian(case, State.of(np.array(x)), p)))
 
 
-def _bearings(case: Case) -> tuple[Bearing, ...]:
-    """Bearings on all eigenvalues of the stationary state of a case."""
+def _criteria(case: Case) -> tuple[Criterion, ...]:
+    """Criteria on all eigenvalues of the stationary state of a case."""
     when = given(case=case.name)
     leans = case is Case.SR
     return (
-        Bearing(
+        Criterion(
             "rates",
             "decay_rate",
             lambda m: -_mode(m).real,
@@ -99,10 +99,10 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
             size=_mode_size,
             by=_JACOBIAN,
         ),
-        Bearing(
+        Criterion(
             "rates", "frequency", lambda m: _mode(m).imag, when=when, size=_mode_size, by=_JACOBIAN
         ),
-        Bearing(
+        Criterion(
             "rates",
             "response",
             _response,
@@ -110,7 +110,7 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
             by=_LEANING if leans else "exponential of the exact Jacobian",
         ),
         # The slowest of the decays, whatever grows or stays besides.
-        Bearing(
+        Criterion(
             "rates",
             "slowest_decay",
             lambda m: 1 / analytic.slowest_time_constant(_stationary(m)),
@@ -131,7 +131,7 @@ CLAIMS = (
         "prop-1-rate",
         "Prop. 1, (23)",
         "Rolling at both points, ω_c approaches the flow with the one rate c/(1 + 2j).",
-        *_bearings(Case.RR),
+        *_criteria(Case.RR),
     ),
     claim(
         "prop-2",
@@ -139,15 +139,15 @@ CLAIMS = (
         "In a fluid at rest a ball that spins next to the wall keeps its spin, whatever it is (a "
         "zero eigenvalue); "
         "going round dies out at the rate c/(1 + j).",
-        *_bearings(Case.RS),
+        *_criteria(Case.RS),
     ),
     claim(
         "prop-3-rate",
         "Prop. 3, (25), (35)",
         "In SR a load on the floor dies out above ω₀₃ = √(g/jR) and grows "
         "below, at the rates of the eigenvalues of f_SR.",
-        *_bearings(Case.SR),
-        Bearing(
+        *_criteria(Case.SR),
+        Criterion(
             "rates",
             "decay_rate",
             _slowest_decay,
@@ -165,7 +165,7 @@ CLAIMS = (
         "prop-4-rate",
         "Prop. 4, section 5.2",
         "Disturbances of slipping at both points die out, with the four eigenvalues of f_SS.",
-        *_bearings(Case.SS),
+        *_criteria(Case.SS),
     ),
     claim(
         "prop-5-rate",
@@ -173,7 +173,7 @@ CLAIMS = (
         "Carried by the wall alone the ball keeps any height (a zero eigenvalue); it swings about "
         "it with a pair "
         "of eigenvalues, and ω_c dies out at c/(1 + j).",
-        *_bearings(Case.NR),
+        *_criteria(Case.NR),
     ),
     claim(
         "prop-6-rate",
@@ -181,7 +181,7 @@ CLAIMS = (
         "The ball that sinks along the wall has a pair of eigenvalues ± iω₀, which never dies out, "
         "a zero for the "
         "cyclic y, and else decay only.",
-        *_bearings(Case.NS),
+        *_criteria(Case.NS),
     ),
 )
 SECTIONS = {"Stability": CLAIMS}

@@ -24,10 +24,10 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.kit.engines import STUDY_SLIP
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
 from compare.kit.statistics import (
@@ -39,8 +39,8 @@ from compare.kit.statistics import (
     propagator,
     uniform,
 )
+from compare.kit.step_pairs import Start
 from compare.kit.tasks import Task
-from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -75,20 +75,20 @@ Exponents = npt.NDArray[np.complex128]
 
 
 def measure(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
     found = [
         each
         for name, p in sets.items()
-        for each in chosen_states(records, name, p, lab.effort.rates_more)
+        for each in chosen_states(records, name, p, runner.effort.rates_more)
     ]
     yield from (each for each in found if isinstance(each, Missing))
     pushed = [each for each in found if isinstance(each, Pushed)]
     yield from (each.missing(NOT_LINEAR, rows=each.numbers) for each in pushed if each.bent)
     states = [each for each in pushed if not each.bent]
-    tasks = [state.tasks(lab) for state in states]
-    for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
+    tasks = [state.tasks(runner) for state in states]
+    for state, own, runs in zip(states, tasks, runner.groups(tasks), strict=True):
         if isinstance(runs, str):
             yield state.missing(f"a run {runs}")
             continue
@@ -102,9 +102,9 @@ def measure(
         if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
             yield state.missing("pushed, the ball doesn't stay in this case")
             continue
-        (_, step), start = state.steps(lab), state.start
+        (_, step), start = state.steps(runner), state.start
         at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
-        row = partial(measurement, lab, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
+        row = partial(measurement, runner, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
         modes = spectrum(state, answers, step)
         yield from _modes(state, modes, step, row)
         yield from _responses(state, answers, row)
@@ -153,10 +153,10 @@ class Pushed:
         slip = np.abs(self.start.x0 / state_units(self.start.p))[SLIP_XYZ].max()
         return SOLVED * max(1.0, float(slip)) / max(self.sizes)
 
-    def steps(self, lab: Lab) -> tuple[float, float]:
+    def steps(self, runner: Runner) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
         coarse, fine = (
-            lab.effort.rates_leaning if self.case is Case.SR else lab.effort.rates_refined
+            runner.effort.rates_leaning if self.case is Case.SR else runner.effort.rates_refined
         )
         return coarse_step(self.start.p) / coarse, coarse_step(self.start.p) / fine
 
@@ -189,9 +189,9 @@ class Pushed:
             if contact == "S"
         )
 
-    def tasks(self, lab: Lab) -> list[Task]:
+    def tasks(self, runner: Runner) -> list[Task]:
         """Runs for each of the `sizes`: every active variable is pushed, up and down."""
-        p, step, (coarse, fine) = self.start.p, coarse_step(self.start.p), self.steps(lab)
+        p, step, (coarse, fine) = self.start.p, coarse_step(self.start.p), self.steps(runner)
         lasts, samples = self.record
         tasks = []
         for size, h in zip(self.sizes, (coarse, fine, fine), strict=False):
@@ -199,7 +199,7 @@ class Pushed:
                 for push in (unit, -unit):
                     x = self.start.x0.copy()
                     x[k] += push
-                    tasks.append(lab.task(p, x, lasts * step, h, samples=samples))
+                    tasks.append(runner.task(p, x, lasts * step, h, samples=samples))
         return tasks
 
     def missing(self, why: str, modes: int = 0, rows: int = 0) -> Missing:

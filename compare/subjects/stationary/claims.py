@@ -11,7 +11,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.mechanics import drag
 from analytic.stationary import slipping_branch
-from compare.claim import Bearing, Text, When, all_of, bearings, claim, given
+from compare.claim import Criterion, Text, When, all_of, claim, criteria, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
@@ -71,33 +71,33 @@ def _exists(case: Case, m: Measurement) -> bool:
     )
 
 
-def _value_bearings(
+def _value_criteria(
     quantities: Iterable[str],
     when: When,
     by: str,
     of: Case | None = None,
     protocol: str = "settled",
-) -> tuple[Bearing, ...]:
-    """Bearings on values of settled states: predicted in the case `of`, or in the one that was
+) -> tuple[Criterion, ...]:
+    """Criteria on values of settled states: predicted in the case `of`, or in the one that was
     detected."""
 
     def predict(m: Measurement) -> float:
         state = theory(analytic.solution, m.parameters, of) if of else solution_of(m)
         return quantity_of(m.quantity, state, m.parameters)
 
-    return bearings(protocol, quantities, predict, when=when, by=by)
+    return criteria(protocol, quantities, predict, when=when, by=by)
 
 
-def _case_bearing(when: When) -> Bearing:
-    """A bearing on the case to which a ball settles."""
-    return Bearing("settled", "case", case, when=when, by="analytic.stable_solutions")
+def _case_criterion(when: When) -> Criterion:
+    """A criterion on the case to which a ball settles."""
+    return Criterion("settled", "case", case, when=when, by="analytic.stable_solutions")
 
 
-def _rolling_bearing(when: When = lambda m: True) -> Bearing:
-    """A bearing on the case of balls that start with the fluid: RR up to the threshold at which
+def _rolling_criterion(when: When = lambda m: True) -> Criterion:
+    """A criterion on the case of balls that start with the fluid: RR up to the threshold at which
     rolling ends."""
     chosen = all_of(given(start="with the fluid"), when)
-    return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
+    return Criterion("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
 def _sinks_at_reynolds(m: Measurement) -> float:
@@ -208,23 +208,23 @@ CLAIMS = (
         "its forces "
         "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or "
         "ω₀₃ (η > j).",
-        *_value_bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
-        _case_bearing(_ROLLS),
-        _rolling_bearing(),
+        *_value_criteria((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
+        _case_criterion(_ROLLS),
+        _rolling_criterion(),
     ),
     claim(
         "prop-1-rough",
         "Prop. 1, (83), (86)",
         "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
-        *_value_bearings(("omega_c",), all_of(lifts_first, _ROLLS), "(32)"),
-        _rolling_bearing(lifts_first),
+        *_value_criteria(("omega_c",), all_of(lifts_first, _ROLLS), "(32)"),
+        _rolling_criterion(lifts_first),
     ),
     claim(
         "prop-2-forces",
         "Prop. 2, (33), (34)",
         "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing "
         "else acts.",
-        *_value_bearings(
+        *_value_criteria(
             ("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS
         ),
     ),
@@ -235,9 +235,9 @@ CLAIMS = (
         "ω₀R/r, at any height; "
         "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same "
         "state as NR.",
-        *_value_bearings(_STATE, _LIFTED, "(46), (47)"),
-        *_value_bearings(_STATE, _LEANS, "(35), (36)", Case.SR),
-        _case_bearing(_LIFTED),
+        *_value_criteria(_STATE, _LIFTED, "(46), (47)"),
+        *_value_criteria(_STATE, _LEANS, "(35), (36)", Case.SR),
+        _case_criterion(_LIFTED),
         text=Text.CORRECTED,
         reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), "
         "as (46) has it.",
@@ -247,8 +247,8 @@ CLAIMS = (
         "Prop. 4, (37)-(42)",
         "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
         "its contact forces are (42)-(44).",
-        *_value_bearings(_STATE, _SLIPS, "(37)-(44)"),
-        _case_bearing(_SLIPS),
+        *_value_criteria(_STATE, _SLIPS, "(37)-(44)"),
+        _case_criterion(_SLIPS),
     ),
     claim(
         "eq-40",
@@ -257,10 +257,10 @@ CLAIMS = (
         "wall, cos α > 0, and "
         "backwards, sin α < 0: there is no such motion with cos α < 0.",
         *(
-            Bearing("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
+            Criterion("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
             for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
         ),
-        *bearings(
+        *criteria(
             "settled",
             ("slip_z", "slip_x"),
             _slip_on_branch,
@@ -274,7 +274,7 @@ CLAIMS = (
         "Slipping at both points, the normal forces at floor and wall are the closed forms in α, "
         "and friction holds "
         "the ball back along its orbit.",
-        *bearings(
+        *criteria(
             "settled",
             ("force_Ay", "force_Bx", "force_Az"),
             _along_branch,
@@ -288,15 +288,15 @@ CLAIMS = (
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, "
         "going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
-        *_value_bearings(_STATE, _SINKS, "(49), (50)"),
-        Bearing(
+        *_value_criteria(_STATE, _SINKS, "(49), (50)"),
+        Criterion(
             "settled",
             "v_y",
             _sinks_at_reynolds,
             when=all_of(_SINKS, lambda m: m.parameters.drag == SCHILLER_NAUMANN),
             by="analytic.mechanics.drag.reynolds",
         ),
-        _case_bearing(given(start="on the wall")),
+        _case_criterion(given(start="on the wall")),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),
@@ -304,11 +304,11 @@ CLAIMS = (
         "mirrored",
         "Props. 1, 4 and 5",
         "In a flow the other way round the ball settles in the mirror images of the same states.",
-        *_value_bearings(
+        *_value_criteria(
             _STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"
         ),
-        *_value_bearings((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
-        Bearing("mirrored", "case", case, by="analytic.stable_solutions"),
+        *_value_criteria((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
+        Criterion("mirrored", "case", case, by="analytic.stable_solutions"),
     ),
 )
 
@@ -317,7 +317,7 @@ DIAGRAMS = (
         "fig-9",
         "Fig. 9",
         "Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
-        *_value_bearings(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
+        *_value_criteria(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
     ),
     claim(
         "fig-10",
@@ -325,16 +325,16 @@ DIAGRAMS = (
         "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall "
         "lie on the curves "
         "of Fig. 10.",
-        *_value_bearings(("wall_spin",), all_of(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
-        *_value_bearings(("wall_spin",), all_of(slips_first, _LEANS), "(91)", Case.SR),
+        *_value_criteria(("wall_spin",), all_of(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
+        *_value_criteria(("wall_spin",), all_of(slips_first, _LEANS), "(91)", Case.SR),
     ),
     claim(
         "fig-11",
         "Fig. 11",
         "For η > j rolling ends at ω₀₃, where it meets SR, whose spin on the wall falls like 1/ω₀.",
-        *_value_bearings(("wall_spin",), all_of(lifts_first, _ROLLS), "(91)"),
-        *_value_bearings(("wall_spin",), all_of(lifts_first, _LEANS), "(91)", Case.SR),
-        _rolling_bearing(lifts_first),
+        *_value_criteria(("wall_spin",), all_of(lifts_first, _ROLLS), "(91)"),
+        *_value_criteria(("wall_spin",), all_of(lifts_first, _LEANS), "(91)", Case.SR),
+        _rolling_criterion(lifts_first),
     ),
     *(
         claim(
@@ -344,14 +344,14 @@ DIAGRAMS = (
             f"settles in every case "
             "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor "
             "counts as NR).",
-            Bearing(
+            Criterion(
                 "plane",
                 "cases",
                 lambda m: sum(1 << case for case in lasting_cases(m.parameters)),
                 when=given(figure=figure),
                 by="analytic.stable_solutions",
             ),
-            *bearings(
+            *criteria(
                 "thresholds",
                 [f"omega_0{k}" for k in (1, 2, 3, 4)],
                 _on_surface,
@@ -371,24 +371,24 @@ DIAGRAMS = (
         "in the attracting "
         "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the "
         "floor.",
-        Bearing("plane", "cases", _cases_in_region, by="analytic.bifurcation.diagram.case_map"),
-        Bearing("edge", "edge_omega_c", _omega_c_beyond_fold, by="case_map, analytic.solution"),
-        Bearing("rates", "slowest_decay", _decay_leaning, when=given(case="SR"), by="case_map"),
+        Criterion("plane", "cases", _cases_in_region, by="analytic.bifurcation.diagram.case_map"),
+        Criterion("edge", "edge_omega_c", _omega_c_beyond_fold, by="case_map, analytic.solution"),
+        Criterion("rates", "slowest_decay", _decay_leaning, when=given(case="SR"), by="case_map"),
     ),
     claim(
         "double-points",
         "Figs. 7 and 8, black dots",
         "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j all thresholds are √(g/(jR)), "
         "and rolling ends.",
-        Bearing("birth", "critical_drag", _drag_at_birth, by=_DOUBLE),
-        Bearing(
+        Criterion("birth", "critical_drag", _drag_at_birth, by=_DOUBLE),
+        Criterion(
             "birth",
             "critical_drag",
             lambda m: _drag_at_birth(m, equal=True),
             when=lambda m: m.parameters.mu == m.parameters.eta,
             by=f"{_DOUBLE}, equal friction",
         ),
-        Bearing(
+        Criterion(
             "thresholds",
             "omega_03",
             lambda m: bifurcation.double_points(m.parameters)[-1].omega_0,

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from compare.kit import settling
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
-from compare.kit.settling import SOLVED, Patience, Settled
+from compare.kit.settling import SOLVED, SettlingCriteria, SteadyState
 from compare.kit.statistics import Estimate, estimate
-from compare.kit.trials import Start
+from compare.kit.step_pairs import Start
 from model import Case, Parameters, State
 from model.drag import QUADRATIC
 
@@ -28,28 +28,28 @@ PROTOCOL = "settled"
 
 
 def measure(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The case that every start ends in, and once for every distinct state its values."""
-    sharp, refine = lab.effort.settled_sharp, lab.effort.settled_refine
-    alike: dict[Attractor, list[Settled]] = {}
+    sharp, refine = runner.effort.settled_sharp, runner.effort.settled_refine
+    alike: dict[Attractor, list[SteadyState]] = {}
     without: dict[Attractor, Missing] = {}
     starts = []
     for name, p in sets.items():
-        for how, flows in lab.effort.settled_starts:
+        for how, flows in runner.effort.settled_starts:
             starts += [
-                settling.named_start(name, p.replace(omega_0=flow / time_unit(p)), how)
+                settling.initial_condition(name, p.replace(omega_0=flow / time_unit(p)), how)
                 for flow in flows
             ]
         spinning = State(slip_y=settling.SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
     for state in settling.settle(
-        lab, starts, Patience(sharp=sharp, loose=lab.effort.settled_loose)
+        runner, starts, SettlingCriteria(sharp=sharp, loose=runner.effort.settled_loose)
     ):
         if state.failure:
             yield _unsettled(state, 1)
         else:
-            yield _row(lab, state, "case", state.case)
+            yield _row(runner, state, "case", state.case)
         if why := "no values of it" if state.failure else _why_drag_fades(state):
             why = f"{state.case.name} at omega_0 = {state.start.p.omega_0:.4g} rad/s: {why}"
             without[Attractor.of(state)] = Missing(
@@ -65,12 +65,12 @@ def measure(
         again.append(replace(state.start, x0=x0.stacked()))
     # With several time steps the limit is extrapolated from all of them, and half the step isn't
     # needed here.
-    patience = Patience(refine=refine, span=20.0, sharp=sharp)
+    criteria = SettlingCriteria(refine=refine, span=20.0, sharp=sharp)
     refined = (
-        settling.settle(lab, again, patience) if refine > 1 else [state for state, *_ in groups]
+        settling.settle(runner, again, criteria) if refine > 1 else [state for state, *_ in groups]
     )
     for same, fine in zip(groups, refined, strict=True):
-        yield from _values(lab, same, fine)
+        yield from _values(runner, same, fine)
 
 
 @dataclass(frozen=True, order=True)
@@ -82,12 +82,12 @@ class Attractor:
     case: Case
 
     @classmethod
-    def of(cls, state: Settled) -> Self:
+    def of(cls, state: SteadyState) -> Self:
         """The attractor of a settled state."""
         return cls(state.start.set, state.start.p.omega_0, settling.physical_case(state.case))
 
 
-def _why_drag_fades(state: Settled) -> str:
+def _why_drag_fades(state: SteadyState) -> str:
     """Why drag fades as the ball settles; empty if it doesn't, and a round lasts for ten times 1/c
     or more."""
     p = state.start.p
@@ -107,7 +107,9 @@ def _why_drag_fades(state: Settled) -> str:
     )
 
 
-def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measurement | Missing]:
+def _values(
+    runner: Runner, same: Sequence[SteadyState], fine: SteadyState
+) -> Iterator[Measurement | Missing]:
     """Measured values of a settled state with half the step; uncertain by what step and start
     change, too."""
     p = fine.start.p
@@ -130,11 +132,16 @@ def _values(lab: Lab, same: Sequence[Settled], fine: Settled) -> Iterator[Measur
             ]
             for n, size in sizes.items():
                 yield _row(
-                    lab, fine, n, _with_changes(lab, fine.values[n], max(changes) * size, p, size)
+                    runner,
+                    fine,
+                    n,
+                    _with_changes(runner, fine.values[n], max(changes) * size, p, size),
                 )
 
 
-def _with_changes(lab: Lab, value: Estimate, change: float, p: Parameters, size: float) -> Estimate:
+def _with_changes(
+    runner: Runner, value: Estimate, change: float, p: Parameters, size: float
+) -> Estimate:
     """A value of a settled state, of which half the step and other starts change so much; `size` is its
     natural size.
 
@@ -142,9 +149,9 @@ def _with_changes(lab: Lab, value: Estimate, change: float, p: Parameters, size:
     is twice as much with half the step, so that it is about twice the change; what adds up at random
     the change may not show. Both take the place of what `settling` allows for them. (The second was
     added after a round played blind, where two claims were refuted without it.)"""
-    if lab.effort.settled_refine == 1:
+    if runner.effort.settled_refine == 1:
         return value.also(start=change)
-    steps = lab.effort.settled_refine / (p.c * coarse_step(p))
+    steps = runner.effort.settled_refine / (p.c * coarse_step(p))
     return estimate(
         value.value,
         drift=value.budget["drift"],
@@ -154,24 +161,24 @@ def _with_changes(lab: Lab, value: Estimate, change: float, p: Parameters, size:
 
 
 def mirrored(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Case and values to which a ball settles in a flow the other way round."""
     starts = [
-        settling.named_start(name, p.replace(omega_0=-flow / time_unit(p)), how)
+        settling.initial_condition(name, p.replace(omega_0=-flow / time_unit(p)), how)
         for name, p in sets.items()
         for how, flow in (("rest", 0.62), ("rest", 1.4), ("on the wall", 4.2))
     ]
-    for state in settling.settle(lab, starts):
+    for state in settling.settle(runner, starts):
         if state.failure:
             yield _unsettled(state, 1 + len(state.values), "mirrored")
             continue
-        yield _row(lab, state, "case", state.case, "mirrored")
+        yield _row(runner, state, "case", state.case, "mirrored")
         for name, value in state.values.items():
-            yield _row(lab, state, name, value, "mirrored")
+            yield _row(runner, state, name, value, "mirrored")
 
 
-def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
+def _unsettled(each: SteadyState, rows: int, protocol: str = PROTOCOL) -> Missing:
     """A record of a start from which the ball did not settle, and of what it did last."""
     p = each.start.p
     at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
@@ -184,11 +191,11 @@ def _unsettled(each: Settled, rows: int, protocol: str = PROTOCOL) -> Missing:
 
 
 def _row(
-    lab: Lab, each: Settled, name: str, value: Estimate | float, protocol: str = PROTOCOL
+    runner: Runner, each: SteadyState, name: str, value: Estimate | float, protocol: str = PROTOCOL
 ) -> Measurement:
     """The measurement of a quantity, by its name, of a settled state."""
     start, at = each.start, {"case": each.case.name, "start": each.start.name}
-    return measurement(lab, protocol, start.set, start.p, name, value, [each.task], **at)
+    return measurement(runner, protocol, start.set, start.p, name, value, [each.task], **at)
 
 
 PROTOCOLS = (

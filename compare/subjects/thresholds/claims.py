@@ -13,7 +13,7 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import rolling_forces
 from analytic.stationary import slipping_branch
-from compare.claim import Bearing, When, bearings, claim, given
+from compare.claim import Criterion, When, claim, criteria, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.states import quantity_of, thresholds_of
@@ -29,10 +29,10 @@ def _threshold(
     quantity: str,
     when: When = lambda m: m.conditions["by"] != SLIPPING,
     protocol: str = "thresholds",
-) -> Bearing:
-    """A bearing on a threshold, which `analytic.thresholds` predicts."""
+) -> Criterion:
+    """A criterion on a threshold, which `analytic.thresholds` predicts."""
     by = f"{_BY}: {quantity}"
-    return Bearing(
+    return Criterion(
         protocol, quantity, lambda m: float(getattr(thresholds_of(m), quantity)), when=when, by=by
     )
 
@@ -83,7 +83,7 @@ CLAIMS = (
         "Rolling at both points goes on just as long as forces within both friction cones admit "
         "it, for μ < 1.",
         *(
-            Bearing(
+            Criterion(
                 "thresholds",
                 quantity,
                 lambda m, name=name: theory(
@@ -116,7 +116,7 @@ CLAIMS = (
         "it; above, it "
         "leaves it.",
         _threshold("omega_03"),
-        Bearing(
+        Criterion(
             "thresholds",
             "lifts",
             lambda m: math.isnan(thresholds_of(m).omega_01),
@@ -128,7 +128,7 @@ CLAIMS = (
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         _threshold("omega_04"),
-        Bearing(
+        Criterion(
             "thresholds",
             "folds",
             lambda m: math.isfinite(thresholds_of(m).omega_04),
@@ -139,7 +139,7 @@ CLAIMS = (
         "sub-branches",
         "Prop. 7, (87)-(90), Fig. 10",
         "Between ω₀₂ and ω₀₄ an unstable state of slipping at both points divides two attractors.",
-        *bearings(
+        *criteria(
             "edge",
             [f"edge_{name}" for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")],
             _unstable_quantity,
@@ -152,13 +152,13 @@ CLAIMS = (
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the "
         "state carried by "
         "the wall at ω₀₂, without a jump.",
-        Bearing(
+        Criterion(
             "thresholds",
             "folds",
             lambda m: m.parameters.eta > thresholds_of(m).eta_cr,
             by=f"{_BY}: eta_cr",
         ),
-        Bearing(
+        Criterion(
             "birth",
             "critical_drag",
             lambda m: bifurcation.critical_drag(m.parameters),
@@ -170,20 +170,20 @@ CLAIMS = (
         "one-fold",
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
-        Bearing(
+        Criterion(
             "thresholds",
             "omega_04",
             lambda m: max(thresholds_of(m).omega_01, thresholds_of(m).omega_02),
             relation=Relation.AT_LEAST,
             by=f"{_BY}: omega_01, omega_02",
         ),
-        Bearing(
+        Criterion(
             "thresholds",
             "folds",
             lambda m: bifurcation.number_of_folds(m.parameters),
             by="diagram.number_of_folds",
         ),
-        Bearing("thresholds", "omega_04", _greatest_flow, by="slipping_branch.states"),
+        Criterion("thresholds", "omega_04", _greatest_flow, by="slipping_branch.states"),
     ),
 )
 SECTIONS = {"Bifurcations": CLAIMS}

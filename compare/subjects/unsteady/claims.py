@@ -7,7 +7,7 @@ import math
 
 import analytic
 from analytic.flowmeter import pulsation, response
-from compare.claim import Bearing, claim, given
+from compare.claim import Criterion, claim, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
 from compare.states import lifts_first, slips_first
@@ -26,15 +26,15 @@ def _gain(m: Measurement) -> complex:
     return theory(pulsation.first_harmonic, m.parameters, m.at("amplitude"), m.at("f"))
 
 
-def _onset_bearing(rule: str, relation: Relation) -> Bearing:
-    """A bearing on the amplitude at which slip begins, if rolling ends by a rule of
+def _onset_criterion(rule: str, relation: Relation) -> Criterion:
+    """A criterion on the amplitude at which slip begins, if rolling ends by a rule of
     `Settings.leave_rolling`."""
 
     def onset(m: Measurement) -> float:
         return theory(pulsation.slip_onset, m.parameters, m.at("f"), rule)
 
     by = f"{_BY}.pulsation.slip_onset, {rule}"
-    return Bearing("pulsation", "slip_amplitude", onset, relation=relation, by=by)
+    return Criterion("pulsation", "slip_amplitude", onset, relation=relation, by=by)
 
 
 def _ramp_end(m: Measurement) -> float:
@@ -77,14 +77,14 @@ CLAIMS = (
         "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag "
         "alone accelerates it "
         "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
-        Bearing(
+        Criterion(
             "pulsation",
             "gain",
             lambda m: abs(_gain(m)),
             by=f"{_BY}.response.transfer, pulsation.first_harmonic",
         ),
-        Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_gain(m)), by="the same"),
-        Bearing(
+        Criterion("pulsation", "phase_lag", lambda m: -cmath.phase(_gain(m)), by="the same"),
+        Criterion(
             "unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE
         ),
     ),
@@ -96,8 +96,8 @@ CLAIMS = (
         "give: not below the amplitude at which slip first lasts, and not above the one up to "
         "which forces allow "
         "rolling. Mostly the two are the same; in between Coulomb's law allows both.",
-        _onset_bearing("slip-stability", Relation.AT_LEAST),
-        _onset_bearing("infeasible", Relation.AT_MOST),
+        _onset_criterion("slip-stability", Relation.AT_LEAST),
+        _onset_criterion("infeasible", Relation.AT_MOST),
     ),
     claim(
         "pulsation-limits",
@@ -108,7 +108,7 @@ CLAIMS = (
         "pulsation needs a "
         "larger amplitude than a fast one.",
         *(
-            Bearing(
+            Criterion(
                 "thresholds",
                 end,
                 # The greatest flow at which the ball slips in a very slow pulsation about four
@@ -122,7 +122,7 @@ CLAIMS = (
             )
             for end, first in (("omega_01", slips_first), ("omega_03", lifts_first))
         ),
-        Bearing(
+        Criterion(
             "bounds",
             "gamma_zero_square",
             lambda m: _lowest_flow(m) ** 2,
@@ -130,7 +130,7 @@ CLAIMS = (
             size=lambda m: m.parameters.g / m.parameters.R,
             by=f"{_BY}.pulsation.slow_onset",
         ),
-        Bearing(
+        Criterion(
             "bounds",
             "gamma_zero",
             lambda m: (
@@ -140,7 +140,7 @@ CLAIMS = (
             when=given(inner="RR", outer="RS", by="held"),
             by=f"{_BY}.pulsation.fast_onset",
         ),
-        Bearing(
+        Criterion(
             "pulsation",
             "slip_amplitude",
             # On rough floors rolling goes on while forces admit it, beyond the first slip that
@@ -158,8 +158,8 @@ CLAIMS = (
         "A pulsation that makes the ball slip at both points makes its mean reading low: on average "
         "its spin about the tangent takes drag. One that makes it slip at the wall alone does not "
         "change the mean, under Stokes' law.",
-        Bearing("pulsation", "mean_error", _mean_error, when=given(slips=_BOTH), by=_MEAN),
-        Bearing(
+        Criterion("pulsation", "mean_error", _mean_error, when=given(slips=_BOTH), by=_MEAN),
+        Criterion(
             "pulsation",
             "mean_error",
             _mean_error,
@@ -167,7 +167,7 @@ CLAIMS = (
             size=_flow,
             by=_MEAN,
         ),
-        Bearing(
+        Criterion(
             "pulsation",
             "mean_error",
             lambda m: 0.0,
@@ -182,7 +182,7 @@ CLAIMS = (
         "After a jump of the flow a ball that slips at both points overshoots its new reading and "
         "rings.",
         *(
-            Bearing(
+            Criterion(
                 "unsteady",
                 quantity,
                 lambda m, k=k: theory(response.peak, m.parameters, Case.SS)[k],  # type: ignore[misc]
@@ -195,7 +195,7 @@ CLAIMS = (
         "ramp-fold",
         "(26), (88)",
         "A flow that rises steadily keeps the ball slipping beyond the fold, before it catches up.",
-        Bearing(
+        Criterion(
             "unsteady",
             "ramp_end",
             _ramp_end,

@@ -25,7 +25,6 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import (
@@ -37,10 +36,11 @@ from compare.kit.record import (
     measurement,
     state_of,
 )
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top
+from compare.kit.step_pairs import Start, StepPair, carry_out, of_no_step
 from compare.kit.tasks import Task
-from compare.kit.trials import Start, Trial, carry_out, of_no_step
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -76,7 +76,7 @@ OCTAVE = 3
 
 
 def pulsation(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
     small = []  # about a flow at which a ball rolls, at several frequencies
@@ -90,9 +90,9 @@ def pulsation(
             continue
         q = p.replace(omega_0=ROLLS_AT * end)
         room, lowest = end - q.omega_0, _lowest(p)
-        octaves, reach = lab.effort.pulsation_octaves, lab.effort.pulsation_reach * room
+        octaves, reach = runner.effort.pulsation_octaves, runner.effort.pulsation_reach * room
         small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
-    followed = _as_followed(lab, small)
+    followed = _as_followed(runner, small)
     for each in followed:
         if each.failure:
             yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
@@ -102,12 +102,12 @@ def pulsation(
             ("gain", estimate(gain, time_step=sure)),
             ("phase_lag", estimate(lag, time_step=sure / gain)),
         ):
-            yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
-    rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
+            yield each.row(runner, quantity, value, each.tasks, amplitude=each.amplitude)
+    rolling, slipping = _raised(runner, [each for each in followed if not each.failure]), []
     for each, bracket in zip(
-        rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True
+        rolling, narrow(runner, [_search(runner, each) for each in rolling]), strict=True
     ):
-        onset = _onset(lab, each, bracket)
+        onset = _onset(runner, each, bracket)
         yield onset
         if isinstance(onset, Missing):
             continue
@@ -125,7 +125,7 @@ def pulsation(
                 f"slip in {at} begins at no definite amplitude: no mean reading there",
             )
     strong = [each for name, p in sets.items() for each in _strong(name, p, records)]
-    yield from mean_errors(lab, slipping + strong)
+    yield from mean_errors(runner, slipping + strong)
 
 
 def _strong(name: str, p: Parameters, records: Records) -> Iterator[tuple[Pulsation, float]]:
@@ -180,29 +180,31 @@ class Pulsation:
         return replace(self, lead=(omega_c - self.p.omega_0) / self.amplitude)
 
     def task(
-        self, lab: Lab, amplitude: float, x: Array, timing: Timing, largest: float = 0.0
+        self, runner: Runner, amplitude: float, x: Array, timing: Timing, largest: float = 0.0
     ) -> Task:
         """A run from a state, with as many steps in a period, a power of two, as the `largest`
         amplitude needs."""
         fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
-        least = max(lab.effort.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest)
+        least = max(
+            runner.effort.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest
+        )
         step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * timing.refine)
         flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, timing.phase)
         samples = round(timing.samples * timing.periods)
-        return lab.task(
+        return runner.task(
             self.p, x, timing.periods / self.frequency, step, flow=flow, samples=samples
         )
 
     def row(
-        self, lab: Lab, quantity: str, value: Estimate, tasks: Sequence[Task], **at: Condition
+        self, runner: Runner, quantity: str, value: Estimate, tasks: Sequence[Task], **at: Condition
     ) -> Measurement:
         """A measurement in this pulsation."""
         return measurement(
-            lab, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at
+            runner, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at
         )
 
 
-def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
+def _onset(runner: Runner, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
     """The measurement of the amplitude at which slip begins."""
     at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
     if low is None or high is None:
@@ -215,9 +217,9 @@ def _onset(lab: Lab, each: Pulsation, bracket: Bracket) -> Measurement | Missing
             f"in {at} one contact slips before both do, too little to tell when",
         )
     # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-    unseen = (math.pi * LASTING / lab.effort.pulsation_samples) ** 2 / 2 * place.value
+    unseen = (math.pi * LASTING / runner.effort.pulsation_samples) ** 2 / 2 * place.value
     return each.row(
-        lab,
+        runner,
         "slip_amplitude",
         place.also(unseen_slip=unseen),
         bracket.tasks,
@@ -234,7 +236,11 @@ class Round(NamedTuple):
 
 
 def _settled_rounds(
-    lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
+    runner: Runner,
+    driven: Sequence[tuple[Pulsation, float]],
+    refine: int,
+    samples: int,
+    slips: bool,
 ) -> list[list[Round] | str]:
     """Run pulsations until they are settled: of each the last two rounds, the second with half the
     step, or its error. A ball that slips goes on with the rest of its last state."""
@@ -244,12 +250,12 @@ def _settled_rounds(
     )
     for n in range(ROUNDS):
         last = n == ROUNDS - 1
-        timing = Timing(PERIODS, samples, refine * (lab.effort.pulsation_refine if last else 1))
+        timing = Timing(PERIODS, samples, refine * (runner.effort.pulsation_refine if last else 1))
         todo = [
             (k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)
         ]
-        tasks = [each.task(lab, a, states[k], timing) for k, each, a, _ in todo]
-        for (k, each, a, before), task, run in zip(todo, tasks, lab.each(tasks), strict=True):
+        tasks = [each.task(runner, a, states[k], timing) for k, each, a, _ in todo]
+        for (k, each, a, before), task, run in zip(todo, tasks, runner.each(tasks), strict=True):
             if isinstance(run, str):
                 seen[k] = f"the run {run}"
                 continue
@@ -264,12 +270,12 @@ def _settled_rounds(
     return seen
 
 
-def _as_followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
+def _as_followed(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """Pulsations with omega_c at the beginning of a period as runs show it."""
-    followed, samples = [], lab.effort.pulsation_samples
+    followed, samples = [], runner.effort.pulsation_samples
     last = slice(-2 * samples, None)
     rounds = _settled_rounds(
-        lab, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False
+        runner, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False
     )
     for each, seen in zip(pulsations, rounds, strict=True):
         if isinstance(seen, str):
@@ -297,7 +303,7 @@ def _as_followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     return followed
 
 
-def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
+def _raised(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """Pulsations of the largest of rising amplitudes at which the ball still rolls, if drag isn't
     Stokes'."""
     raised, todo = (
@@ -315,7 +321,7 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
         ]
         still = [
             (k, each)
-            for k, each in zip(todo, _as_followed(lab, higher), strict=True)
+            for k, each in zip(todo, _as_followed(runner, higher), strict=True)
             if not each.failure
         ]
         for k, each in still:
@@ -324,13 +330,13 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     return raised
 
 
-def _search(lab: Lab, each: Pulsation) -> Search:
+def _search(runner: Runner, each: Pulsation) -> Search:
     """A search for the amplitude at which slip begins, in runs of a period and a half without the
     first sixth."""
 
     def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
-        timing = Timing(1.5 * attempt.time, lab.effort.pulsation_samples, 2 * attempt.refine)
-        return each.task(lab, amplitude, each.start(amplitude), timing, largest=first.high)
+        timing = Timing(1.5 * attempt.time, runner.effort.pulsation_samples, 2 * attempt.refine)
+        return each.task(runner, amplitude, each.start(amplitude), timing, largest=first.high)
 
     if each.p.drag == STOKES:
         # Slip may begin from about half the largest amplitude on: the width is taken relative to
@@ -342,7 +348,7 @@ def _search(lab: Lab, each: Pulsation) -> Search:
             Bracket(0.99 * each.amplitude, RAISED * each.amplitude),
             each.amplitude,
         )
-    return Search(first, task, rolls_on, lab.effort.pulsation_width * size)
+    return Search(first, task, rolls_on, runner.effort.pulsation_width * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
@@ -356,7 +362,7 @@ def rolls_on(run: Trajectory) -> bool:
 
 
 def mean_errors(
-    lab: Lab, slipping: Sequence[tuple[Pulsation, float]]
+    runner: Runner, slipping: Sequence[tuple[Pulsation, float]]
 ) -> Iterator[Measurement | Missing]:
     """Means over the last period in pulsations of these amplitudes, with both steps, once periods
     repeat.
@@ -367,14 +373,14 @@ def mean_errors(
 
     phases = PHASES
     samples = 8 * phases
-    rounds = _settled_rounds(lab, slipping, 1, samples, slips=True)
+    rounds = _settled_rounds(runner, slipping, 1, samples, slips=True)
     anew = [
-        each.task(lab, a, x, Timing(1, samples, 1, phase=2 * math.pi * k / phases))
+        each.task(runner, a, x, Timing(1, samples, 1, phase=2 * math.pi * k / phases))
         for (each, a), seen in zip(slipping, rounds, strict=True)
         if not isinstance(seen, str)
         for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // phases])
     ]
-    begun = lab.groups([anew[k : k + phases] for k in range(0, len(anew), phases)])
+    begun = runner.groups([anew[k : k + phases] for k in range(0, len(anew), phases)])
     for (each, amplitude), seen in zip(slipping, rounds, strict=True):
         at = f"the mean reading at {each.frequency:g} Hz"
         if isinstance(seen, str) or isinstance(again := next(begun), str):
@@ -396,7 +402,7 @@ def mean_errors(
         within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
         error = estimate(value, drift_and_time_step=drift + within)
         slips = _slips(halved.case[-samples:])
-        row = each.row(lab, "mean_error", error, [task], amplitude=amplitude, slips=slips)
+        row = each.row(runner, "mean_error", error, [task], amplitude=amplitude, slips=slips)
         yield if_found(row, f"{at} is none")
 
 
@@ -419,15 +425,15 @@ def _threshold(records: Records, set: str, threshold: str) -> float | None:
 
 
 def jumps(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at
     which a ramp ends it."""
     flows: dict[
         str, tuple[float, float, float]
     ] = {}  # where slipping begins, the wall carries the ball, a jump ends
-    trials, starts = (
-        list[Trial](),
+    pairs, starts = (
+        list[StepPair](),
         list[Start](),
     )  # from rest, to settle slipping before a jump or a ramp
     for name, p in sets.items():
@@ -443,7 +449,7 @@ def jumps(
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
             q = p.replace(omega_0=ROLLS_AT * begins)
             rolls = Start(name, q, "RR", State(omega_c=q.omega_0).stacked())
-            trials.append(_jump(lab, rolls, JUMP * q.omega_0))
+            pairs.append(_jump(runner, rolls, JUMP * q.omega_0))
         q = p.replace(omega_0=begins + SLIPS_AT * (holds - begins))
         starts.append(Start(name, q, "jump", np.zeros(8)))
         if ends is None:
@@ -455,7 +461,7 @@ def jumps(
         else:
             q = p.replace(omega_0=begins + RAMP[0] * (ends - begins))
             starts.append(Start(name, q, "ramp", np.zeros(8)))
-    for start, state in zip(starts, settle(lab, starts), strict=True):
+    for start, state in zip(starts, settle(runner, starts), strict=True):
         if state.failure or state.case is not Case.SS:
             why = state.failure or state.case.name
             yield Missing("unsteady", start.set, f"no settled slipping to start from: {why}")
@@ -466,35 +472,37 @@ def jumps(
             start, x0=State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
         )
         if start.name == "jump":
-            trials.append(_jump(lab, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
+            pairs.append(_jump(runner, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
         else:
-            trials += _ramps(lab, begun, begins, ends)
-    for result in carry_out(lab, "unsteady", trials):
+            pairs += _ramps(runner, begun, begins, ends)
+    for result in carry_out(runner, "unsteady", pairs):
         if isinstance(result, Missing):
             yield result
             continue
-        trial, coarse, fine = result.trial, result.coarse, result.fine
-        if trial.flow is None:
-            for quantity in ("jump_delay",) if trial.name == "RR" else ("jump_peak", "jump_height"):
-                row = result.row(lab, quantity, of_no_step(coarse[quantity].value, fine[quantity]))
-                yield if_found(row, f"{quantity} in {trial.name}: no peak")
+        pair, coarse, fine = result.pair, result.coarse, result.fine
+        if pair.flow is None:
+            for quantity in ("jump_delay",) if pair.name == "RR" else ("jump_peak", "jump_height"):
+                row = result.row(
+                    runner, quantity, of_no_step(coarse[quantity].value, fine[quantity])
+                )
+                yield if_found(row, f"{quantity} in {pair.name}: no peak")
         elif math.isfinite(coarse) and math.isfinite(fine):
-            yield result.row(lab, "ramp_end", of_no_step(coarse, estimate(fine)))
+            yield result.row(runner, "ramp_end", of_no_step(coarse, estimate(fine)))
         else:
-            why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
-            yield Missing("unsteady", trial.set, why)
+            why = f"a ramp of {pair.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
+            yield Missing("unsteady", pair.set, why)
 
 
-def _jump(lab: Lab, start: Start, size: float) -> Trial:
-    """The trial of jumps of the flow up and down, rad s-1, from a state in the case that the start
+def _jump(runner: Runner, start: Start, size: float) -> StepPair:
+    """The pair of jumps of the flow up and down, rad s-1, from a state in the case that the start
     is named by."""
-    p, t_end = start.p, rounded_duration(start.p, lab.effort.unsteady_lasts)
+    p, t_end = start.p, rounded_duration(start.p, runner.effort.unsteady_lasts)
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     samples = max(
         4000, round(t_end / (4 * coarse_step(p)))
     )  # drag may be weak, and peaks come soon
-    refine, at = lab.effort.unsteady_refine, {"case": start.name}
-    return Trial(
+    refine, at = runner.effort.unsteady_refine, {"case": start.name}
+    return StepPair(
         start.set,
         p,
         start.name,
@@ -509,16 +517,18 @@ def _jump(lab: Lab, start: Start, size: float) -> Trial:
     )
 
 
-def _ramps(lab: Lab, start: Start, begins: float, ends: float) -> Iterator[Trial]:
-    """Trials of ramps of the flow at several rates, rad s-2, from settled SS, which is between two
+def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator[StepPair]:
+    """Step pairs of ramps of the flow at several rates, rad s-2, from settled SS, which is between two
     flows."""
     p, span = start.p, ends - begins
     last = begins + RAMP[1] * span
-    for rate in lab.effort.unsteady_rates:
+    for rate in runner.effort.unsteady_rates:
         rise = rate * p.c * span
         t_end, at = (last - p.omega_0) / rise, {"rate": rise, **state_of(start.x0[:6])}
-        flow, refine = Flow.ramp(p.omega_0, last, t_end), lab.effort.unsteady_ramps
-        yield Trial(start.set, p, "ramp", start.x0, t_end, refine, 16000, caught_up, flow, (), at)
+        flow, refine = Flow.ramp(p.omega_0, last, t_end), runner.effort.unsteady_ramps
+        yield StepPair(
+            start.set, p, "ramp", start.x0, t_end, refine, 16000, caught_up, flow, (), at
+        )
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:

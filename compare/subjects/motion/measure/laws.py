@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES
 from compare.kit.statistics import estimate
@@ -56,7 +56,7 @@ class ContactLaw(NamedTuple):
 
 
 def measure(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """How far each law of contact is off at its worst in motions from rest, down the wall, and
     along the floor.
@@ -76,13 +76,13 @@ def measure(
         )
         finer = [
             (coarse_step(p) / parts, *start)
-            for parts in lab.effort.laws_refined
+            for parts in runner.effort.laws_refined
             for start in starts
         ]
         tasks.append(
-            [lab.task(p, x, t_end, h, flow=flow, samples=RUN_LENGTH) for h, flow, x in finer]
+            [runner.task(p, x, t_end, h, flow=flow, samples=RUN_LENGTH) for h, flow, x in finer]
         )
-    for (name, p), own, runs in zip(sets.items(), tasks, lab.groups(tasks), strict=True):
+    for (name, p), own, runs in zip(sets.items(), tasks, runner.groups(tasks), strict=True):
         if isinstance(runs, str):
             yield Missing(PROTOCOL, name, f"the run {runs}")
             continue
@@ -97,24 +97,24 @@ def measure(
             change, at = float(np.nanmax(changes)), law._asdict()
             sure = estimate(value, time_step=change, rounding=ROUNDING)
             yield measurement(
-                lab, PROTOCOL, name, p, at.pop("quantity"), sure, own[len(own) // 2 :], **at
+                runner, PROTOCOL, name, p, at.pop("quantity"), sure, own[len(own) // 2 :], **at
             )
     balls = {
         name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2)
         for name, fluid in FLUIDS.items()
     }
-    falls, refined = [], lab.effort.laws_refined
+    falls, refined = [], runner.effort.laws_refined
     for p in balls.values():
         step, rest = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
         begun = rest, rest._replace(v_y=-math.sqrt(p.g * p.R))
         falls.append(
             [
-                lab.task(p, x, 64 * step, step / parts, samples=64)
+                runner.task(p, x, 64 * step, step / parts, samples=64)
                 for parts in refined
                 for x in begun
             ]
         )
-    for (name, p), own, runs in zip(balls.items(), falls, lab.groups(falls), strict=True):
+    for (name, p), own, runs in zip(balls.items(), falls, runner.groups(falls), strict=True):
         if isinstance(runs, str):
             yield Missing(PROTOCOL, name, f"the run {runs}")
             continue
@@ -124,7 +124,7 @@ def measure(
         rounding = ROUNDING * abs(speed) / (p.c * lasts)
         sinking = estimate(speed, time_step=abs(speed - before), rounding=rounding)
         yield measurement(
-            lab, PROTOCOL, name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name]
+            runner, PROTOCOL, name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name]
         )
 
 

@@ -19,21 +19,20 @@ from itertools import product
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, SOLVED
 from compare.kit.statistics import Estimate, estimate, uniform
-from compare.kit.tasks import Task
-from compare.kit.trials import (
+from compare.kit.step_pairs import (
     DOUBT,
     EXTRAPOLATION,
     HALF_WINDOW,
-    REFINED,
+    STEP_RATIO,
     WINDOW_DEGREES,
     Start,
-    Trial,
-    TrialResult,
+    StepPair,
+    StepPairResult,
     carry_out,
     constrained,
     lag_error,
@@ -41,6 +40,7 @@ from compare.kit.trials import (
     random_state,
     unlike,
 )
+from compare.kit.tasks import Task
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -70,13 +70,13 @@ MOVING = {
 
 
 def field(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
-    refine, trials = (REFINED * lab.effort.halves[0], REFINED * lab.effort.halves[1]), []
+    refine, pairs = (STEP_RATIO * runner.effort.halves[0], STEP_RATIO * runner.effort.halves[1]), []
     for name, p in sets.items():
         rng = np.random.default_rng([STATES_SEED, *name.encode()])
-        for case, k in product(Case, range(lab.effort.field_starts)):
+        for case, k in product(Case, range(runner.effort.field_starts)):
             x, unit = random_state(case, p, rng), time_unit(p)
             # Friction at two rolling contacts can balance only a slight lag.
             rolls = case is Case.RR
@@ -86,17 +86,17 @@ def field(
                 else rng.uniform(0.3, 2.5) / unit
             )
             q = p.replace(omega_0=omega_0)
-            t_end = (WINDOW_CENTRES[-1] + HALF_WINDOW + AROUND_WINDOW) * coarse_step(q) / REFINED
-            trials.append(Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0))
+            t_end = (WINDOW_CENTRES[-1] + HALF_WINDOW + AROUND_WINDOW) * coarse_step(q) / STEP_RATIO
+            pairs.append(StepPair(name, q, f"from {case.name}", x, t_end, refine, rows=0))
             if (
                 p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2
             ):  # Reynolds numbers as in water
                 _, v_y, omega_c, *_, h, v_h = x
                 speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
                 fast = q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * unit))
-                trials.append(replace(trials[-1], p=fast))
+                pairs.append(replace(pairs[-1], p=fast))
     results = []
-    for result in carry_out(lab, "field", trials):
+    for result in carry_out(runner, "field", pairs):
         if isinstance(result, Missing):
             yield result
         else:
@@ -104,33 +104,33 @@ def field(
     kept = Counter[tuple[str, float, Case]]()
     for centre, result in product(WINDOW_CENTRES, results):
         set, p, case = (
-            result.trial.set,
-            result.trial.p,
-            Case(int(result.coarse.case[centre * lab.effort.halves[0]])),
+            result.pair.set,
+            result.pair.p,
+            Case(int(result.coarse.case[centre * runner.effort.halves[0]])),
         )
-        enough = kept[set, p.nu_f, case] >= lab.effort.field_kept
-        if not enough and (found := _values(lab, case, result, centre)):
+        enough = kept[set, p.nu_f, case] >= runner.effort.field_kept
+        if not enough and (found := _values(runner, case, result, centre)):
             kept[set, p.nu_f, case] += 1
             x, values = found
             for what, value in values.items():
-                yield result.row(lab, what, value, case=case.name, **state_of(x))
+                yield result.row(runner, what, value, case=case.name, **state_of(x))
     for name, case in product(sets, Case):
-        if lacking := lab.effort.field_kept - kept[name, sets[name].nu_f, case]:
+        if lacking := runner.effort.field_kept - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
             rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
             yield Missing("field", name, why, lacking * rows)
 
 
 def _values(
-    lab: Lab, case: Case, result: TrialResult, centre: int
+    runner: Runner, case: Case, result: StepPairResult, centre: int
 ) -> tuple[Array, dict[str, Estimate]] | None:
     """State (8,), rates and forces at the centre of a window; None if its case changes, or it
     `turns_or_hovers`.
 
     They are extrapolated to a vanishing step, and uncertain by what this and the degree of the
-    polynomials change, see `trials.unlike`."""
-    p, read = result.trial.p, []
-    for run, times in zip((result.coarse, result.fine), lab.effort.halves, strict=True):
+    polynomials change, see `pairs.unlike`."""
+    p, read = result.pair.p, []
+    for run, times in zip((result.coarse, result.fine), runner.effort.halves, strict=True):
         near, half, middle = (
             (HALF_WINDOW + AROUND_WINDOW) * times,
             HALF_WINDOW * times,
@@ -143,7 +143,7 @@ def _values(
             return None
         time, at = run.time[window], float(run.time[middle])
         # The forces of a sample act from then on for a step: they belong to the middle of it.
-        acting = time + (time[1] - time[0]) / lab.refine / 2
+        acting = time + (time[1] - time[0]) / runner.refine / 2
         forces = polynomials(
             acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at
         )[0]
@@ -235,19 +235,19 @@ late."""
 
 
 def motions(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The case at the end of every piece, and how the ball turns there, with the state at its
     beginning."""
     starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
     tasks = []
     for start in starts:
-        step = coarse_step(start.p) / REFINED
+        step = coarse_step(start.p) / STEP_RATIO
         steps = round(6.0 * time_unit(start.p) / step)
-        tasks.append(lab.task(start.p, start.x0, steps * step, step, samples=steps))
+        tasks.append(runner.task(start.p, start.x0, steps * step, step, samples=steps))
     seen: dict[str, set[Case]] = {name: set() for name in sets}
-    count, again = lab.effort.motions_pieces, list[Trial]()
-    for start, task, run in zip(starts, tasks, lab.each(tasks), strict=True):
+    count, again = runner.effort.motions_pieces, list[StepPair]()
+    for start, task, run in zip(starts, tasks, runner.each(tasks), strict=True):
         name, p = start.set, start.p
         if isinstance(run, str):
             yield Missing("motions", name, f"a motion {run}", count * (1 + len(VARIABLES[TURNING])))
@@ -262,32 +262,32 @@ def motions(
             x = constrained(Case(int(run.case[first])), run.x[first], p)
             time = float(run.time[last] - run.time[first])
             at: dict[str, Condition] = {"case": case.name, "time": time, **state_of(x)}
-            yield measurement(lab, "motions", name, p, "case", case, [task], **at)
-            refine, rows = (REFINED, 2 * REFINED), len(VARIABLES[TURNING])
-            piece = Trial(name, p, case.name, x, time, refine, conditions=at, rows=rows)
+            yield measurement(runner, "motions", name, p, "case", case, [task], **at)
+            refine, rows = (STEP_RATIO, 2 * STEP_RATIO), len(VARIABLES[TURNING])
+            piece = StepPair(name, p, case.name, x, time, refine, conditions=at, rows=rows)
             again.append(piece)
-    for result in carry_out(lab, "motions", again):
-        yield from [result] if isinstance(result, Missing) else _turns_at_end(lab, result)
+    for result in carry_out(runner, "motions", again):
+        yield from [result] if isinstance(result, Missing) else _turns_at_end(runner, result)
     for name, cases in seen.items():
         if unseen := [case.name for case in Case if case not in cases]:
             yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
-def _turns_at_end(lab: Lab, piece: TrialResult) -> Iterator[Measurement | Missing]:
+def _turns_at_end(runner: Runner, piece: StepPairResult) -> Iterator[Measurement | Missing]:
     """How the ball turns at the end of a piece that is run anew with both steps."""
-    trial, ends = piece.trial, (piece.coarse.x[-1], piece.fine.x[-1])
-    if {trial.name} != {Case(int(run.case[-1])).name for run in (piece.coarse, piece.fine)}:
-        why = f"a piece that ended in {trial.name} does not with other steps or forces at first"
-        yield Missing("motions", trial.set, why, len(VARIABLES[TURNING]))
+    pair, ends = piece.pair, (piece.coarse.x[-1], piece.fine.x[-1])
+    if {pair.name} != {Case(int(run.case[-1])).name for run in (piece.coarse, piece.fine)}:
+        why = f"a piece that ended in {pair.name} does not with other steps or forces at first"
+        yield Missing("motions", pair.set, why, len(VARIABLES[TURNING]))
         return
     # The change of one variable may vanish by chance, and so may all: the largest, in natural
     # units, is used, or what forces do that lag behind.
-    units = state_units(trial.p)
-    change = max(float(np.abs((ends[1] - ends[0]) / units).max()), lag_error(trial.p))
+    units = state_units(pair.p)
+    change = max(float(np.abs((ends[1] - ends[0]) / units).max()), lag_error(pair.p))
     for name, value, unit in zip(
         VARIABLES[TURNING], ends[1][TURNING].tolist(), units[TURNING].tolist(), strict=True
     ):
-        yield piece.row(lab, f"end_{name}", estimate(value, unit, time_step=uniform(change)))
+        yield piece.row(runner, f"end_{name}", estimate(value, unit, time_step=uniform(change)))
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
@@ -306,7 +306,7 @@ def pieces(run: Trajectory, count: int) -> list[int]:
         contact = np.array([getattr(case, side).name for case in Case])[run.case]
         plain &= (contact != "R") | (friction <= 0.99 * limit)
         plain &= (contact != "N") | (gap > 1e-4 * p.R)
-        plain &= (contact != "S") | (speed > 2 * p.g * coarse_step(p) / REFINED)
+        plain &= (contact != "S") | (speed > 2 * p.g * coarse_step(p) / STEP_RATIO)
     changes = np.flatnonzero(np.diff(run.case)) + 1
     firsts = np.arange(APART, len(run.time) - PIECE - APART)
     for end in (0, PIECE):
@@ -347,21 +347,21 @@ LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 
 
 def impacts(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The state six coarse steps after every landing, and in how many runs the contact opens again.
     It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts
     are 4 to 5 times that high, and of a plastic landing nothing is left but the fall within a step.
     """
-    trials = []
+    pairs = []
     for name, p in sets.items():
         for how, state in LANDINGS.items():
             start = _start(name, p, 0.8, state, how)
-            step = coarse_step(start.p) / REFINED
+            step = coarse_step(start.p) / STEP_RATIO
             conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
-            t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
-            trials.append(
-                Trial(
+            t_end, refine = round(0.4 * time_unit(p) / step) * step, (STEP_RATIO, 2 * STEP_RATIO)
+            pairs.append(
+                StepPair(
                     **vars(start),
                     t_end=t_end,
                     refine=refine,
@@ -370,18 +370,16 @@ def impacts(
                 )
             )
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
-    landed = list[tuple[TrialResult, int, float]]()
-    for landing in carry_out(lab, "impacts", trials):
+    landed = list[tuple[StepPairResult, int, float]]()
+    for landing in carry_out(runner, "impacts", pairs):
         if isinstance(landing, Missing):
             yield landing
             continue
-        tasks[landing.trial.set] += landing.tasks
+        tasks[landing.pair.set] += landing.tasks
         for run in (landing.coarse, landing.fine):
-            gap = run.y if landing.trial.name.startswith("floor") else run.h
+            gap = run.y if landing.pair.name.startswith("floor") else run.h
             low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
-            rebounds[landing.trial.set] += bool(
-                gap[low:].max() > gap[low] + 1e-2 * landing.trial.p.R
-            )
+            rebounds[landing.pair.set] += bool(gap[low:].max() > gap[low] + 1e-2 * landing.pair.p.R)
         found = _after_landing(landing)
         if isinstance(found, Missing):
             yield found
@@ -389,31 +387,31 @@ def impacts(
             landed.append((landing, *found))
     for landing, at, change in landed:
         # By chance a contact may close alike with both steps: what others show counts, too.
-        alike = [other for its, _, other in landed if its.trial.set == landing.trial.set]
+        alike = [other for its, _, other in landed if its.pair.set == landing.pair.set]
         usual = math.sqrt(sum(other**2 for other in alike) / len(alike))
-        p, off = landing.trial.p, uniform(math.hypot(change, usual))
+        p, off = landing.pair.p, uniform(math.hypot(change, usual))
         units = state_units(p)
         # Where only a limit of several steps is looked at: the contact closes at a whole step, up to
         # one late, and until then weight and friction differ.
-        late = uniform(coarse_step(p) / REFINED / lab.refine / time_unit(p) / 2)
+        late = uniform(coarse_step(p) / STEP_RATIO / runner.refine / time_unit(p) / 2)
         for name in LANDED:
             k = VARIABLES.index(name)
-            causes = {"time_step": off} | ({"closing": late} if lab.is_witness else {})
+            causes = {"time_step": off} | ({"closing": late} if runner.has_own_steps else {})
             value = estimate(landing.fine.x[2 * at, k], float(units[k]), **causes)
-            yield landing.row(lab, f"after_{name}", value, time=float(landing.coarse.time[at]))
+            yield landing.row(runner, f"after_{name}", value, time=float(landing.coarse.time[at]))
     for name, count in rebounds.items():
-        p = next(trial.p for trial in trials if trial.set == name)
-        yield measurement(lab, "impacts", name, p, "rebounds", count, tasks[name])
+        p = next(pair.p for pair in pairs if pair.set == name)
+        yield measurement(runner, "impacts", name, p, "rebounds", count, tasks[name])
 
 
-def _after_landing(landing: TrialResult) -> tuple[int, float] | Missing:
+def _after_landing(landing: StepPairResult) -> tuple[int, float] | Missing:
     """The sample six coarse steps after a landing, and the largest change of what it changes, in
     natural units, with half the step."""
-    trial, coarse, fine = landing.trial, landing.coarse, landing.fine
-    contact = [case.A if trial.name.startswith("floor") else case.B for case in coarse.cases]
+    pair, coarse, fine = landing.pair, landing.coarse, landing.fine
+    contact = [case.A if pair.name.startswith("floor") else case.B for case in coarse.cases]
     at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
     if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-        why = f"{trial.name}: the contact did not close for good within 0.4 sqrt(R/g)"
-        return Missing("impacts", trial.set, why, len(LANDED))
-    changes = np.abs(fine.x[2 * at] - coarse.x[at]) / state_units(trial.p)
+        why = f"{pair.name}: the contact did not close for good within 0.4 sqrt(R/g)"
+        return Missing("impacts", pair.set, why, len(LANDED))
+    changes = np.abs(fine.x[2 * at] - coarse.x[at]) / state_units(pair.p)
     return at, float(changes[[VARIABLES.index(name) for name in LANDED]].max())

@@ -26,12 +26,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, Records, state_of
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
 from compare.kit.statistics import estimate, uniform
-from compare.kit.trials import Start, Trial, carry_out, lag_error
+from compare.kit.step_pairs import Start, StepPair, carry_out, lag_error
 from model import Flow, Parameters, State
 from model.drag import QUADRATIC
 from model.kinematics import VARIABLES, state_units
@@ -57,7 +57,7 @@ def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
 
 
 def torque(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as
     `Parameters.fluid_torque`."""
@@ -65,39 +65,39 @@ def torque(
     for name, p in sets.items():
         q = p.replace(mu=1.0, eta=1.0, fluid_torque=0.5 * p.c, omega_0=0.6 / time_unit(p))
         starts.append(Start(name, q, "rest", np.zeros(8)))
-    yield from settled_readings(lab, "torque", starts)
+    yield from settled_readings(runner, "torque", starts)
 
 
 def measure(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Where each start ends: its state, or on a smooth wall and a rough floor its case and
     orbit."""
     for run in carry_out(
-        lab, "runs", [trial for name, p in sets.items() for trial in _trials(name, p)]
+        runner, "runs", [pair for name, p in sets.items() for pair in _pairs(name, p)]
     ):
         if isinstance(run, Missing):
             yield run
             continue
-        p, how, coarse, fine = run.trial.p, run.trial.name, run.coarse, run.fine
+        p, how, coarse, fine = run.pair.p, run.pair.name, run.coarse, run.fine
         time = float(fine.time[-1])
         if coarse.case[-1] != fine.case[-1]:
             yield Missing(
                 "runs",
-                run.trial.set,
+                run.pair.set,
                 f"{how}: with half the time step the ball ends in another case",
-                run.trial.rows,
+                run.pair.rows,
             )
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
             yield Missing(
                 "runs",
-                run.trial.set,
+                run.pair.set,
                 f"{how}: the contact force is so small that the ball may hover",
-                run.trial.rows,
+                run.pair.rows,
             )
         else:
             if apart := how in ("smooth wall", "rough floor"):
-                yield run.row(lab, "case", float(fine.case[-1]), time=time)
+                yield run.row(runner, "case", float(fine.case[-1]), time=time)
             # The change of one variable may vanish by chance: the largest, in natural units, is
             # used for all.
             units, ends = state_units(p), (coarse.x[-1], fine.x[-1])
@@ -109,38 +109,38 @@ def measure(
             ):
                 if variable == "omega_c" or not apart:
                     row = estimate(value, size, time_step=uniform(change))
-                    yield run.row(lab, f"end_{variable}", row, time=time)
+                    yield run.row(runner, f"end_{variable}", row, time=time)
 
 
-def _trials(name: str, p: Parameters) -> Iterator[Trial]:
-    """Trials of a set from all starts."""
+def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
+    """Step pairs of a set from all starts."""
     unit = time_unit(p)
 
-    def trial(
+    def pair(
         how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None
-    ) -> Trial:
+    ) -> StepPair:
         count = round(lasts * unit / coarse_step(p))
         t_end, at = count * coarse_step(p), dict[str, Condition](start=how, **state_of(x.stacked()))
         flow = None
         if rate is not None:
             flow, at = late_ramp(p, rate, t_end), at | {"rate": rate}
-        return Trial(
+        return StepPair(
             name, p, how, x.stacked(), t_end, (8, 16), count, flow=flow, conditions=at, rows=rows
         )
 
     for how, (flow, lasts, x) in STARTS.items():
         start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)
-        yield trial(how, q, start, lasts, rows=len(VARIABLES))
+        yield pair(how, q, start, lasts, rows=len(VARIABLES))
         if how == "thrown" and p.drag == QUADRATIC:
             blunter = q.replace(C_D=1.1)  # that of a disk
-            yield trial("thrown, blunter", blunter, start, lasts, rows=len(VARIABLES))
+            yield pair("thrown, blunter", blunter, start, lasts, rows=len(VARIABLES))
     for how, rate in ("rolls while the flow rises", 0.2), ("rolls while the flow falls", -0.2):
         q = p.replace(omega_0=0.5 / unit)
-        yield trial(how, q, State(omega_c=q.omega_0), 2.0, len(VARIABLES), rate / unit**2)
+        yield pair(how, q, State(omega_c=q.omega_0), 2.0, len(VARIABLES), rate / unit**2)
     for flow in (0.5, 0.7, 0.9, 1.1, 1.3):
         going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
-        yield trial("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0, rows=2)
+        yield pair("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0, rows=2)
     for flow in (1.5, 1.7, 1.8, 2.0, 2.2):
         spin = flow / unit * p.R / p.r
         slight = State(omega_c=flow / unit, slip_x=-5e-4 * spin, slip_z=5e-3 * spin)
-        yield trial("rough floor", p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0, rows=2)
+        yield pair("rough floor", p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0, rows=2)

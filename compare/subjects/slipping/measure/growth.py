@@ -18,13 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.kit import trials
-from compare.kit.lab import Lab, coarse_step
+from compare.kit import step_pairs
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed, slip_unit, time_unit
 from compare.kit.statistics import Estimate, estimate, slope_error, uniform
+from compare.kit.step_pairs import Start
 from compare.kit.tasks import Task
-from compare.kit.trials import Start
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
@@ -62,22 +62,26 @@ SLIPS_BESIDE = (1.2, 0.6, 0.3)
 
 AT_START = slope_error(
     np.arange(RECORD_SKIPPED, RECORD_STEPS + 1.0), RECORD_DEGREES[0]
-) / slope_error(np.arange(-trials.HALF_WINDOW, trials.HALF_WINDOW + 1.0), trials.WINDOW_DEGREES[0])
+) / slope_error(
+    np.arange(-step_pairs.HALF_WINDOW, step_pairs.HALF_WINDOW + 1.0), step_pairs.WINDOW_DEGREES[0]
+)
 """Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a
 window."""
 FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
 
 def measure(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """gamma out of random states, along every arrow; where one contact may slip to either side,
     their shares (69)."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
     yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
-    sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort.growth_more)]
-    tasks = [push.tasks(lab) for pushes in sides for push in pushes]
-    runs = zip(tasks, lab.groups(tasks), strict=True)
+    sides = [
+        push for name, p in rough.items() for push in _pushes(name, p, runner.effort.growth_more)
+    ]
+    tasks = [push.tasks(runner) for pushes in sides for push in pushes]
+    runs = zip(tasks, runner.groups(tasks), strict=True)
     left = Counter[tuple[str, Case, Case]]()
     for pushes in sides:
         grown = []
@@ -92,11 +96,12 @@ def measure(
                 continue
             if value := growth(push, pairs):
                 grown.append(value)
-                yield push.row(lab, "growth", "gamma", value, own)
+                yield push.row(runner, "growth", "gamma", value, own)
                 continue
             sized = ((size, slice(2 * k, 2 * k + 2)) for k, size in enumerate(push.sizes))
             strays = (
-                push.following_case(lab, "growth", size, own[of], pairs[of]) for size, of in sized
+                push.following_case(runner, "growth", size, own[of], pairs[of])
+                for size, of in sized
             )
             if stray := next(filter(None, strays), None):
                 yield stray
@@ -113,7 +118,7 @@ def measure(
                 ahead=plus.uncertainty * abs(minus.value),
                 back=minus.uncertainty * abs(plus.value),
             )
-            yield push.row(lab, "growth", "filippov_share", share, own)
+            yield push.row(runner, "growth", "filippov_share", share, own)
     for (name, inner, outer), count in left.items():
         yield Missing(
             "growth",
@@ -143,19 +148,20 @@ class Push:
             return SLIPS_BESIDE
         return SMALL_SLIPS if self.outer in (Case.RS, Case.SR) else LARGE_SLIPS
 
-    def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
+    def pair(self, runner: Runner, size: float, refine: int = 1) -> list[Task]:
         """Tasks with one size of slip, in units of `start_unit`, with both time steps, divided by
         `refine`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        steps, step = RECORD_STEPS * refine, coarse_step(p) / (trials.REFINED * refine)
+        steps, step = RECORD_STEPS * refine, coarse_step(p) / (step_pairs.STEP_RATIO * refine)
         return [
-            lab.task(p, x, steps * step, step / n, samples=steps * n) for n in lab.effort.halves
+            runner.task(p, x, steps * step, step / n, samples=steps * n)
+            for n in runner.effort.halves
         ]
 
-    def tasks(self, lab: Lab) -> list[Task]:
+    def tasks(self, runner: Runner) -> list[Task]:
         """Tasks with every size of slip and both time steps."""
-        return [task for size in self.sizes for task in self.pair(lab, size)]
+        return [task for size in self.sizes for task in self.pair(runner, size)]
 
     def rates(self, run: Trajectory) -> Array:
         """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in
@@ -165,13 +171,13 @@ class Push:
         alike = [self.outer, Case.RN] if self.start.name == "rest" else [self.outer]
         if not np.isin(run.case[record], alike).all():
             return np.full(2, np.nan)
-        return trials.polynomials(
+        return step_pairs.polynomials(
             run.time[record], run.x[record, SLIP_XYZ] @ self.n, RECORD_DEGREES
         )[1]
 
     def row(
         self,
-        lab: Lab,
+        runner: Runner,
         protocol: str,
         quantity: str,
         value: Estimate | float,
@@ -185,11 +191,13 @@ class Push:
             | state_of(start.x0)
             | n
         )
-        return measurement(lab, protocol, start.set, start.p, quantity, value, tasks, **along, **at)
+        return measurement(
+            runner, protocol, start.set, start.p, quantity, value, tasks, **along, **at
+        )
 
     def following_case(
         self,
-        lab: Lab,
+        runner: Runner,
         protocol: str,
         size: float,
         tasks: Sequence[Task],
@@ -202,7 +210,7 @@ class Push:
         if ended == self.outer or any(np.any(run.case[-RECORD_SETTLED:] != ended) for run in runs):
             return None
         at = {"slip": size * start_unit(self.start.p, self.start.x0), "time": float(fine.time[-1])}
-        return self.row(lab, protocol, "case", ended, tasks, **at)
+        return self.row(runner, protocol, "case", ended, tasks, **at)
 
 
 def growth(push: Push, runs: Sequence[Trajectory]) -> Estimate | None:
@@ -213,13 +221,13 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Estimate | None:
     coarse, fine = (np.array([push.rates(run) for run in some]) for some in (runs[::2], runs[1::2]))
     if np.isnan(coarse).any() or np.isnan(fine).any():
         return None
-    best = fine + (fine - coarse) * trials.EXTRAPOLATION
+    best = fine + (fine - coarse) * step_pairs.EXTRAPOLATION
     value, lower = limit_of_no_size(best)
-    step = limit_of_no_size(fine - coarse)[0] * trials.DOUBT
+    step = limit_of_no_size(fine - coarse)[0] * step_pairs.DOUBT
     size = (value - limit_of_no_size(best[-2:])[0]) / 3
     p = push.start.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
-    least = trials.lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
+    least = step_pairs.lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
     return estimate(
         value,
         time_step=abs(float(step)),
@@ -249,7 +257,7 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
     for side in (1, -1):
         yield [Push(still, Case.RR, Case.RS, np.array([0.0, side, 0.0]))]
         # It sinks half as fast as the fluid pulls it along the wall.
-        sinking = State.of(trials.random_state(Case.NR, p, rng))._replace(
+        sinking = State.of(step_pairs.random_state(Case.NR, p, rng))._replace(
             v_y=-0.5 * dragged_speed(p)
         )
         dragged = p.replace(omega_0=sinking.omega_c + dragged_speed(p) / p.R)
@@ -257,7 +265,7 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
         yield [Push(start, Case.NR, Case.NS, np.array([0.0, 0.8 * side, 0.6]))]
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):
-            x = State.of(trials.random_state(inner, p, rng))
+            x = State.of(step_pairs.random_state(inner, p, rng))
             # The orbit is one at which both contacts press, whichever way friction acts.
             if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
                 x = x._replace(omega_c=math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
@@ -294,7 +302,7 @@ def start_unit(p: Parameters, x: Array) -> float:
 
 
 def steepest(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The direction in which slip out of NR grows the most, for every state: that of the first
     harmonic."""
@@ -304,8 +312,8 @@ def steepest(
     fans = []  # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
     for name, p in rough.items():
         rng = np.random.default_rng([58, *name.encode()])
-        for _ in range(lab.effort.steepest_states):
-            x = trials.random_state(Case.NR, p, rng)
+        for _ in range(runner.effort.steepest_states):
+            x = step_pairs.random_state(Case.NR, p, rng)
             # The fluid pulls along the orbit, by half the weight to three times it: that turns the
             # direction.
             pull = rng.choice([-1, 1]) * rng.uniform(0.5, 3.0)
@@ -319,7 +327,7 @@ def steepest(
                     for b in angles
                 ]
             )
-    runs = lab.groups([push.tasks(lab) for fan in fans for push in fan])
+    runs = runner.groups([push.tasks(runner) for fan in fans for push in fan])
     for fan in fans:
         why, grown = "slip along some direction did not last, or no direction stands out", []
         for push in fan:
@@ -327,7 +335,7 @@ def steepest(
                 why = f"the run {got}"
             elif value := growth(push, got):
                 grown.append(value)
-        start, tasks = fan[0].start, [task for push in fan for task in push.tasks(lab)]
+        start, tasks = fan[0].start, [task for push in fan for task in push.tasks(runner)]
         angle = math.nan
         if len(grown) == len(fan):
             harmonics = np.fft.rfft([g.value for g in grown]) * 2 / len(fan)
@@ -340,5 +348,5 @@ def steepest(
         first = float(np.abs(harmonics[1]))
         beta = estimate(angle, 1 / first, rates=float(scatter), harmonics=float(others))
         yield measurement(
-            lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0)
+            runner, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0)
         )

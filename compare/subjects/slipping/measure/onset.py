@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import slip_unit, time_unit
-from compare.kit.settling import named_start, settle_groups
+from compare.kit.settling import initial_condition, settle_groups
 from compare.kit.statistics import (
     Estimate,
     estimate,
@@ -30,8 +30,8 @@ from compare.kit.statistics import (
     uniform,
     zero_and_slope,
 )
+from compare.kit.step_pairs import DOUBT, EXTRAPOLATION, STEP_RATIO, Start, lag_error, polynomials
 from compare.kit.tasks import Task
-from compare.kit.trials import DOUBT, EXTRAPOLATION, REFINED, Start, lag_error, polynomials
 from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, limit_of_no_size
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -53,7 +53,7 @@ HANGING = (1.05, 1.6, 1.3)
 
 
 def bounds(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Zero and slope of gamma along every line: from two flows, then from two more around the zero
     that these show."""
@@ -65,7 +65,7 @@ def bounds(
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
     starts = [
         [
-            named_start(name, sets[name].replace(omega_0=end * factor), "on the wall")
+            initial_condition(name, sets[name].replace(omega_0=end * factor), "on the wall")
             for factor in HANGING
         ]
         for name, end in ends.items()
@@ -73,7 +73,7 @@ def bounds(
     hangs = set[
         str
     ]()  # sets whose wall alone carries the ball: there it is pushed out of settled states
-    for name, states in zip(ends, settle_groups(lab, starts), strict=True):
+    for name, states in zip(ends, settle_groups(runner, starts), strict=True):
         if not any(state.failure or state.case is not Case.NR for state in states):
             hangs.add(name)
             rides = [
@@ -88,9 +88,9 @@ def bounds(
             )
     for name in (name for name in sets if name not in hangs):
         yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
-    first = _growths(lab, [line.pushes[:2] for line in lines])
+    first = _growths(runner, [line.pushes[:2] for line in lines])
     around = _growths(
-        lab, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)]
+        runner, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)]
     )
     for line, seen, more in zip(lines, first, around, strict=True):
         push, square, tasks = (
@@ -115,13 +115,15 @@ def bounds(
         growth = f"growth of slip {slips}, {push.start.name},"
         if abs(zero.value) <= MOST_BEYOND * np.abs(q).max():
             yield if_found(
-                push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero"
+                push.row(runner, "bounds", f"gamma_zero{square}", zero, tasks),
+                f"{growth} has no zero",
             )
         else:
             why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
             yield Missing("bounds", name, why)
         yield if_found(
-            push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope"
+            push.row(runner, "bounds", f"gamma_slope{square}", slope, tasks),
+            f"{growth} has no slope",
         )
 
 
@@ -177,17 +179,17 @@ class Growths:
     ]  # what became of slips that didn't last, and of runs that broke down
 
 
-def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
+def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
     """gamma for every row of pushes, from two sizes of slip with the shorter step, and one with the
     longer one.
 
     It is uncertain by what the step and the degree of the polynomials change.
     """
-    tasks, refine = [], lab.effort.bounds_refined
+    tasks, refine = [], runner.effort.bounds_refined
     for push in (push for pushes in rows for push in pushes):
         large, small = push.sizes if push.inner is not Case.NR else FAST_SLIPS
-        tasks.append([*push.pair(lab, large, refine), push.pair(lab, small, refine)[1]])
-    results, found = zip(tasks, lab.groups(tasks), strict=True), []
+        tasks.append([*push.pair(runner, large, refine), push.pair(runner, small, refine)[1]])
+    results, found = zip(tasks, runner.groups(tasks), strict=True), []
     for pushes in rows:
         points, used, strays = [], list[Task](), list[Measurement | Missing]()
         for push in pushes:
@@ -200,7 +202,7 @@ def _growths(lab: Lab, rows: Sequence[Sequence[Push]]) -> list[Growths]:
                 points.append((p.omega_0, math.nan, math.nan))
                 continue
             size = push.sizes[0] if push.inner is not Case.NR else FAST_SLIPS[0]
-            if stray := push.following_case(lab, "bounds", size, own[:2], runs[:2]):
+            if stray := push.following_case(runner, "bounds", size, own[:2], runs[:2]):
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
             best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
@@ -264,21 +266,21 @@ LIFT_DEGREES = (3, 2)
 
 
 def lift(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the
     fastest orbit."""
-    arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
+    arrows = [Arrow(runner, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
     orbits = [
         [arrow.task(Omega / time_unit(arrow.p)) for Omega in FIRST_ORBITS] for arrow in arrows
     ]
-    first = list(lab.groups(orbits))
+    first = list(runner.groups(orbits))
     kept = [
         [] if isinstance(got, str) else arrow.staying(got)
         for arrow, got in zip(arrows, first, strict=True)
     ]
     nearer = [arrow.tasks_near_onset(runs) for arrow, runs in zip(arrows, kept, strict=True)]
-    rows = zip(arrows, orbits, first, kept, nearer, lab.groups(nearer), strict=True)
+    rows = zip(arrows, orbits, first, kept, nearer, runner.groups(nearer), strict=True)
     for arrow, tasks, got, runs, later, near in rows:
         leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
         if not runs:
@@ -313,7 +315,7 @@ def lift(
 class Arrow:
     """States of a case that differ in omega_c, and the case to which the ball leaves the floor."""
 
-    lab: Lab
+    runner: Runner
     set: str
     p: Parameters
     inner: Case
@@ -331,10 +333,10 @@ class Arrow:
         )
 
     def task(self, omega_c: float, times: int = 1) -> Task:
-        """A short run from the orbit at omega_c, with steps half as long as those of `REFINED`,
+        """A short run from the orbit at omega_c, with steps half as long as those of `STEP_RATIO`,
         divided by `times`."""
-        step = coarse_step(self.p) / (2 * REFINED * times)
-        return self.lab.task(*self.start(omega_c), LIFT_STEPS * step, step, samples=LIFT_STEPS)
+        step = coarse_step(self.p) / (2 * STEP_RATIO * times)
+        return self.runner.task(*self.start(omega_c), LIFT_STEPS * step, step, samples=LIFT_STEPS)
 
     def staying(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
         """The first runs in succession, in the order of their orbits, that stay in the two cases of
@@ -351,13 +353,13 @@ class Arrow:
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
         if kept and len(pressed) == len(kept):
             fastest = float(kept[-1].omega_c[0])
-            return [self.task(fastest, times) for times in self.lab.effort.halves]
+            return [self.task(fastest, times) for times in self.runner.effort.halves]
         if not 2 <= len(pressed) < len(kept):
             return []
         (a, high), (b, low) = pressed[-2:]
         where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
         orbits = [where * (1 - part) for part in LATER_ORBITS if where]
-        return [self.task(orbit, times) for orbit in orbits for times in self.lab.effort.halves]
+        return [self.task(orbit, times) for orbit in orbits for times in self.runner.effort.halves]
 
     def row(
         self, quantity: str, omega_c: float, value: Estimate | float, tasks: Sequence[Task]
@@ -365,7 +367,7 @@ class Arrow:
         """A measurement along the arrow, with the state at one orbit as conditions."""
         p, x0 = self.start(omega_c)
         at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(x0)
-        return measurement(self.lab, "lift", self.set, p, quantity, value, tasks, **at)
+        return measurement(self.runner, "lift", self.set, p, quantity, value, tasks, **at)
 
 
 def _force(run: Trajectory) -> Estimate | None:

@@ -21,13 +21,13 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import (
-    Patience,
-    named_start,
+    SettlingCriteria,
+    initial_condition,
     physical_case,
     rounded_duration,
     settle_groups,
@@ -57,7 +57,7 @@ class Plane:
 
 
 def planes(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is
     left out."""
@@ -67,10 +67,11 @@ def planes(
     # the wall can carry.
     p = sets["reference"].replace(c=1.25)
     spread = [
-        list(qmc.Halton(2, seed=7 + k).random(lab.effort.plane_spread)) for k in range(len(FIGURES))
+        list(qmc.Halton(2, seed=7 + k).random(runner.effort.plane_spread))
+        for k in range(len(FIGURES))
     ]
     both = [Plane(figure, points) for figure, points in zip(FIGURES, spread, strict=True)]
-    for count in (*lab.effort.plane_added, 0):
+    for count in (*runner.effort.plane_added, 0):
         chosen = [(plane, u) for plane in both for u in plane.points]
         starts = []
         for plane, u in chosen:
@@ -78,17 +79,17 @@ def planes(
             q = p.replace(
                 eta=eta, omega_0=flow / time_unit(p), mu=eta if plane.figure == "fig-8" else p.mu
             )
-            starts.append([named_start(plane.figure, q, how) for how in WAYS])
+            starts.append([initial_condition(plane.figure, q, how) for how in WAYS])
         # Only the case matters: states may drift a thousand times as far as those whose values are
         # compared.
-        patience = Patience(span=20.0, loose=1000.0, rounds=lab.effort.plane_rounds)
-        for (plane, u), states in zip(chosen, settle_groups(lab, starts, patience), strict=True):
+        criteria = SettlingCriteria(span=20.0, loose=1000.0, rounds=runner.effort.plane_rounds)
+        for (plane, u), states in zip(chosen, settle_groups(runner, starts, criteria), strict=True):
             if not any(each.failure for each in states):
                 mask = sum(1 << case for case in {physical_case(each.case) for each in states})
                 plane.seen.append((u, mask))
                 q, tasks = states[0].start.p, [each.task for each in states]
                 yield measurement(
-                    lab, "plane", "reference", q, "cases", mask, tasks, figure=plane.figure
+                    runner, "plane", "reference", q, "cases", mask, tasks, figure=plane.figure
                 )
         for plane in both:
             plane.tried |= {tuple(u.tolist()) for u in plane.points}
@@ -137,7 +138,7 @@ begins."""
 
 
 def borders(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The state on the border between two basins, at flows between omega_02 and omega_04; not with
     quadratic drag.
@@ -156,20 +157,20 @@ def borders(
             yield Missing(
                 "edge", name, "at no flow are a slipping ball and a lifted one both settled"
             )
-    soonest = (
-        max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
-    )
+    at_quick = runner.level is Level.QUICK
+    soonest = max(limits, key=lambda name: sets[name].c, default="") if at_quick else ""
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
-        for part in (CLOSING if name == soonest else lab.effort.edge_flows)
+        for part in (CLOSING if name == soonest else runner.effort.edge_flows)
     ]
     starts = [
-        [named_start(name, p, "rest"), named_start(name, p, "on the wall")] for name, p in flows
+        [initial_condition(name, p, "rest"), initial_condition(name, p, "on the wall")]
+        for name, p in flows
     ]
     edges = []  # first on the line between the two attractors
     for (name, p), (slipping, lifted) in zip(
-        flows, settle_groups(lab, starts, Patience(loose=10.0)), strict=True
+        flows, settle_groups(runner, starts, SettlingCriteria(loose=10.0)), strict=True
     ):
         if (
             slipping.failure
@@ -185,15 +186,15 @@ def borders(
         else:
             a, b = _on_floor_and_wall(slipping.mean), _on_floor_and_wall(lifted.mean)
             edges.append(Edge(name, p, a, b, a, b - a))
-    for _ in range(lab.effort.edge_lines):
+    for _ in range(runner.effort.edge_lines):
         lines = [_next_line(edge) for edge in edges]
-        brackets = narrow(lab, [_search(lab, line) for line in lines], careful=False)
+        brackets = narrow(runner, [_search(runner, line) for line in lines], careful=False)
         edges = [
             e.crossed(line, bracket)
             for e, line, bracket in zip(edges, lines, brackets, strict=True)
         ]
     for edge in edges:
-        yield from _edge_rows(lab, edge)
+        yield from _edge_rows(runner, edge)
     for name, (low, high) in limits.items():
         last = low + (max(CLOSING) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
@@ -206,9 +207,9 @@ def borders(
             tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
             p = sets[name].replace(omega_0=place.value)
             at = {"side": "from above", "by": "unstable slipping meets the lifted ball"}
-            row = measurement(lab, "edge", name, p, "omega_02", place, tasks, **at)
+            row = measurement(runner, "edge", name, p, "omega_02", place, tasks, **at)
             yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
-        elif name == soonest or lab.level > Level.QUICK:
+        elif name == soonest or not at_quick:
             yield Missing(
                 "edge",
                 name,
@@ -257,19 +258,19 @@ def _on_floor_and_wall(x: Array) -> Array:
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
 
-def _search(lab: Lab, edge: Edge) -> Search:
+def _search(runner: Runner, edge: Edge) -> Search:
     """A search for the place on an edge's line at which the border is, first between the
     attractors.
 
     Later lines are a hundredth as long, and four times as long after each that missed the border.
     """
-    t_end, step = rounded_duration(edge.p, lab.effort.edge_time), coarse_step(edge.p)
+    t_end, step = rounded_duration(edge.p, runner.effort.edge_time), coarse_step(edge.p)
     reach = 5e-3 * 4.0**edge.missed
     around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 1e-5)
 
     def task(s: float, bracket: Bracket, attempt: Attempt) -> Task:
         lasts = t_end * attempt.time
-        return lab.task(
+        return runner.task(
             edge.p, edge.centre + s * edge.line, lasts, step, samples=round(lasts / (8 * step))
         )
 
@@ -337,7 +338,7 @@ def _uncertainty(edge: Edge) -> Array:
     return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
-def _edge_rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
+def _edge_rows(runner: Runner, edge: Edge) -> Iterator[Measurement | Missing]:
     """Measurements of the state on an edge: omega_c, slips and the spin on the wall."""
     if not (edge.moves and edge.bracket):  # it is to be crossed by the last line, and by one before
         at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
@@ -355,5 +356,5 @@ def _edge_rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
     for name, value in values.items():
         of = estimate(value, edge=slips / roll if name == "omega_c" else slips)
         yield measurement(
-            lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS"
+            runner, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS"
         )

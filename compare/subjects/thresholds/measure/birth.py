@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compare.kit.lab import Lab
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
+from compare.kit.runner import Runner
 from compare.kit.scales import time_unit
-from compare.kit.settling import named_start, settle_groups
+from compare.kit.settling import initial_condition, settle_groups
 from compare.kit.statistics import Estimate, initial_slope, straight_line
 from compare.kit.tasks import Task
 from model import Case, Parameters
@@ -38,7 +38,7 @@ class BranchEnd:
 
 
 def birth(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The drag at which the fold is born, where d omega_0/dA_y along the branch of SS is zero at
     its end, A_y = 0.
@@ -56,7 +56,7 @@ def birth(
     for _ in (FIRST_DRAGS, NEARER_DRAGS):
         starts = [
             [
-                named_start(
+                initial_condition(
                     name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest"
                 )
                 for part in BEFORE_FOLD
@@ -64,7 +64,7 @@ def birth(
             for name, c in drags
             for low, high in [ranges[name]]
         ]
-        for (name, c), states in zip(drags, settle_groups(lab, starts), strict=True):
+        for (name, c), states in zip(drags, settle_groups(runner, starts), strict=True):
             if not any(state.failure or state.case is not Case.SS for state in states):
                 flows = np.array([state.start.p.omega_0 for state in states])
                 slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
@@ -96,5 +96,5 @@ def birth(
             lag = lags[name]
             drag = replace(lag.times(1 / lag.value**2), value=1 / lag.value)
             tasks = [task for end in found[name] for task in end.tasks]
-            row = measurement(lab, "birth", name, p, "critical_drag", drag, tasks)
+            row = measurement(runner, "birth", name, p, "critical_drag", drag, tasks)
             yield if_found(row, "no drag gives birth to a fold")

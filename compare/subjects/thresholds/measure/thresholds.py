@@ -23,9 +23,9 @@ import numpy as np
 from compare.kit import settling
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.engines import sliding_speeds
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.settling import Patience, Settled
+from compare.kit.runner import Runner, coarse_step
+from compare.kit.settling import SettlingCriteria, SteadyState
 from compare.kit.statistics import (
     COVERAGE,
     POINTS,
@@ -61,17 +61,17 @@ From = Callable[[Parameters], Array]
 
 
 def measure(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The thresholds of each set: bisected between flows whose settled cases differ, and
     extrapolated from states."""
-    sure = not lab.effort.granted
-    found = [_where_cases_change(lab, name, p, records) for name, p in sets.items()]
-    _narrow(lab, found, _end_of_rolling, careful=sure)
-    _narrow(lab, found, _sinking_and_slipping)
-    _settle_beside(lab, found)
-    _narrow(lab, found, _riding_and_leaning, careful=sure)
-    _narrow(lab, found, _fold)
+    sure = not runner.effort.granted
+    found = [_where_cases_change(runner, name, p, records) for name, p in sets.items()]
+    _narrow(runner, found, _end_of_rolling, careful=sure)
+    _narrow(runner, found, _sinking_and_slipping)
+    _settle_beside(runner, found)
+    _narrow(runner, found, _riding_and_leaning, careful=sure)
+    _narrow(runner, found, _fold)
     for each in found:
         for kind, bracket in each.brackets.items():
             if bracket.failure and kind != "sinking":  # which is looked for roughly
@@ -89,7 +89,7 @@ class Findings:
     Kinds: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or where slip of a
     "riding" ball ends."""
 
-    lab: Lab
+    runner: Runner
     set: str
     p: Parameters
     cases: Mapping[
@@ -97,7 +97,7 @@ class Findings:
     ]  # in which cases balls were seen to settle, by flow, the slowest first
     changes: Mapping[str, Bracket]  # flows between which it is looked for
     brackets: dict[str, Bracket] = field(default_factory=dict)
-    states: dict[str, list[Settled]] = field(default_factory=dict)
+    states: dict[str, list[SteadyState]] = field(default_factory=dict)
     """Settled states beside a change, the nearest first, by kind: of "riding", "sinking", "lifted"
     balls; of "slipping" ones near its beginning, and "turning" ones near its end."""
 
@@ -121,10 +121,10 @@ class Findings:
                 if last
                 else start(q)
                 if start
-                else settling.named_start("", q, STARTS[kind]).x0
+                else settling.initial_condition("", q, STARTS[kind]).x0
             )
             t_end = settling.rounded_duration(q, units * time * attempt.time)
-            return self.lab.task(q, x0, t_end, coarse_step(q) / attempt.refine)
+            return self.runner.task(q, x0, t_end, coarse_step(q) / attempt.refine)
 
         return kind, Search(around, task, answer, width)
 
@@ -146,7 +146,7 @@ class Findings:
             why = f"too few states settled for {quantity} by {how['by']}, or their extrapolation has no zero"
             return self.missing(why)
         p = self.p.replace(omega_0=at.value) if isinstance(at, Estimate) else self.p
-        return measurement(self.lab, "thresholds", self.set, p, quantity, at, tasks, **how)
+        return measurement(self.runner, "thresholds", self.set, p, quantity, at, tasks, **how)
 
     def row_of_bracket(
         self, quantity: str, of: Bracket, side: str, by: str
@@ -174,13 +174,13 @@ class Findings:
             yield self.row(quantity, place, tasks, side=side, by=f"{by} → 0")
 
 
-def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) -> Findings:
+def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Records) -> Findings:
     """For each kind of change a bracket to search: the flows of settled states between which the
     case changes.
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one
     on trial looks where that one found something."""
-    starts = STARTS | {"slipping": lab.effort.settled_starts[0][0]}
+    starts = STARTS | {"slipping": runner.effort.settled_starts[0][0]}
     cases = {kind: settling.settled_cases(records, name, how) for kind, how in starts.items()}
     changes = {}
     for kind, seen in cases.items():
@@ -198,18 +198,18 @@ def _where_cases_change(lab: Lab, name: str, p: Parameters, records: Records) ->
             ):
                 away = AWAY if kind == "rolling" else COARSE / 3
                 changes[kind] = Bracket(known.value * (1 - away), known.value * (1 + away))
-    return Findings(lab, name, p, cases, changes)
+    return Findings(runner, name, p, cases, changes)
 
 
 def _narrow(
-    lab: Lab,
+    runner: Runner,
     found: Sequence[Findings],
     searches: Callable[[Findings], Iterator[tuple[str, Search]]],
     careful: bool = False,
 ) -> None:
     """Narrow down what is searched for on a set, on all sets together."""
     asked = [(each, kind, search) for each in found for kind, search in searches(each)]
-    brackets = narrow(lab, [search for *_, search in asked], careful)
+    brackets = narrow(runner, [search for *_, search in asked], careful)
     for (each, kind, _), bracket in zip(asked, brackets, strict=True):
         each.brackets[kind] = bracket
 
@@ -217,7 +217,7 @@ def _narrow(
 def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
     """A search for the largest flow at which a ball that rolls at both points goes on so."""
     if change := each.changes.get("rolling"):
-        width = each.lab.effort.thresholds_width * change.high
+        width = each.runner.effort.thresholds_width * change.high
         yield each.search("rolling", change, width)
 
 
@@ -232,7 +232,7 @@ def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
         yield each.search("slipping", change, COARSE * change.low)
 
 
-def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
+def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
     """Settle states beside every change; those count that did settle, in the case that belongs
     there.
 
@@ -247,14 +247,14 @@ def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
             for kind, b in each.brackets.items()
             if not (b.runs[1] or b.high in each.cases[kind])
         ]
-        for kind in unseen if not lab.effort.granted else ():
+        for kind in unseen if not runner.effort.granted else ():
             del each.brackets[kind]
         settled, turning, riding = (
             np.array(row) for row in (DISTANCES, DISTANCES_BELOW_FOLD, DISTANCES_RIDING)
         )
         if carried := each.brackets.get("sinking"):
             beside.append((each, "riding", "on the wall", carried.high * (1 + riding)))
-            if lab.effort.slow:  # a ball that sinks swings for long
+            if runner.effort.slow:  # a ball that sinks swings for long
                 beside.append((each, "sinking", "on the wall", carried.low * (1 - settled / 2)))
         end, last = each.brackets.get("rolling"), each.brackets.get("slipping")
         if end and lifts(end):
@@ -265,15 +265,17 @@ def _settle_beside(lab: Lab, found: Sequence[Findings]) -> None:
             beside.append((each, "turning", "rest", last.low - turning * span))
     starts = [
         [
-            settling.named_start(each.set, each.p.replace(omega_0=flow), how)
+            settling.initial_condition(each.set, each.p.replace(omega_0=flow), how)
             for flow in flows.tolist()
         ]
         for each, _, how, flows in beside
     ]
-    patience = Patience(loose=lab.effort.thresholds_loose, rounds=lab.effort.thresholds_rounds)
+    criteria = SettlingCriteria(
+        loose=runner.effort.thresholds_loose, rounds=runner.effort.thresholds_rounds
+    )
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
     for (each, kind, *_), states in zip(
-        beside, settling.settle_groups(lab, starts, patience), strict=True
+        beside, settling.settle_groups(runner, starts, criteria), strict=True
     ):
         case = belongs.get(kind, Case.NR)
         each.states[kind] = [
@@ -287,7 +289,7 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
 
     They begin from settled states continued to each flow; the pressed one has a thousandth less
     spin on the wall."""
-    width = each.lab.effort.thresholds_width
+    width = each.runner.effort.thresholds_width
     begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
     if begins and len(riding) == len(DISTANCES_RIDING):
         ride = riding_start(riding, height=settling.safe_height(each.p))
@@ -300,7 +302,7 @@ def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
         )
 
 
-def riding_start(states: Sequence[Settled], height: float, less: float = 0.0) -> From:
+def riding_start(states: Sequence[SteadyState], height: float, less: float = 0.0) -> From:
     """A state that rides the wall at a height, continued in omega_0 from settled states, with less
     spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
@@ -336,11 +338,13 @@ def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
     if pressing := extrapolated(turned, "slip_x", forces):
         sure = COVERAGE * pressing.uncertainty
         return top if pressing.value > sure else None, pressing.value < -sure
-    return None, bool(held and off < each.lab.effort.thresholds_fold * held.high)
+    return None, bool(held and off < each.runner.effort.thresholds_fold * held.high)
 
 
 def extrapolated(
-    states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Estimate]], Estimate]
+    states: Sequence[SteadyState],
+    quantity: str,
+    to: Callable[[Array, Sequence[Estimate]], Estimate],
 ) -> Estimate | None:
     """The flow to which a quantity of settled states is extrapolated; None if they are too few, or
     there is none."""
@@ -364,8 +368,8 @@ def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
     At a fold all slows down, like the root of the distance.
     """
     top, _ = _end_of_slipping(each)
-    if top and each.lab.effort.slow:
-        narrowest = each.lab.effort.thresholds_fold
+    if top and each.runner.effort.slow:
+        narrowest = each.runner.effort.thresholds_fold
         half = max(narrowest, 5.0 * top.uncertainty / top.value)
         change, nearest = (
             Bracket(top.value * (1 - half), top.value * (1 + half)),
@@ -424,7 +428,7 @@ def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
     settles = len(tasks) >= POINTS
     # Beside known flows only a ball may have settled at none beyond the last.
-    if settles and (ends or not each.lab.effort.granted):
+    if settles and (ends or not each.runner.effort.granted):
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
         yield from each.rows_of_zero(
@@ -442,7 +446,7 @@ def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
             yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
         else:
             slow = "costs more than an engine beside the one on trial may"
-            why = "could not be done" if each.lab.effort.slow else slow
+            why = "could not be done" if each.runner.effort.slow else slow
             yield each.missing(
                 f"the end of slipping at both points is extrapolated; to bracket it {why}"
             )

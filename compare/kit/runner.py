@@ -20,7 +20,7 @@ from model import Flow, Parameters, Trajectory
 
 
 @dataclass(frozen=True)
-class Lab:
+class Runner:
     """Where protocols run what they need: every run is carried out once and read from its file
     afterwards."""
 
@@ -33,12 +33,12 @@ class Lab:
     @property
     def effort(self) -> Effort:
         """How much is measured at this level by this engine."""
-        if self.is_witness:
-            return levels.WITNESS if self.level is Level.QUICK else levels.WITNESS_ABOVE_QUICK
+        if self.has_own_steps:
+            return levels.OWN_STEPS if self.level is Level.QUICK else levels.OWN_STEPS_ABOVE_QUICK
         return (levels.AT_QUICK, levels.AT_DEFAULT, levels.AT_FULL)[self.level]
 
     @property
-    def is_witness(self) -> bool:
+    def has_own_steps(self) -> bool:
         """Whether the engine is heard beside the one on trial, or in its place, with time steps of
         its own."""
         return self.engine.refine != (1,)
@@ -53,7 +53,7 @@ class Lab:
         flow: Flow | None = None,
         samples: int = 100,
     ) -> Task:
-        """The task of a run by the lab's engine with a time step in s, in the studies' settings.
+        """The task of a run by the runner's engine with a time step in s, in the studies' settings.
 
         One that goes on from another begins on floor and wall, into which contacts may have let it
         sink."""

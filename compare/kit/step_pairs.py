@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step
 from compare.kit.record import Condition, Measurement, Missing, measurement
+from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import Estimate, uniform
 from compare.kit.tasks import Task
@@ -35,7 +35,7 @@ class Start:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial(Start):
+class StepPair(Start):
     """A motion that is run with two time steps."""
 
     t_end: float
@@ -50,49 +50,51 @@ class Trial(Start):
     variants: tuple[Parameters, ...] = ()
     """Parameters of the runs that are read together; empty for one run with those of the start."""
     conditions: Mapping[str, Condition] = field(default_factory=dict)
-    """Of all measurements of this trial."""
+    """Of all measurements of this pair."""
     rows: int = 1
     """Measurements that are left out if a run breaks down."""
 
 
 @dataclass(frozen=True, eq=False)
-class TrialResult:
-    """What was read from a trial with the coarser and with the finer time step."""
+class StepPairResult:
+    """What was read from a pair with the coarser and with the finer time step."""
 
     protocol: str
-    trial: Trial
+    pair: StepPair
     tasks: Sequence[Task] = field(repr=False)
     """The runs, those with the coarser step first."""
     coarse: Any
     fine: Any
 
     def row(
-        self, lab: Lab, quantity: str, value: Estimate | float, **conditions: Condition
+        self, runner: Runner, quantity: str, value: Estimate | float, **conditions: Condition
     ) -> Measurement:
-        """A measurement of this trial."""
-        trial, conditions = self.trial, {**self.trial.conditions, **conditions}
+        """A measurement of this pair."""
+        pair, conditions = self.pair, {**self.pair.conditions, **conditions}
         return measurement(
-            lab, self.protocol, trial.set, trial.p, quantity, value, self.tasks, **conditions
+            runner, self.protocol, pair.set, pair.p, quantity, value, self.tasks, **conditions
         )
 
 
-def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[TrialResult | Missing]:
-    """Run all trials, and read each; or say which of its runs broke down."""
-    tasks: list[tuple[Trial, list[Task]]] = []
-    for trial in trials:
-        tasks.append((trial, []))
-        for step in (coarse_step(trial.p) / refine for refine in trial.refine):
-            samples = trial.samples or round(trial.t_end / step)
-            for p in trial.variants or (trial.p,):
-                task = lab.task(p, trial.x0, trial.t_end, step, flow=trial.flow, samples=samples)
+def carry_out(
+    runner: Runner, protocol: str, pairs: Iterable[StepPair]
+) -> Iterator[StepPairResult | Missing]:
+    """Run all pairs, and read each; or say which of its runs broke down."""
+    tasks: list[tuple[StepPair, list[Task]]] = []
+    for pair in pairs:
+        tasks.append((pair, []))
+        for step in (coarse_step(pair.p) / refine for refine in pair.refine):
+            samples = pair.samples or round(pair.t_end / step)
+            for p in pair.variants or (pair.p,):
+                task = runner.task(p, pair.x0, pair.t_end, step, flow=pair.flow, samples=samples)
                 tasks[-1][1].append(task)
-    for (trial, own), runs in zip(tasks, lab.groups([own for _, own in tasks]), strict=True):
+    for (pair, own), runs in zip(tasks, runner.groups([own for _, own in tasks]), strict=True):
         if isinstance(runs, str):
-            yield Missing(protocol, trial.set, f"{trial.name}: the run {runs}", trial.rows)
+            yield Missing(protocol, pair.set, f"{pair.name}: the run {runs}", pair.rows)
         else:
             half = len(runs) // 2
-            yield TrialResult(
-                protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:])
+            yield StepPairResult(
+                protocol, pair, own, pair.read(*runs[:half]), pair.read(*runs[half:])
             )
 
 
@@ -127,7 +129,7 @@ def unlike(changes: Array) -> Array:
     return np.asarray(np.hypot(sizes, sizes.max(initial=0.0) / 4))
 
 
-REFINED = 16
+STEP_RATIO = 16
 """Steps in one of `coarse_step`; the finer run has twice as many. With shorter ones the studies'
 settings come to the engine's least impedance, and contacts then answer no faster."""
 LAG = 3
@@ -142,8 +144,8 @@ def lag_error(p: Parameters, refine: int = 1) -> float:
     change nothing.
 
     The error is at most half the square of the lag `LAG` in units of `time_unit`: the second order,
-    once the first is extrapolated. The steps of `REFINED` may be divided by `refine`."""
-    return uniform((LAG * coarse_step(p) / (REFINED * refine) / time_unit(p)) ** 2 / 2)
+    once the first is extrapolated. The steps of `STEP_RATIO` may be divided by `refine`."""
+    return uniform((LAG * coarse_step(p) / (STEP_RATIO * refine) / time_unit(p)) ** 2 / 2)
 
 
 def polynomials(

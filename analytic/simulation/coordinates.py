@@ -49,7 +49,7 @@ from analytic.simulation.equations import (
     Fall,
     Motion,
 )  # fmt: skip
-from analytic.simulation.motion import Moment
+from analytic.simulation.motion import HybridState
 from model import State
 
 MOST = 8
@@ -84,7 +84,7 @@ def count_guards(k: Motion) -> int:
     return count
 
 
-def begin(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+def begin(case: int, at: HybridState, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
     """Begin a case at a moment: write coordinates z and their natural sizes; return its constants
     and their number."""
     if case % 3 == AWAY:
@@ -92,7 +92,7 @@ def begin(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion,
     return _begin_on_wall(case, at, k, z, scale)
 
 
-def _begin_on_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+def _begin_on_wall(case: int, at: HybridState, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
     """As `begin`: z = (theta; omega_c, off the floor y, v_y, omega_c, slip_x; size and direction of
     slips; work)."""
     x, turns, side, n = at.x, case in (SS, NS), 0.0, 2
@@ -126,7 +126,9 @@ def _begin_on_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tupl
     return equations.in_case(k, case, side, k.line, NO_FALL), n + 1
 
 
-def _begin_off_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+def _begin_off_wall(
+    case: int, at: HybridState, k: Motion, z: Any, scale: Any
+) -> tuple[Motion, int]:
     """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point at rest; in NN y,
     v_y; work).
 
@@ -154,14 +156,14 @@ def _begin_off_wall(case: int, at: Moment, k: Motion, z: Any, scale: Any) -> tup
     return equations.in_case(k, case, 0.0, k.line, fall), n + 1
 
 
-def moment(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
+def hybrid_state(t: Any, z: Any, at: HybridState, k: Motion) -> HybridState:
     """The state with azimuth and work at a time t, from coordinates z of a case that began at the
     moment `at`.
 
     An azimuth off the wall is given up to whole turns.
     """
     if k.case % 3 == AWAY:
-        return _moment_off_wall(t, z, at, k)
+        return _hybrid_state_off_wall(t, z, at, k)
     y, v_y, omega_c, w_x, w_y, w_z, alpha, beta = 0.0, 0.0, z[1], 0.0, 0.0, 0.0, math.nan, math.nan
     if k.case // 3 == AWAY:
         y, v_y, omega_c, w_x = z[1], z[2], z[3], z[4]
@@ -175,10 +177,10 @@ def moment(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
     elif k.case == NS:
         beta = z[6]
         w_y, w_z = z[5] * np.sin(beta), z[5] * np.cos(beta)
-    return Moment(t, z[0], State(y, v_y, omega_c, w_x, w_y, w_z, 0.0, 0.0), alpha, beta, z[-1])
+    return HybridState(t, z[0], State(y, v_y, omega_c, w_x, w_y, w_z, 0.0, 0.0), alpha, beta, z[-1])
 
 
-def _moment_off_wall(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
+def _hybrid_state_off_wall(t: Any, z: Any, at: HybridState, k: Motion) -> HybridState:
     """As `moment`, for a ball away from the wall."""
     turn, u = cmath.exp(1j * at.theta), rigid_body.velocities(at.x, k)
     place, moves, y, v_y, alpha, slide = z[0] + 1j * z[1], z[2] + 1j * z[3], 0.0, 0.0, math.nan, 0j
@@ -203,7 +205,7 @@ def _moment_off_wall(t: Any, z: Any, at: Moment, k: Motion) -> Moment:
         w_x, w_z = 0.0, -v_h / k.r
     # rho = R - h to the last digit
     x = State(y, v_y, v_k / rho, w_x, u.o_y + v_k / k.r, w_z, k.R - rho, v_h)
-    return Moment(t, np.arctan2(place.imag, place.real), x, alpha, math.nan, z[-1])
+    return HybridState(t, np.arctan2(place.imag, place.real), x, alpha, math.nan, z[-1])
 
 
 def least_slip(z: Any, scale: Any, case: int) -> float:
@@ -214,7 +216,7 @@ def least_slip(z: Any, scale: Any, case: int) -> float:
     return least
 
 
-def rebound_time(at: Moment, z: Any, k: Motion, rate: Any) -> float:
+def rebound_time(at: HybridState, z: Any, k: Motion, rate: Any) -> float:
     """How long a rebound that begins at a moment will last by the accelerations then, s; inf if
     none begins."""
     x, lasts = at.x, math.inf

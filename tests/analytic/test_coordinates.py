@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from analytic.mechanics import drag, dynamics, rigid_body, rolling_forces
-from analytic.simulation import charts, equations, motion
-from analytic.simulation.motion import Moment
+from analytic.simulation import coordinates, equations, motion
+from analytic.simulation.motion import HybridState
 from analytic.simulation.settings import Settings
 from model import Case, Contact, Flow, Parameters, State
 from model.cases import TRAITS
@@ -38,14 +38,14 @@ def moments(case, p):
         (A_x, _, A_z), (_, B_y, B_z) = slip_velocities(x.stacked(), p)
         alpha = math.atan2(-A_z, A_x) if case.A is Contact.S else math.nan
         beta = math.atan2(B_z, -B_y) if case.B is Contact.S else math.nan
-        yield Moment(TIME, rng.uniform(-3, 3), x, alpha, beta)
+        yield HybridState(TIME, rng.uniform(-3, 3), x, alpha, beta)
 
 
 def begun(case, at, p):
     """The constants of a motion, its coordinates and their rates."""
     k = motion.of_ball(p, FLOW, Settings())
-    z, scale = np.empty((2, charts.MOST))
-    k, n = charts.begin(int(case), at, k, z, scale)
+    z, scale = np.empty((2, coordinates.MOST))
+    k, n = coordinates.begin(int(case), at, k, z, scale)
     rates = np.empty(n)
     equations.rates(TIME, z[:n], k, rates)
     return k, z[:n], scale[:n], rates
@@ -65,7 +65,7 @@ def test_rates_in_all_coordinates(case, law):
         k, z, scale, rates = begun(case, at, p)
 
         def moved(t, at=at, k=k, z=z, rates=rates):
-            return charts.moment(TIME + t, z + t * rates, at, k)
+            return coordinates.hybrid_state(TIME + t, z + t * rates, at, k)
 
         def energy(t, moved=moved):
             x = moved(t).x
