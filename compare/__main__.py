@@ -35,8 +35,8 @@ def main() -> NoReturn:
 
 
 if __name__ == "__main__":
-    if sys.path[:1] == [str(Path.cwd())] != [str(Path(__file__).parents[1])]:
-        del sys.path[
-            0
-        ]  # `python -m` puts the current folder first, where a foreign `model` may be; `dualball` doesn't
+    # `python -m` puts the current folder first, where a foreign `model` may be; `dualball` doesn't.
+    with suppress(FileNotFoundError):  # it was deleted
+        if sys.path[:1] == [str(Path.cwd())] != [str(Path(__file__).parents[1])]:
+            del sys.path[0]
     main()

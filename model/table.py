@@ -15,6 +15,8 @@ from model.errors import InputError, StorageError, suggestion
 from model.files import write_text
 from model.parameters import parse_number
 
+LARGEST = 500_000_000
+"""Characters of a table that is read: a device has no end."""
 _LABEL = re.compile(r"(?P<name>.*?)\s*(?:[(\[](?P<unit>.*?)[)\]]|\bin (?P<after>.*))?")
 
 _SHORT = {"second": "s", "seconds": "s", "sec": "s", "radian": "rad", "radians": "rad"}
@@ -98,11 +100,15 @@ def read(
     are none. Raises `StorageError` for a file that can't be read, `InputError` that names the line
     for anything else."""
     try:
-        lines = Path(path).read_text("utf-8-sig").splitlines()
+        with Path(path).open(encoding="utf-8-sig") as file:
+            text = file.read(LARGEST + 1)
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not a text file: {error.reason}") from error
+    if len(text) > LARGEST:
+        raise StorageError(f"cannot read {path}: it has more than {LARGEST / 1e6:g} MB")
+    lines = text.splitlines()
     rows = [(n, row) for n, line in enumerate(lines, 1) if any(row := fields(line))]
     place, width = {name: k for k, name in enumerate(bare)}, len(bare)
     if rows and not any(is_number(text) for text in rows[0][1]):

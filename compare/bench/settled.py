@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import math
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,7 +81,10 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     except ValueError as error:
-        raise InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}") from error
+        said = " ".join(str(error).split())
+        if of_xml := re.match(r"XML parse error \d+:.* Line number=(\d+)", said):
+            raise InputError(f"{path} is not valid XML, line {of_xml[1]}") from error
+        raise InputError(f"{path}: MuJoCo refuses it: {said}") from error
     data, names = mujoco.MjData(model), [model.key(k).name or str(k) for k in range(model.nkey)]
     if keyframe is not None:
         if keyframe not in names and keyframe not in map(str, range(model.nkey)):

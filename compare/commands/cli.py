@@ -11,6 +11,7 @@ import errno
 import gc
 import importlib
 import io
+import itertools
 import os
 import re
 import sys
@@ -96,6 +97,11 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     words = [
         re.sub(r"^--[\w-]+", lambda option: option[0].replace("_", "-"), word) for word in words
     ]
+    for before, word in itertools.pairwise(["", *words]):
+        option = re.fullmatch(r"(--[\w-]+)=\s*", word)
+        if option or not word.strip():
+            named = option[1] if option else before if before.startswith("-") else "an argument"
+            raise InputError(f"{named} is empty")
     words = words or ["--help"]
     if words[0] == "help":
         words = [*words[1:2], "--help"]

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import math
 import os
+import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -272,6 +273,10 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
         raise
 
 
+NARROWEST = 40
+"""Columns of a terminal below which tables would lose what they hold."""
+
+
 def terminal(**look: Any) -> Console:
     """A console of rich that is wide enough for any table off a terminal, and lets a broken pipe be
     an error."""
@@ -281,9 +286,9 @@ def terminal(**look: Any) -> Console:
         def on_broken_pipe(self) -> NoReturn:
             raise BrokenPipeError
 
-    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
-        look.setdefault("width", 1000)
-    return Terminal(**look)
+    unknown = 80 if sys.stdout.isatty() else 1000
+    width = max(shutil.get_terminal_size((unknown, 24)).columns, NARROWEST)
+    return Terminal(**{"width": width} | look)
 
 
 def show(data: Any, as_json: bool, *shown: Any) -> None:

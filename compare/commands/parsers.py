@@ -322,7 +322,7 @@ def calibrate(parser: Parser) -> None:
     for end, usual in ends:
         flow = Number("FLOW", Range(1e-12, 1e12))
         parser.add_argument(f"--{end}", type=flow, help=f"{end} flow (default: {usual})")
-    points = Number(allowed=Range(2, 10_000, whole=True))
+    points = Number(allowed=Range(2, 1000, whole=True))
     parser.add_argument("--count", type=points, default=60, help="flows between them")
     written = "write the curve (default: don't)"
     parser.add_argument("-o", "--output", type=TABLE, dest="table", help=written)

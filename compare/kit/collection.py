@@ -140,7 +140,8 @@ def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, 
     parts, problems = [], []
     for file in files:
         try:
-            parts.append(_rows(file, file.relative_to(directory)))
+            if rows := _rows(file, file.relative_to(directory)):
+                parts.append(rows)
         except StorageError as error:
             problems.append(str(error))
     return {
@@ -149,8 +150,11 @@ def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, 
 
 
 def _rows(path: Path, shown: Path) -> Columns:
-    """The columns of all runs of a file, whose name in the collection begins with `shown`."""
+    """The columns of all runs of a file, whose name in the collection begins with `shown`; of a
+    collection, which holds no run, none."""
     with reading(path) as file:
+        if file.attrs.get("schema") == SCHEMA:
+            return {}
         if file.attrs.get("schema") != MEANS:
             found = None
         elif file.attrs.get("schema_version") != MEANS_VERSION:

@@ -272,6 +272,9 @@ def test_commands_write_csv_where_the_name_says_so(tmp_path, monkeypatch, capsys
     told(capsys, "collect runs -o all.h5 --workers 0")
     told(capsys, "inspect all.h5 --table again.csv")
     assert Path("all.csv").read_text("utf-8") == Path("again.csv").read_text("utf-8")
+    told(capsys, "collect runs -o runs/all.h5 --workers 0")
+    told(capsys, "collect runs -o more.csv --workers 0")  # beside a collection
+    assert Path("all.csv").read_text("utf-8") == Path("more.csv").read_text("utf-8")
 
     data = json.loads(told(capsys, "predict --omega-0 25 --json -o cases.csv"))
     rows = list(csv.DictReader(Path("cases.csv").read_text("utf-8").splitlines()))

@@ -16,6 +16,8 @@ import shlex
 import shutil
 import signal
 import stat
+import subprocess
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -24,7 +26,7 @@ import numpy as np
 import pytest
 
 from compare.commands import cli, options
-from tests.commands import COMMANDS, NEEDED, parser_of, refused
+from tests.commands import COMMANDS, NEEDED, ROOT, parser_of, refused
 
 ODD = (
     "x",
@@ -329,6 +331,88 @@ def test_odd_lines(
             os.chdir(here)
             whole = contents(here)
     assert not {line: of for line, of in wrong.items() if of}
+
+
+USERS = {  # a slice of some 330 lines that were drawn by hand: what must be in the one line
+    "predict --parameters ": "--parameters is empty",
+    "predict --parameters=": "--parameters is empty",
+    "simulate --start ": "--start is empty",
+    " ": "an argument is empty",
+    "cases ": "an argument is empty",
+    "simulate --flow /dev/zero": "cannot read /dev/zero: it has more than",
+    "simulate --flow utf16.csv": "utf16.csv is not a text file",
+    "simulate --flow twice.csv": "line 1: time is given twice",
+    "simulate --flow deg.csv": "omega_0 must be in rad/s, not in deg/s",
+    "simulate --flow back.csv": "line 3: times must increase",
+    "simulate --sine 10 5": "then each wave's amplitude in rad/s and frequency",
+    "simulate --staircase -1 1 2": "-1",
+    "simulate --mu 20%": "'20%' is not a number",
+    "simulate --mu 1/2": "'1/2' is not a number",
+    "simulate --mu 0.2 0.3": "'0.3' is one argument too many",
+    "simulate --engine mujoco,event": "no engine is called 'mujoco,event'",
+    "simulate --timestep 1": "timestep = 1 s is out of range",
+    "simulate -o .h5": "its name must end in",
+    "forecast cut.xml": "cut.xml is not valid XML, line 2",
+    "forecast bytes.csv": "bytes.csv",
+    "forecast scene.xml --keyframe 0": "has no keyframe '0'",
+    "predict --parameters twice.toml": "is not valid TOML",
+    "predict --parameters deep.toml": "deep.toml",
+    "inspect run.h5/x": "run.h5/x",
+    "inspect run.h5 --plot /proc/x.png": "cannot write /proc/x.png",
+    "compare run.h5 runs": "runs",
+    "compare run.h5 rpm.csv": "rpm.csv",
+    "collect run.h5": "it is no directory",
+    "sweep --vary omega_0=1:2:1e9": "count of omega_0",
+    "sweep --vary omega_0=1:2:3 --scheduler nowhere": "nowhere",
+    "basins --across omega_c=0:1:3 --up omega_c=0:1:3": "omega_c",
+    "render run.h5 -o new.html --at 5": "5",
+    "league --engine json": "unknown engine 'json'",
+    "calibrate --slowest 5 --fastest 5": "--fastest 5 rad/s is out of range",
+    "calibrate --count 1e4": "10000 is out of range",
+    "help nothing": "there is no command 'nothing'",
+    "--print-completion ksh": "--print-completion takes one of",
+}
+TABLES = {
+    "utf16.csv": "time,omega_0\n0,10\n1,20\n".encode("utf-16"),
+    "twice.csv": b"t,t,omega_0\n0,0,1\n1,1,1\n",
+    "deg.csv": b"t,omega_0 (deg/s)\n0,1\n1,2\n",
+    "rpm.csv": b"t,omega_c (rpm)\n0,10\n1,20\n",
+    "back.csv": b"t,omega_0\n1,10\n0,20\n",
+    "twice.toml": b"mu = 1\nmu = 2\n",
+    "deep.toml": b"a" + b".a" * 5000 + b" = 1\n",
+}
+
+
+@pytest.mark.parametrize(("line", "said"), USERS.items())
+def test_what_users_may_write_is_one_line(line, said, here, monkeypatch, capsys):
+    monkeypatch.setattr("model.table.LARGEST", 10**6)
+    for name, content in TABLES.items():
+        (here / name).write_bytes(content)
+    before = contents(here)
+    assert said in refused(capsys, *line.split(" "))
+    assert contents(here) == before
+
+
+@pytest.mark.parametrize("columns", ["0", "3", "x", "-5"])
+def test_tables_lose_nothing_in_a_terminal_of_any_width(columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", columns)
+    assert cli.main(["predict"]) == 0
+    shown = capsys.readouterr().out
+    assert "13.562" in shown
+    assert "lags" in shown
+
+
+def test_a_directory_that_was_deleted_is_one_line(tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    line = f"cd {gone} && rmdir {gone} && exec {sys.executable} -m compare predict -o x.csv"
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(["sh", "-c", line], env=env, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[-1] == (
+        "dualball: error: cannot write x.csv: No such file or directory"
+    )
+    assert "Traceback" not in done.stderr
 
 
 def reading(command, file):
