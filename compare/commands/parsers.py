@@ -12,7 +12,7 @@ from typing import NamedTuple, NoReturn
 
 from compare.commands import options
 from compare.commands.options import DATA, MAP, MARKDOWN, PAGE, TABLE, Number, Parser
-from model import InputError
+from model import InputError, Parameters, drag
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range
 
@@ -509,6 +509,29 @@ def _complete(parser: Parser, commands: options.Commands, shell: Sequence[str]) 
         raise InputError(f"--print-completion takes one of {', '.join(shtab.SUPPORTED_SHELLS)}")
     for name in COMMANDS:
         declare(commands, name)
+    _name_values(commands)
     commands.help = "a command"  # what has no help isn't completed
     print(shtab.complete(parser, shell[0]))
     raise SystemExit(0)
+
+
+def _name_values(commands: options.Commands) -> None:
+    """Let shells complete sets, laws, engines, claims, cases and figures by their names."""
+    from compare import catalogue, gallery  # here, because nothing else waits for them
+    from compare.bench import exact, league
+    from compare.kit import engines
+
+    known = {
+        "--set": Parameters.names(),
+        "--drag": drag.LAWS,
+        "--engine": engines.ENGINES,
+        "--claim": [claim.id for claim in catalogue.CLAIMS],
+        "--figure": gallery.FIGURES,
+        "--format": gallery.FORMATS,
+    }
+    for name, parser in commands.choices.items():
+        own = known | ({"--engine": league.ENTRIES} if name == "league" else {})
+        own |= {"name": [case.name for case in exact.cases()]} if name == "cases" else {}
+        for action in parser._actions:
+            for option in (*action.option_strings, action.dest):
+                action.choices = list(own[option]) if option in own else action.choices

@@ -336,6 +336,19 @@ def test_mistakes(tmp_path, monkeypatch, capsys, argv, says):
     assert sorted(Path().iterdir()) == before  # and nothing is left half written
 
 
+COMPLETED = {
+    "dualball predict --set stee": "steel-in-water",
+    "dualball predict --drag sch": "schiller-naumann",
+    "dualball simulate --engine mujoco-pl": "mujoco-plain",
+    "dualball league --engine newton-k": "newton-kamino",
+    "dualball validate --claim fig-13-l": "fig-13-left",
+    "dualball figures --figure fig-1": "fig-13-right",
+    "dualball figures --format p": "pdf",
+    "dualball cases drill": "drilling-sphere",
+}
+"""Lines, and what bash offers for the last word."""
+
+
 def test_shells_complete_commands_and_options(tmp_path, monkeypatch, capsys):
     for shell in ("zsh", "fish", "bash"):
         with pytest.raises(SystemExit, match="0"):
@@ -348,5 +361,11 @@ def test_shells_complete_commands_and_options(tmp_path, monkeypatch, capsys):
         subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True).stdout
         == "simulate\n"
     )
+    for line, found in COMPLETED.items():
+        words = line.split(" ")
+        at = f"COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}"
+        words = f"source ./bash; {at}; _shtab_dualball; echo ${{COMPREPLY[@]}}"
+        done = subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True)
+        assert found in done.stdout.split(), line
     monkeypatch.setitem(sys.modules, "shtab", None)
     assert "dualball[completion]" in refused(capsys, "--print-completion", "bash")
