@@ -6,7 +6,6 @@ a design doesn't reach its fastest flow, 2 a mistake in what was asked, 130 inte
 from __future__ import annotations
 
 import argparse
-import codecs
 import errno
 import gc
 import importlib
@@ -15,12 +14,12 @@ import itertools
 import os
 import re
 import sys
+import warnings
 from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import NoReturn
 
 from compare.commands import signals, waiting
-from compare.kit import pages
 from model import InputError, SimulationError
 from model.files import leave
 from model.versions import version
@@ -31,7 +30,6 @@ def program() -> NoReturn:
 
     What standard output can't show in its encoding is spelled.
     """
-    codecs.register_error("spelled", pages.spell_out)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="spelled")
     os.environ["MPLBACKEND"] = (
@@ -120,5 +118,11 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     own = hasattr(args, "quiet") or getattr(args, "view", False) or args.run == "look.explore"
     quiet = own or getattr(args, "json", False)
     telling = nullcontext(lambda done: None) if quiet else waiting.told(words[0])
-    with options.no_empty_directories(args), signals.raised(), telling as args.tell:
+    with (
+        warnings.catch_warnings(),
+        options.no_empty_directories(args),
+        signals.raised(),
+        telling as args.tell,
+    ):
+        warnings.showwarning = lambda message, *where: options.warn(" ".join(str(message).split()))
         return int(run(args))

@@ -2,7 +2,6 @@
 outputs, no home."""
 
 import ast
-import codecs
 import os
 import re
 import shutil
@@ -11,7 +10,6 @@ import sys
 
 import pytest
 
-from compare.kit import pages
 from model import storage
 from tests.commands import ROOT, SCENE, carried_out, refused
 
@@ -47,9 +45,17 @@ def test_any_encoding(here, encoding):
     done = dualball(here, "predict", PYTHONIOENCODING=encoding)
     assert done.returncode == 0
     shown = done.stdout.decode(encoding)
-    assert ("omega01" in shown) is (encoding != "utf-16")
-    codecs.register_error("spelled", pages.spell_out)
-    assert "ω₀₁Ωω̃²√±…é \udcff✓".encode("ascii", "spelled") == b"omega01Omega omega2sqrt +-...e ??"
+    assert ("omega_01" in shown) is (encoding != "utf-16")
+    if encoding == "ascii":  # the tables are straight all the same
+        for table in shown.split("Stationary solutions"):
+            assert len({len(line) for line in table.splitlines() if line.startswith("|")}) == 1
+    spelled = {
+        "ω₀₁ Ω ω̃² √± … é \udcff✓": "omega_01 Omega omega~^2 sqrt+- ... e ?+",
+        "8πρ_fνr = c√(R/g)": "8 pi rho_f nu r = c sqrt(R/g)",
+        "ω₀√(R/g) −½ 10⁻³ m²/s": "omega_0 sqrt(R/g) -1/2 10^-3 m^2/s",
+    }
+    for text, plain in spelled.items():
+        assert text.encode("ascii", "spelled").decode() == plain
 
 
 def test_any_backend_and_no_home(here):

@@ -3,7 +3,9 @@ tables of text."""
 
 from __future__ import annotations
 
+import codecs
 import re
+import sys
 import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -33,34 +35,47 @@ def readable(unit: str) -> str:
 
 
 _SIGNS = {
-    "√": "sqrt ",
-    "±": "+-",
-    "×": "x",
-    "–": "-",
-    "—": "-",
-    "·": "*",
-    "≈": "~",
-    "≤": "<=",
-    "≥": ">=",
-}
+    "±": "+-", "×": "x", "–": "-", "—": "-", "−": "-", "·": "*", "≈": "~", "≤": "<=", "≥": ">=",
+    "→": "->", "“": '"', "”": '"', "’": "'", "✓": "+", "✗": "x",
+    "\u0303": "~", "⁻": "-",
+}  # fmt: skip
+_ABOVE, _BELOW = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "₀₁₂₃₄₅₆₇₈₉"
 
 
 def spell_out(error: UnicodeError) -> tuple[str, int]:
     """An error handler of `codecs`: spells out Greek letters, and shows others without accents and
-    digits as such."""
+    digits as such, x₀₁ as x_01, 10⁻³ as 10^-3."""
     assert isinstance(error, UnicodeEncodeError)
-    shown = []
-    for k, letter in enumerate(error.object[error.start : error.end], error.start + 1):
-        name = unicodedata.name(letter, "?").split()
-        greek = name[-1].capitalize() if "CAPITAL" in name else name[-1].lower()
-        plain = (
-            _SIGNS.get(letter)
-            or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
-        )
-        if name[0] == "GREEK":  # two symbols in a row are two words
-            plain = greek + " " * error.object[k : k + 1].isalpha()
+    text, shown = error.object, list[str]()
+    for k in range(error.start, error.end):
+        letter, before, after = text[k], text[k - 1 : k], text[k + 1 : k + 2]
+        if _is_greek(letter) or letter == "√":  # symbols in a row are words of their own
+            name = unicodedata.name(letter).split()
+            word = "sqrt" if letter == "√" else name[-1].lower()
+            word = word.capitalize() if "CAPITAL" in name else word
+            gap = before.isalnum() and not _is_greek(before)
+            shown.append(" " * gap + word + " " * (after.isalpha() or after == "√"))
+            continue
+        parts = unicodedata.normalize("NFKD", letter).replace("⁄", "/")
+        plain = _SIGNS.get(letter) or parts.encode("ascii", "ignore").decode()
+        for digits, mark in ((_ABOVE, "^"), (_BELOW, "_")):
+            if letter in digits and before not in digits:
+                plain = mark + plain
         shown.append(plain or "?" * (not unicodedata.combining(letter)))
     return "".join(shown), error.end
+
+
+codecs.register_error("spelled", spell_out)
+
+
+def for_terminal(text: str) -> str:
+    """A text as standard output can show it: a table that is spelled out later isn't straight."""
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    return text.encode(encoding, "spelled").decode(encoding)
+
+
+def _is_greek(letter: str) -> bool:
+    return unicodedata.name(letter, "").startswith("GREEK") if letter else False
 
 
 _SYMBOL = (  # compiled where it is first needed
@@ -127,7 +142,7 @@ def pairs(rows: Mapping[str, str]) -> Table:
 
     shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for name, text in rows.items():
-        shown.add_row(Text(name, "bold"), Text(text))
+        shown.add_row(Text(for_terminal(name), "bold"), Text(for_terminal(text)))
     return shown
 
 
@@ -155,10 +170,10 @@ def table(
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):
         words = rows[1:] and all(str(row[k])[:1].isalpha() for row in rows[1:])
-        shown.add_column(name, justify="left" if k == 0 or words else justify)
+        shown.add_column(for_terminal(name), justify="left" if k == 0 or words else justify)
     for row in rows[1:]:
         texts = (
-            Text(cell, no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell
+            Text(for_terminal(cell), no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell
             for k, cell in enumerate(row)
         )
         shown.add_row(*texts)
