@@ -170,7 +170,7 @@ def table(
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):
         words = rows[1:] and all(str(row[k])[:1].isalpha() for row in rows[1:])
-        shown.add_column(for_terminal(name), justify="left" if k == 0 or words else justify)
+        shown.add_column(for_terminal(str(name)), justify="left" if k == 0 or words else justify)
     for row in rows[1:]:
         texts = (
             Text(for_terminal(cell), no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell
