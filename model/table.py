@@ -15,7 +15,7 @@ from model.errors import InputError, StorageError, suggestion
 from model.files import write_text
 from model.parameters import parse_number
 
-LARGEST = 500_000_000
+LONGEST = 500_000_000
 """Characters of a table that is read: a device has no end."""
 _LABEL = re.compile(r"(?P<name>.*?)\s*(?:[(\[](?P<unit>.*?)[)\]]|\bin (?P<after>.*))?")
 
@@ -101,13 +101,13 @@ def read(
     for anything else."""
     try:
         with Path(path).open(encoding="utf-8-sig") as file:
-            text = file.read(LARGEST + 1)
+            text = file.read(LONGEST + 1)
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not a text file: {error.reason}") from error
-    if len(text) > LARGEST:
-        raise StorageError(f"cannot read {path}: it has more than {LARGEST / 1e6:g} MB")
+    if len(text) > LONGEST:
+        raise StorageError(f"cannot read {path}: it has more than {LONGEST / 1e6:g} MB")
     lines = text.splitlines()
     rows = [(n, row) for n, line in enumerate(lines, 1) if any(row := fields(line))]
     place, width = {name: k for k, name in enumerate(bare)}, len(bare)

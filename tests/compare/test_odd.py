@@ -385,7 +385,7 @@ TABLES = {
 
 @pytest.mark.parametrize(("line", "said"), USERS.items())
 def test_what_users_may_write_is_one_line(line, said, here, monkeypatch, capsys):
-    monkeypatch.setattr("model.table.LARGEST", 10**6)
+    monkeypatch.setattr("model.table.LONGEST", 10**6)
     for name, content in TABLES.items():
         (here / name).write_bytes(content)
     before = contents(here)
