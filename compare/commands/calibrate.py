@@ -13,7 +13,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import design, real_fluid
 from compare.commands import options
 from compare.kit import drawing, pages
-from compare.kit.doubt import model_warning
+from compare.kit.doubt import model_warning, torque_left_out
 from compare.report import meter
 from model import InputError, Parameters, table
 from model.arrays import Array
@@ -151,7 +151,10 @@ def in_words(
         said.append(f"Beyond the range it reads up to {worst:.2g} % too low{again}.")
     elif limit.omega_0 < top:
         said.append("Beyond the range it reads right, too, but for the ball's fall.")
-    left = [meter.torque(p.replace(omega_0=min(limit.omega_0, top))), meter.AT_WALLS * bool(p.nu_f)]
+    left = [
+        torque_left_out(p.replace(omega_0=min(limit.omega_0, top))),
+        meter.AT_WALLS * bool(p.nu_f),
+    ]
     left = [each for each in left if each] or [
         "Left out are a real fluid's torque on the ball and its inertia: give nu_f and "
         "density_ratio to have their share."

@@ -18,7 +18,7 @@ from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from compare.commands import options
 from compare.kit import pages
-from compare.kit.doubt import model_warning
+from compare.kit.doubt import model_warning, torque_left_out
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
 from compare.report import meter
@@ -190,7 +190,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     remarks: list[Text | str] = [
         Text("Forces in RR are not determined: shown are those that need least friction.", "dim")
     ]
-    remarks += filter(None, [meter.torque(p)])
+    remarks += filter(None, [torque_left_out(p)])
     if data["fluid_inertia"]:
         shifts = ", ".join(
             f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "

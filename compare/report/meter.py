@@ -15,9 +15,8 @@ from analytic.flowmeter.characteristic import End
 from analytic.flowmeter.design import THRESHOLDS, Choice, Design
 from analytic.mechanics import drag
 from compare.kit import pages
-from compare.kit.doubt import model_warning
+from compare.kit.doubt import model_warning, torque_left_out
 from compare.kit.quantities import QUANTITIES
-from model import Parameters
 
 SYMBOLS = {"mu": "μ", "eta": "η", "rho_b": "ρ_b", "rho_f": "ρ_f", "nu_f": "ν_f"}
 SYMBOLS |= {key: QUANTITIES[key].symbol for key in THRESHOLDS}
@@ -31,26 +30,6 @@ MEANING = {
 }
 """What happens at a threshold."""
 _NONE = "–"
-
-
-def torque(p: Parameters) -> str:
-    """In words what the fluid's torque, which theory leaves out, does to a ball that rolls at both
-    points; empty where the fluid isn't known."""
-    if not (p.nu_f or p.fluid_torque) or not (p.c and p.omega_0):
-        return ""
-    laws = {"by Stokes": real_fluid.rolling(p, False)}
-    layer = real_fluid.rolling(p)
-    if p.fluid_torque:
-        laws = {f"at the rate of {p.fluid_torque:g} 1/s that is given": layer}
-    elif layer.Re > 8:
-        laws["with a boundary layer"] = layer
-    told = ", ".join(
-        f"{law.omega_c:.3g} rad/s ({100 * law.shift:+.0f} %) {how}" for how, law in laws.items()
-    )
-    said = f"Left out is the fluid's torque on the spin: the rolling ball's ω_c would be {told}."
-    if max(law.friction for law in laws.values()) > 1:
-        said += " That takes more friction than there is: it would slip."
-    return said
 
 
 AT_WALLS = (
@@ -116,7 +95,7 @@ def sentences(made: Design) -> list[str]:
             f"At the slowest flow, 1/{rounded(ratio)} of the fastest, a turn takes {rounded(turn)} "
             f"s."
         )
-    said += [torque(chosen.p.replace(omega_0=request.fastest)), AT_WALLS]
+    said += [torque_left_out(chosen.p.replace(omega_0=request.fastest)), AT_WALLS]
     p = chosen.p
     Re = float(np.max(drag.reynolds(p.R * (curve.omega_0 - curve.band[0]), p)))
     if not drag.covers(Re, p.drag):

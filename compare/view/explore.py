@@ -30,10 +30,9 @@ from analytic.bifurcation.diagram import Exists
 from analytic.flowmeter import real_fluid
 from compare.branches import slipping_curve, stable_ends
 from compare.kit import steady
-from compare.kit.doubt import model_warning
+from compare.kit.doubt import model_warning, torque_left_out
 from compare.kit.pages import typeset
 from compare.kit.style import COLOURS
-from compare.report import meter
 from compare.subjects.thresholds.figures import TINTS
 from compare.view import cases
 from compare.view import page as motion
@@ -247,7 +246,7 @@ def in_words(p: Parameters) -> str:
     )
     doubts = "".join(f"{doubt} " for doubt in model_warning(real_fluid.model_error(p)))
     said = f"{doubts}{', '.join(parts)} rad/s. Settles to: {stable or 'nothing stationary'}"
-    return f"{said}. {meter.torque(p)}" if p.nu_f and p.omega_0 and p.c else said
+    return f"{said}. {torque_left_out(p)}" if p.nu_f and p.omega_0 and p.c else said
 
 
 def serve(p: Parameters, port: int, show: bool) -> None:
