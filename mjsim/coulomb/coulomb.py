@@ -433,9 +433,9 @@ def _restitution(model: Any, given: Any) -> tuple[float, ...]:
     """That of each geom, or none if nothing bounces; `ValueError` for others than 0 … 1."""
     if isinstance(given, (list, tuple, np.ndarray)):
         if np.shape(given) != (model.ngeom,):
-            shape = "×".join(map(str, np.shape(given)))
             raise ValueError(
-                f"restitution has {shape} values; one number, or one for each of {model.ngeom} geoms"
+                f"restitution = {_shown(given)} must be one number, or one for each of "
+                f"{model.ngeom} geoms"
             )
         values = list(given)
     else:

@@ -197,8 +197,8 @@ def test_an_interrupted_run_is_kept(tmp_path, monkeypatch, capsys):
     with monkeypatch.context() as pressed:
         pressed.setattr(simulate, "store", pressing)
         code, _, said = carried_out(capsys, line)
+    assert code == 130, said
     part = storage.load(tmp_path / "run.failed.h5")
-    assert code == 130
     assert f"its samples so far are kept in {tmp_path / 'run.failed.h5'}" in said
     assert part.header.failure == f"was stopped at t = {part.time[-1]:g} s"
     told(capsys, line)

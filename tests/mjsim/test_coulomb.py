@@ -578,7 +578,10 @@ def test_restitution_of_each_geom():
     after = np.array(heights)[230:]
     assert after[:, 0].max() - 0.05 == pytest.approx(0.8**2 * 0.95, rel=1e-2)
     assert after[:, 1].max() < 0.0501
-    with pytest.raises(ValueError, match="restitution has 2 values; one number, or one for each"):
+    with pytest.raises(
+        ValueError,
+        match=r"restitution = \[0.5, 0.5\] must be one number, or one for each of 3 geoms",
+    ):
         Coulomb(model, rigid=True, restitution=[0.5, 0.5])
     with pytest.raises(ValueError, match=r"restitution\[1\] = 1.5 must be from 0 to 1"):
         Coulomb(model, rigid=True, restitution=[0.0, 1.5, 0.0])
