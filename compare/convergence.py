@@ -62,7 +62,7 @@ several orders cancel."""
 LEAST_STEPS = 3
 """Time steps with which a number must have been measured to have a limit."""
 Ends = Set[tuple[str, float]]
-"""Estimate thresholds, each with the name of its set."""
+"""Measured thresholds, each with the name of its set."""
 Limit = tuple[Check, float]
 """A check in the limit of no step, and the observed order, nan where the step shows nothing."""
 

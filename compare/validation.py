@@ -60,7 +60,7 @@ def validate(
     level : how much is measured
     claims : ids; all that the level measures for None
     sets : parameter sets by name; those of the level for None
-    engine : the engine on trial, alone; MuJoCo and the witnesses beside it for None
+    engine : the engine on trial, alone; the usual ones, MuJoCo on trial, for None
     workers : number of processes, or `Workers` of another kind
     limit : longest real time a run may take, s
     progress, announce : called with how far it is, and with every verdict

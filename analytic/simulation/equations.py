@@ -2,7 +2,7 @@
 
 At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with
 h = 0; away from it both are written in the resting frame. `dynamics` has them for arrays of states,
-and test_charts holds these against it. A function writes what it finds into a list or an array that
+and test_coordinates holds these against it. A function writes what it finds into a list or an array that
 it is given."""
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def validate(parser: Parser) -> None:
     """Hold simulation against theory, claim by claim; the main job.
 
     The exit code is 1 if a verdict on the engine on trial isn't the expected one. What the
-    witnesses beside it refute is told, and changes nothing."""
+    engines beside it refute is told, and changes nothing."""
     level = parser.add_mutually_exclusive_group()
     for name, takes in (("quick", "some four minutes"), ("full", "an hour or more")):
         takes = f"{takes} (default: in between)"
