@@ -102,25 +102,16 @@ def _begin_on_wall(case: int, at: HybridState, k: Motion, z: Any, scale: Any) ->
         scale[1], scale[2], scale[3], scale[4] = k.R, k.R / k.unit, 1 / k.unit, k.spin
     else:
         z[1], scale[1] = x.omega_c, 1 / k.unit
-    if case // 3 == SLIPS:
-        z[n], scale[n], side = (
-            math.hypot(x.slip_x, x.slip_z),
-            k.spin,
-            math.copysign(1.0, math.sin(at.alpha)),
-        )
+    for slips, size, direction in (
+        (case // 3 == SLIPS, math.hypot(x.slip_x, x.slip_z), at.alpha),
+        (case % 3 == SLIPS, math.hypot(x.slip_y, x.slip_z), at.beta),
+    ):
+        if not slips:
+            continue
+        z[n], scale[n], side = size, k.spin, math.copysign(1.0, math.sin(direction))
         n += 1
         if turns:
-            z[n], scale[n] = at.alpha, 1.0
-            n += 1
-    if case % 3 == SLIPS:
-        z[n], scale[n], side = (
-            math.hypot(x.slip_y, x.slip_z),
-            k.spin,
-            math.copysign(1.0, math.sin(at.beta)),
-        )
-        n += 1
-        if turns:
-            z[n], scale[n] = at.beta, 1.0
+            z[n], scale[n] = direction, 1.0
             n += 1
     z[n], scale[n] = at.work, k.m * k.g * k.R
     return equations.in_case(k, case, side, k.line, NO_FALL), n + 1

@@ -258,8 +258,8 @@ def extrapolated_maximum(
     return _extrapolated(maximum, values)
 
 
-def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Estimate]) -> Estimate:
-    """The estimate(values, n) from all n values, with an uncertainty by its convergence with n and
+def _extrapolated(found: Callable[[Array, int], float], points: Sequence[Estimate]) -> Estimate:
+    """What is found(values, n) from all n values, with an uncertainty by its convergence with n and
     their noise.
 
     It is made without the last two points, without the last, and with all. Its changes are
@@ -272,14 +272,14 @@ def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Esti
         np.array([getattr(m, name) for m in points]) for name in ("value", "uncertainty")
     )
     count = len(values)
-    row = np.array([estimate(values, n) for n in range(count - 3, count + 1)])
+    row = np.array([found(values, n) for n in range(count - 3, count + 1)])
     changes = np.abs(np.diff(row))
     ratios = np.divide(changes[1:], changes[:-1], out=np.ones(2), where=changes[:-1] > 0)
     ratio = float(np.clip(ratios.max(), LEAST_RATIO, 1.0))
     rest = max(float(changes[-2]) * ratio**2, float(changes[-1]) * ratio)
     if (row[-1] - row[-2]) * (row[-2] - row[-3]) > 0:
         rest /= 1 - (LARGEST_RATIO if ratios[1] > ratios[0] > 0 else min(ratio, LARGEST_RATIO))
-    carried = [estimate(values + shift, count) - row[-1] for shift in np.diag(noise)]
+    carried = [found(values + shift, count) - row[-1] for shift in np.diag(noise)]
     rounding = np.finfo(float).eps * abs(row[-1]) * 2**count
     budget = {"extrapolation": rest, "rounding": rounding, "points": math.hypot(*carried)}
     return Estimate(float(row[-1]), math.hypot(rest, rounding, *carried), budget)

@@ -52,6 +52,8 @@ SHORT = 5e-4
 
 
 class Stepper(Protocol):
+    model: Any
+
     def step(self, data: Any, nstep: int = 1) -> None: ...
 
 
@@ -379,14 +381,13 @@ def landing() -> Rows:
 
 
 def choices() -> Rows:
-    """What the numbers of the law decide: solutions a step, and what gets worse."""
+    """What the numbers of the law decide: how many steps are in doubt, and what gets worse."""
 
     def tried(law: dict[str, Any]) -> list[str]:
         solves, steps, rest, rise = 0, 0, 0, 0.0
         for seed, mixed in itertools.product(range(CHOSEN), (False, True)):
-            model = pile(seed, mixed)
-            _, stepper = start(model, law=law)
-            drift, risen = settle(model, stepper)
+            data, stepper = start(pile(seed, mixed), law=law)
+            drift, risen = settle(data, stepper)
             rest, rise = rest + (drift < STILL and not mixed), max(rise, risen)
             (own,) = stepper._simulations.values()  # type: ignore[attr-defined]
             solves, steps = solves + int(own.record["solves"][0]), steps + 3000
@@ -414,7 +415,7 @@ def choices() -> Rows:
     return [
         [
             "rule",
-            "solutions a step more",
+            "steps in doubt, share",
             "piles of boxes at rest",
             "energy rises by at most, J",
             "height varies by, µm",
@@ -462,7 +463,7 @@ def servo() -> Rows:
         for seed in range(10):
             model = pile(seed, mixed=False)
             model.geom_margin[:] = 4e-3 if servo else 0.0
-            still += settle(model, Coulomb(model, servo=servo))[0] < STILL
+            still += settle(mujoco.MjData(model), Coulomb(model, servo=servo))[0] < STILL
         return ["–", f"{still} of 10"]
 
     scenes: dict[str, Callable[[float | None], list[str]]] = {
@@ -499,10 +500,10 @@ def pile(seed: int, mixed: bool) -> Any:
     )
 
 
-def settle(model: Any, stepper: Stepper) -> tuple[float, float]:
+def settle(data: Any, stepper: Stepper) -> tuple[float, float]:
     """How far bodies go in the last second, m, and the most that energy rises above what it was
     since the fall, J."""
-    data, lowest, rise = mujoco.MjData(model), math.inf, 0.0
+    model, lowest, rise = stepper.model, math.inf, 0.0
     for k in range(round((SETTLING + LAST) / 0.01)):
         if k == round(SETTLING / 0.01):
             place = data.xpos.copy()
@@ -517,9 +518,7 @@ def settle(model: Any, stepper: Stepper) -> tuple[float, float]:
 
 def fallen(way: dict[str, Any], mixed: bool, seed: int) -> tuple[float, float]:
     """What `settle` finds of a pile."""
-    model = pile(seed, mixed)
-    _, stepper = start(model, **way)
-    return settle(model, stepper)
+    return settle(*start(pile(seed, mixed), **way))
 
 
 def piles() -> Rows:

@@ -95,10 +95,10 @@ class Coulomb:
         _check_number("share", share, "", 1e-9, 1.0)
         _check_number("depth", depth, "", 0.0, 0.1)
         law = Law(
-            bool(rigid),
-            bounces,
-            float(servo or 0.0),
-            float(share),
+            rigid=bool(rigid),
+            restitution=bounces,
+            servo=float(servo or 0.0),
+            share=float(share),
             depth=float(depth),
         )
         self._begin(model, law, float(model.opt.timestep))
@@ -267,7 +267,7 @@ class Coulomb:
 
     @property
     def unsolved(self) -> int:
-        """How many steps there were, of all simulations, that didn't come to `share`."""
+        """How many steps of all `MjData` that there are didn't come to `share`."""
         return sum(int(each.record["unsolved"][0]) for each in self._simulations.values())
 
     def step1(self, data: Any) -> None:

@@ -71,18 +71,8 @@ def _only(whole: np.dtype[Any], *names: str, **parts: np.dtype[Any]) -> np.dtype
 
 MJ_CONTACT = _only(
     structure("mjContact"),
-    *(
-        "dist",
-        "pos",
-        "frame",
-        "includemargin",
-        "friction",
-        "mu",
-        "dim",
-        "geom",
-        "exclude",
-        "efc_address",
-    ),
+    *("dist", "pos", "frame", "includemargin", "friction", "mu"),
+    *("dim", "geom", "exclude", "efc_address"),
 )
 MJ_WARNING = _only(structure("mjWarningStat"), "number")
 MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver")
@@ -96,18 +86,8 @@ MJ_MODEL = _only(
 )
 MJ_DATA = _only(
     structure("mjData"),
-    *(
-        "time",
-        "ncon",
-        "nefc",
-        "ne",
-        "nf",
-        "nisland",
-        "warning",
-        "contact",
-        "geom_xpos",
-        "geom_xmat",
-    ),
+    *("time", "ncon", "nefc", "ne", "nf", "nisland"),
+    *("warning", "contact", "geom_xpos", "geom_xmat"),
     *("qvel", "qacc", "qacc_warmstart", "qfrc_bias", "xpos", "xmat", "crb", "cvel", "subtree_com"),
     *("efc_J", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind", "efc_KBIP", "efc_R", "efc_D"),
     *("efc_diagA", "efc_vel", "efc_aref", "efc_frictionloss"),

@@ -79,8 +79,8 @@ ROW = np.dtype(
         ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
         ("remembered", _f8),  # force of the step before, or of the last solution of this one, N
         ("held", _f8),  # the part of it that it keeps without giving way, N
-        # J qacc (after `multiply`), less the reference (`subtract_references`), less R times what is
-        # held, and of normal rows with the shift (`find_forces`, `find_residuals`), m s-2
+        # m s-2: J qacc after `multiply`; less the reference after `subtract_references`; less R times
+        # what is held, too, in Newton's method, and in `find_forces`, which adds the shift to normals
         ("residual", _f8),
         ("force", _f8),  # as found, N
         ("limit", _f8),  # the most that a dry joint bears, N or N m

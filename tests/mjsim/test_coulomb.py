@@ -454,10 +454,9 @@ def test_piles_come_to_rest(seeds, rigid):
     from docs.studies import friction
 
     models = [friction.pile(seed, mixed=False) for seed in seeds]
-    plain = [friction.settle(model, friction.Plain(model))[1] for model in models]
-    drift, rise = np.transpose(
-        [friction.settle(model, Coulomb(model, rigid=rigid)) for model in models]
-    )
+    plain = [friction.settle(*friction.start(model))[1] for model in models]
+    law = {"rigid": rigid}
+    drift, rise = np.transpose([friction.settle(*friction.start(m, law=law)) for m in models])
     assert (drift < friction.STILL).sum() >= 0.95 * len(models)
     assert rise.max() <= max(friction.RISES[0], *plain)
 
