@@ -6,8 +6,8 @@
 # make benchmarks the figures of speed, as ratios in one run: writes the tables of docs/records/speed.md
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
-# make check      what CI runs: wheel, docs, lint, types, import contracts and a small league, two at a time; a quick
-#                 validation judged by wrong theories; tests
+# make check      what CI runs: lint, types, import contracts; a quick validation judged by wrong theories; docs, wheel
+#                 and a small league; tests
 # make league     physics engines on exact contact cases: those that have a wheel, Siconos where the system has it
 # make help       this list
 # make lock       resolve the dependencies anew (needs uv)
@@ -62,8 +62,9 @@ wheel: $(VENV)/installed-dev
 
 check:
 	$(MAKE) $(VENV)/installed-dev $(VENV)/installed-engines
-	$(MAKE) -j 2 wheel docs lint league  # a processor each, what takes longest first
-	$(MAKE) verdicts test
+	$(MAKE) -j 2 lint verdicts  # what is compiled here and the report serve all that follows
+	$(MAKE) -j 2 docs wheel league  # a processor each, what takes longest first
+	$(MAKE) test
 
 league: $(VENV)/installed-engines
 	$(BIN)/dualball league --quick --quiet -o $(RESULTS)

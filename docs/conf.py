@@ -65,6 +65,9 @@ highlight_language = "text"
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike", "Array": "Array"}
 suppress_warnings = ["ref.python"]  # two classes of one name in an annotation: neither is linked
 autodoc_member_order = "bysource"
+toc_object_entries = (
+    False  # a page lists its modules; with all they have a build takes half as long again
+)
 autodoc_mock_imports = [
     "dartpy",
     "mujoco_warp",
