@@ -6,8 +6,8 @@
 # make benchmarks the figures of speed, as ratios in one run: writes the tables of docs/records/speed.md
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
-# make check      what CI runs: lint, types, import contracts; a quick validation judged by wrong theories; docs, wheel
-#                 and a small league; tests
+# make check      what CI runs: wheel, lint, types, import contracts; a quick validation; docs, a small league and what
+#                 wrong theories show; tests
 # make league     physics engines on exact contact cases: those that have a wheel, Siconos where the system has it
 # make help       this list
 # make lock       resolve the dependencies anew (needs uv)
@@ -17,7 +17,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 RESULTS ?= results
 
-.PHONY: help validate mutants blind verdicts league test test-all benchmarks docs wheel check lint lock clean
+.PHONY: help validate mutants blind verdicts measured trial league test test-all benchmarks docs wheel check ready lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
@@ -44,8 +44,14 @@ benchmarks: $(VENV)/installed-dev
 	$(BIN)/python -m docs.studies.speed docs/records/speed.md
 	$(BIN)/python -m docs.studies.costs docs/records/speed.md
 
-verdicts: $(VENV)/installed
+verdicts:
+	$(MAKE) measured
+	$(MAKE) trial
+
+measured: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)
+
+trial: $(VENV)/installed
 	$(BIN)/python -m tests.mutants $(RESULTS) --least 0.95
 
 lint: $(VENV)/installed-dev
@@ -57,14 +63,17 @@ lint: $(VENV)/installed-dev
 docs: $(VENV)/installed-dev
 	$(BIN)/sphinx-build -q -W --keep-going docs docs/_build/html
 
-wheel: $(VENV)/installed-dev
-	.ci/wheel $(VENV)
+wheel:
+	.ci/wheel $(PYTHON)
 
 check:
-	$(MAKE) $(VENV)/installed-dev $(VENV)/installed-engines
-	$(MAKE) -j 2 lint verdicts  # what is compiled here and the report serve all that follows
-	$(MAKE) -j 2 docs wheel league  # a processor each, what takes longest first
+	$(MAKE) -j 2 wheel ready
+	$(MAKE) measured  # with a process for each processor; compiles what the others then load
+	$(MAKE) -j 2 docs league trial
 	$(MAKE) test
+
+ready:
+	$(MAKE) -j 1 $(VENV)/installed-dev $(VENV)/installed-engines lint
 
 league: $(VENV)/installed-engines
 	$(BIN)/dualball league --quick --quiet -o $(RESULTS)
