@@ -1,22 +1,16 @@
-"""Settings of MuJoCo's contact model, and the theory of what they do to a ball that slides and
-rolls.
+"""Settings of MuJoCo's own contacts, and the theory of what they do to a ball that slides and rolls.
 
 Force f and acceleration a of a row obey ``a + R f = a_ref`` inside the friction cone, with ``R = (1
 - d)/d A`` of the inverse mass A and the impedance d (`solimp`), ``R_t = R / impratio`` in friction
 rows, and
 
-    normal row:    a_ref = -b v - k (gap - margin),   b = 2/(d tc),   k = 1/(d tc^2 dr^2),   solref
-    = (tc, dr) friction rows: a_ref = -b_f v,                    b_f = 2/(d tc_f),
-    solreffriction = tc_f
+    normal row:    a_ref = -b v - k gap,   b = 2/(d tc),   k = 1/(d tc^2 dr^2),   solref = (tc, dr)
+    friction rows: a_ref = -b_f v,         b_f = 2/(d tc_f),                 solreffriction = tc_f
 
 On the cone, slip lifts the contact: with ``w = a - a_ref + R_t f`` of the friction rows, in steady
-motion
-
-    k (margin - gap) = R f - mu |w|,   |w| = b_f v_slip (with memory),   b_f v_slip - mu R_t f
-    (without).
-
-Without memory, which takes ``mu |w|`` away (`corrections`), sliding is continuous only while ``mu
-|w| < R f``: beyond, the contact switches on and off from step to step."""
+motion ``-k gap = R f - mu |w|``, ``|w| = b_f v_slip - mu R_t f``. So sliding is continuous only while
+``mu |w| < R f``: beyond, the contact switches on and off from step to step.
+"""
 
 from __future__ import annotations
 
@@ -30,20 +24,20 @@ import numpy as np
 import numpy.typing as npt
 
 from model import InputError, Parameters
-from model.arrays import Array, Real
+from model.arrays import Array
 from model.errors import check_type
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
+from model.parameters import POSITIVE, Range, check_choice, check_names, check_number
 
-FORESEEN = 0.01
-"""Share of a force to which a step knows what rigid contacts slip: a fifth of `Law.share` of
-mjsim.coulomb, by a test. (A fifth was chosen after the slip of a rolling ball had been seen, which
-is a tenth of that.)"""
+FORESEEN, YIELDS = 2e-3, 1e-5
+"""Slip of rigid contacts that roll, divided by what their friction force makes in a step: in motion
+at most twice, and once all is steady a hundredth of `Law.softness` of mjsim.coulomb. (Both were
+chosen after slips of a rolling ball had been seen.)"""
+LANDING_PARTS = 16
+"""Into how many parts a step is divided in which a ball with rigid contacts lands: a blow falls into
+one of them."""
 _LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
 """`contact_decay` beyond which contacts are made slower; and `solref` with its time in steps, the
 fastest first: stable up to mu eta = 1.03, 2.1, 5 and 9."""
-_FALL = 0.01
-"""Distance fallen in a step from which a contact is an impact, in units of the gap that counts as
-touching."""
 
 
 def _number(default: float, unit: str, allowed: Range) -> Any:
@@ -58,13 +52,16 @@ def _choice(*known: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSettings:
-    """How MuJoCo is set; names are its own where it has one. The defaults belong to a step of 1 ms.
+    """How contacts are set; names are MuJoCo's own where it has one. The defaults of its own contacts
+    belong to a step of 1 ms.
 
     Raises `InputError` if a value is outside what the engine can do or would be unstable.
     """
 
     timestep: float = _number(1e-3, "s", POSITIVE)
     """Time step, s."""
+    rigid: bool = _choice(True, False)
+    """Whether contacts are rigid and obey `mjsim.Coulomb`: nothing below decides anything, then."""
     solref: tuple[float, float] = (2e-3, 0.5)
     """Time constant (s) and damping ratio of the normal rows; `suited` makes them slower where
     friction asks for it."""
@@ -74,19 +71,6 @@ class ContactSettings:
     """Impedance d, one value at every depth."""
     impratio: float = _number(3e3, "1", Range(0.1, 1e7))
     """How much stiffer the friction rows are than the normal row; beyond 1e7 the solver fails."""
-    memory: bool = True
-    """Whether the friction force of the last step shifts the surface velocity, so that rolling
-    doesn't creep, and slip is kept from lifting contacts: what `mjsim.Coulomb` does in any
-    model."""
-    servo: float = _number(0.01, "s", NOT_NEGATIVE)
-    """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
-    order: int = _choice(2, 1)
-    """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by
-    itself."""
-    rigid: bool = False
-    """Whether the ball is free and its contacts obey `mjsim.Coulomb`, for which no parameter of
-    soft ones decides anything; else azimuth, radius and height are joints, and the wall a plane
-    that is turned to the ball."""
     cone: str = _choice("elliptic", "pyramidal")
     integrator: str = _choice("Euler", "implicit", "implicitfast", "discrete")
     noslip_iterations: int = _number(0, "1", Range(0, whole=True))
@@ -108,23 +92,14 @@ class ContactSettings:
                 )
             elif "known" in field.metadata:
                 check_choice(field.name, getattr(self, field.name), field.metadata["known"])
-        if self.rigid and (self.memory or self.servo or self.order == 2):
-            raise InputError("rigid contacts need memory = False, servo = 0, order = 1")
         if self.rigid and (self.noslip_iterations or self.integrator == "discrete"):
             raise InputError(
                 "rigid contacts need noslip_iterations = 0 and another integrator than 'discrete'"
             )
-        if self.memory and self.cone == "pyramidal":
-            raise InputError(
-                "cone = 'pyramidal' needs memory = False: rows of the pyramid mix normal and "
-                "friction"
-            )
         if self.timestep > self.largest_timestep * (1 + 1e-12):
             raise InputError(
                 f"timestep = {self.timestep:g} s is too large for the contact settings: solref "
-                f"{self.solref[0]:g} s, "
-                f"solreffriction {self.solreffriction:g} s and servo {self.servo:g} s allow at "
-                f"most "
+                f"{self.solref[0]:g} s and solreffriction {self.solreffriction:g} s allow at most "
                 f"{self.largest_timestep:g} s"
             )
 
@@ -133,11 +108,9 @@ class ContactSettings:
         """Largest stable time step, s.
 
         The normal rows need tc >= 2 h (else the engine silently replaces tc), the friction rows b_f
-        h <= 1 to die out without changing sign, and the servo must be slower than a step."""
-        if self.rigid:
-            return math.inf
-        limits = [self.solref[0] / 2, self.solreffriction * self.solimp / 2]
-        return min(limits + ([self.servo] if self.servo else []))
+        h <= 1 to die out without changing sign."""
+        own = min(self.solref[0] / 2, self.solreffriction * self.solimp / 2)
+        return math.inf if self.rigid else own
 
     @property
     def b_f(self) -> float:
@@ -155,54 +128,30 @@ class ContactSettings:
         from `solimp`."""
         return (1 - self.solimp) / self.solimp
 
-    def margin(self, load: Real) -> Real:
-        """Margin that leaves no gap at a contact under a steady load (force divided by mass, m
-        s-2), m.
-
-        Without a margin it is how deep the ball sinks; slip that lifts the contact is left out."""
-        return self.softness * load / self.k
-
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
-        """The hover number mu |w| / (R f): a sliding contact without memory stays closed below 1;
-        needs `load` > 0."""
-        kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
-        return friction * max(0.0, self.b_f * slip_speed - kept) / (self.softness * load)
+        """The hover number mu |w| / (R f): a sliding contact stays closed below 1; needs `load` > 0.
 
-    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) up to which regularised friction stays below a force of m times
-        `load`: R_t f_t / b_f.
+        What R_t takes off |w| is left out, to be on the safe side."""
+        return friction * self.b_f * slip_speed / (self.softness * load)
 
-        Of rigid contacts it is what a step changes by a share `FORESEEN` of the force: so well they
-        know their slip."""
-        time = FORESEEN * self.timestep if self.rigid else self.softness / self.impratio / self.b_f
+    def creep_speed(self, load: npt.ArrayLike) -> Array:
+        """Slip speed (m s-1) of a contact that rolls steadily, under a friction force of m times
+        `load`.
+
+        Soft ones creep at R_t f_t / b_f. Of rigid ones it is what a step changes by a share `YIELDS`
+        of the force."""
+        time = YIELDS * self.timestep if self.rigid else self.softness / self.impratio / self.b_f
         return np.asarray(time * np.asarray(load, dtype=float))
 
     def dead_band(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) below which a contact counts as rolling, for a friction force of m
         times `load`."""
-        return self.regularisation_speed(load) * (
-            1.0 if self.rigid else 1e-3 if self.memory else 0.4
-        )
-
-    def creep_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) of a rolling contact's creep under a friction force of m times `load`;
-        0 with memory.
-
-        Rigid contacts may slip so fast where two of them hold a ball by forces that the balances
-        leave open."""
-        return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)
+        return self.creep_speed(load) * (FORESEEN / YIELDS if self.rigid else 0.4)
 
     @property
     def midpoint(self) -> float:
         """Where in a step the forces are taken, in steps after its beginning."""
-        return 0.5 if self.order == 2 else 0.0
-
-    @property
-    def friction_lag(self) -> float:
-        """When the slip occurs that MuJoCo's friction alone opposes, in steps after mid step:
-        1/(b_f h) - 1/2, or 0."""
-        corrected = self.order == 2 and self.cone == "elliptic"
-        return 1 / (self.b_f * self.timestep) - 0.5 if corrected else 0.0
+        return 0.5 if self.rigid else 0.0
 
     def contact_decay(self, mu: float, eta: float) -> float:
         """Largest factor by which a small displacement changes in a step, where a ball slips at
@@ -219,18 +168,15 @@ class ContactSettings:
             np.abs(np.roots([1, pull * (damping + stiffness) - 2, 1 - pull * damping])).max()
         )
 
+    def depth(self, load: float) -> float:
+        """How deep the ball sinks under a steady load (force divided by mass, m s-2) while it rolls,
+        m; slip lifts it."""
+        return 0.0 if self.rigid else self.softness * load / self.k
+
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching: twice the depth to which
         gravity presses it."""
-        return 0.0 if self.rigid else 2 * float(self.margin(g))
-
-    def slowest_fall(self, g: float) -> float:
-        """Speed (m s-1) from which on a ball comes down with an impact; below, the contacts stop it
-        softly.
-
-        In a step it falls by a hundredth of the gap that counts as touching. Without servo there
-        are no impacts."""
-        return _FALL * self.touching(g) / self.timestep if self.servo else math.inf
+        return 2 * self.depth(g)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
@@ -244,26 +190,11 @@ class ContactSettings:
 
     @classmethod
     def at(cls, timestep: float, **changes: Any) -> Self:
-        """The defaults with their times scaled to another step, and the given changes."""
+        """The defaults for another step, to which their times are scaled, and the given changes."""
         check_number("timestep", timestep, "s", POSITIVE)
         scale, (time, ratio) = timestep / 1e-3, cls.solref
         scaled = {"solref": (time * scale, ratio), "solreffriction": cls.solreffriction * scale}
-        return cls.from_mapping(
-            {"timestep": timestep, "servo": cls.servo * scale} | scaled | changes
-        )
-
-    @classmethod
-    def rigid_at(cls, timestep: float) -> Self:
-        """Rigid contacts of a free ball, for a step of any length."""
-        return cls(
-            timestep=timestep,
-            rigid=True,
-            solimp=0.9,
-            impratio=1.0,
-            servo=0.0,
-            memory=False,
-            order=1,
-        )
+        return cls.from_mapping({"timestep": timestep} | scaled | changes)
 
     def suited(self, p: Parameters) -> Self:
         """These settings, with slower contacts where friction between floor and wall would make the
@@ -284,8 +215,8 @@ class ContactSettings:
         max_slip_speed: float | None = None,
         **changes: Any,
     ) -> Self:
-        """Settings with which contacts of this ball that slide stay closed instead of hovering,
-        with a reserve.
+        """MuJoCo's own contacts, so set that those of this ball which slide stay closed instead of
+        hovering, with a reserve.
 
         `max_slip_speed` (m s-1) is the fastest slip to expect under the load of gravity; by default
         that of the fluid, R omega_0. The impedance is lowered, where need be, until the hover
@@ -293,7 +224,7 @@ class ContactSettings:
         its own), and impratio is raised with the softness, so that that of the friction rows stays
         the same. The engine's least impedance, 1e-4, may stop that short."""
         check_type("p", p, Parameters)
-        settings = cls.at(timestep, **changes)
+        settings = cls.at(timestep, rigid=False, **changes)
         if "solref" not in changes:
             settings = settings.suited(p)
         speed = abs(p.R * p.omega_0) if max_slip_speed is None else max_slip_speed

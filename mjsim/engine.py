@@ -18,7 +18,7 @@ import numpy.typing as npt
 from mjsim import recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, resistance
+from mjsim.mid_step import Ball, resistance
 from model import (
     Events,
     Flow,
@@ -54,7 +54,7 @@ class Run:
     p : parameters; its omega_0 is used if there is no `flow`
     x0 : state (19) at the start, 6 entries, or 8 with h and v_h
     t_end : duration, s
-    settings : `ContactSettings.for_problem` if None
+    settings : rigid contacts under Coulomb's law if None, in steps of 1 ms
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
     state : `state()` of an earlier process, from which to go on
@@ -86,10 +86,7 @@ class Run:
         check_type("p", p, Parameters)
         check_type("flow", flow, Flow | None)
         check_type("settings", settings, ContactSettings | None)
-        self._flow, self._settings = (
-            flow or Flow.steady(p.omega_0),
-            settings or ContactSettings.for_problem(p),
-        )
+        self._flow, self._settings = flow or Flow.steady(p.omega_0), settings or ContactSettings()
         self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
         self._state, self._progress = state, progress or (lambda done: None)
         self._timestep = self._settings.timestep
@@ -115,19 +112,18 @@ class Run:
         return self._classifier.events(self._end)
 
     def __iter__(self) -> Iterator[npt.NDArray[np.void]]:
-        from mjsim import free, stepping  # here, because the law takes long to load, compiled
+        from mjsim.stepping import JointedBall  # here, because the law takes long to load, compiled
 
-        begin = free.FreeBall if self._settings.rigid else stepping.JointedBall
-        self.ball = ball = begin(self._model, self._p, self._settings, self._x0, self._theta_0)
+        given = self._model, self._p, self._settings, self._x0, self._theta_0
+        self.ball = ball = JointedBall(*given)
         self._step, self._waiting = 0, np.empty((0, recorder.COLUMNS))
         if self._state:
             self._step, self._waiting = int(self._state["step"]), self._state["waiting"]
             ball.restore(self._state)
             self._classifier.restore(self._state)
         noted, steps = np.empty((NOTED, recorder.COLUMNS)), (self._count - 1) * self._interval + 1
-        while (
-            self._step < steps and not self.header.failure
-        ):  # nothing is needed of steps after the last sample
+        # nothing is needed of steps after the last sample
+        while self._step < steps and not self.header.failure:
             rows = noted[: steps - self._step]
             ball.advance(
                 self._flow((self._step + np.arange(len(rows)) + 0.5) * self._timestep), rows
@@ -169,18 +165,15 @@ class Run:
         block["case"] = self._classifier.cases(samples[:count] * self._interval)
         if count < len(raw):
             self._end = end = float(time[count])
-            left = [
-                f"{x} = {block[x][-1]:.6g} {unit}"
-                for x, unit in zip(VARIABLES, UNITS, strict=True)
-                if count
-            ]
+            named = zip(VARIABLES, UNITS, strict=True)
+            left = [f"{x} = {block[x][-1]:.6g} {unit}" for x, unit in named if count]
             failure = f"diverged by t = {end:g} s{', after ' * bool(left)}{', '.join(left)}"
             self.header = dataclasses.replace(self.header, failure=failure)
         return block
 
 
 def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
-    """`check_place`, and a warning if friction at both contacts makes them chatter."""
+    """`check_place`, and a warning if friction at both contacts makes soft ones chatter."""
     if settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
             f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters "
@@ -193,7 +186,7 @@ def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
 
 def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float, x0: State) -> None:
     """`time_scales.check_timestep` with the drag of these engines."""
-    ball = Ball.of(p, ContactSettings())
+    ball = Ball.of(p)
     time_scales.check_timestep(
         timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m, x0
     )
@@ -204,13 +197,8 @@ def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tu
     t_end = check_number("t_end", t_end, "s", Range(timestep), "to hold a time step it")
     if sample_interval is None:
         sample_interval = max(t_end / 1000, timestep)
-    check_number(
-        "sample_interval",
-        sample_interval,
-        "s",
-        Range(timestep * (1 - 1e-9)),
-        "to hold a time step it",
-    )
+    least = Range(timestep * (1 - 1e-9))
+    check_number("sample_interval", sample_interval, "s", least, "to hold a time step it")
     steps = max(1, round(sample_interval / timestep))
     return steps, math.floor(t_end / (steps * timestep) + 1e-9) + 1
 
@@ -254,10 +242,10 @@ def simulate_many(
     """Simulate many runs, in this process; arguments as of `Run`, parameters and starts one for
     each.
 
-    `flow` is one for all, one for each, or None for each one's own omega_0; settings, if None, are
-    the softest that any of the runs asks for. `threads` of them go on at once; None is a thread for
-    each processor that has `RUNS_A_THREAD` of them. Results are the same to the bit whatever the
-    number. A run that breaks down has a header that says so; the others go on.
+    `flow` is one for all, one for each, or None for each one's own omega_0. `threads` of them go on
+    at once; None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the
+    same to the bit whatever the number. A run that breaks down has a header that says so; the others
+    go on.
 
     Raises
     ------
@@ -275,8 +263,6 @@ def simulate_many(
     if threads is None:
         threads = max(1, min(os.cpu_count() or 1, len(flows) // RUNS_A_THREAD))
     threads = int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True)))
-    if settings is None:
-        settings = min((ContactSettings.for_problem(p) for p in parameters), key=lambda s: s.solimp)
     done, over = np.zeros(len(flows)), threading.Event()
 
     def report(run: int, fraction: float) -> None:

@@ -95,10 +95,10 @@ def samples(time: Array, rows: Array, lead: float, p: Parameters) -> npt.NDArray
         gap, speed, touches = (
             block[f"gap_{contact}"],
             block[f"slip_speed_{contact}"],
-            sensor[:, _COUNT] > 0,
+            sensor[:, _FORCE.start] > 0,
         )
         block[f"force_{contact}"] = loads[:, k]
-        # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
+        # Of a contact that bears nothing the coordinates say how far it is, and how fast.
         gap[touches] = sensor[touches, _DIST]
         speed[touches] = np.hypot(*sensor[touches, _SLIP].T)
     return block

@@ -13,8 +13,6 @@ from mjsim.contact_settings import ContactSettings
 from model import InputError, Parameters
 
 SCENE = Path(__file__).with_name("scene.xml")
-_HEAVY = 1e6
-"""Mass of a wall that moves, divided by that of the ball."""
 
 
 def spec(p: Parameters, settings: ContactSettings) -> Any:
@@ -24,6 +22,8 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     option.gravity = (0.0, 0.0, -p.g)
     for name in ("timestep", "impratio", "noslip_iterations"):
         setattr(option, name, getattr(settings, name))
+    if settings.rigid:  # stiffer friction takes more iterations, softer friction creeps more
+        option.impratio = 1e3
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     body.pos, body.mass, body.inertia = (p.R, 0.0, p.r), p.m, (p.j * p.m * p.r**2,) * 3
@@ -48,25 +48,6 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         pair.solreffriction = (settings.solreffriction, 1.0)
         pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
         pair.margin = pair.gap = 0.0
-    if settings.rigid:
-        for name in ("azimuth", "inward", "upward", "spin"):
-            spec.delete(spec.joint(name))
-        body.add_freejoint(name="free")
-        # The wall is the face of a block that goes with the ball, so heavy that it isn't moved.
-        option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
-        half, (box, slide) = 4 * p.R, (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtJoint.mjJNT_SLIDE)
-        moving = spec.worldbody.add_body(name="wall", explicitinertial=True)
-        moving.mass, moving.inertia = (
-            p.m / _HEAVY,
-            body.inertia,
-        )  # it doesn't turn: of any ball that MuJoCo takes
-        for axis in ([-1, 0, 0], [0, 1, 0], [0, 0, 1]):  # inwards, onwards, up
-            moving.add_joint(type=slide, axis=axis, armature=_HEAVY * p.m)
-        rgba = list(wall.rgba)
-        spec.delete(wall)
-        moving.ipos = centre = (p.R + p.r + half, 0, 0)
-        part = moving.add_geom(name="wall", type=box, size=[half] * 3, pos=centre, rgba=rgba)
-        part.contype, part.conaffinity = 0, 0
     return spec
 
 
@@ -100,10 +81,4 @@ def _compiled(p: Parameters, settings: ContactSettings, shown: bool) -> tuple[An
         raise InputError(
             f"MuJoCo cannot compile the scene: {' '.join(str(error).split())}"
         ) from error
-    # Without any in the scene, the engine looks at surface velocities and adhesion only if these
-    # flags say so.
-    model.flg_surfacevel, model.flg_adhesion = (
-        settings.memory or settings.friction_lag != 0,
-        settings.memory,
-    )
     return model, text

@@ -1,171 +1,189 @@
-"""Balls on joints along the paper's coordinates, and the loop round MuJoCo's step.
+"""The ball on joints along the paper's coordinates, and the loop round MuJoCo's step.
 
-Before each step the wall is turned to be tangent at the ball's azimuth, the margins follow the
-gaps, and `mjsim.corrections` says what drives the step. The body axes of a homogeneous ball are
-arbitrary: they are set upright, so that forces and velocities of the ball's joint are along the
-paper's axes. Positions are kept half a step ahead of velocities (leapfrog). Contacts are in the
-order A, B.
-
-A ball that lands in a step, or comes near the axis, where polar coordinates end, takes it as
-`mjsim.free` says; so it does the first one, which finds the margins and forces that belong to the
-start."""
+Before a step the wall is turned to be tangent at the ball's azimuth, and drag and inertia are
+those in its middle (`mjsim.mid_step`). All else is MuJoCo's: plain, or with rigid contacts under
+`mjsim.Coulomb`, the law for any model. Under that semi-implicit steps are leapfrog, places half a
+step ahead of velocities, and contacts are in sight long before they close, so that they need no
+depth. The ball's axes are left to turn: set upright, contacts would seem to be fixed on it.
+"""
 
 from __future__ import annotations
 
-import functools
+import contextlib
 import math
+from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from mjsim import recorder
-from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Velocity, corrections, lands, near_axis
+from mjsim.contact_settings import LANDING_PARTS, ContactSettings
+from mjsim.coulomb import Coulomb
 from mjsim.coulomb.compiling import entry
-from mjsim.coulomb.engine import mj_step
-from mjsim.free import Fine
-from mjsim.recorder import COORDINATES, HUGE, NORMALS, NSENSOR, SENSORS
+from mjsim.coulomb.engine import mj_step, models
+from mjsim.mid_step import Ball, Velocity, mid_step_forces
+from mjsim.recorder import COORDINATES, NSENSOR, SENSORS
 from model import Parameters, State
 from model.arrays import Array
 
-_CHANGE = 0.5
-"""Most that contact forces may change in a step before the ball goes on upon its joints, in units
-of what the largest force, at least that of gravity and the wall's friction, does as the ball goes
-round."""
-NOT, LANDS, GOES_ON, BEGINS = range(4)
-"""Whether a ball takes the next step in fine ones: not; as it lands; in the shortest, as it did the
-last one; or in these as the first of all, without a blow, after which it goes on upon its joints
-however forces change."""
-_DUE, _HELD = 0, 1
-_NORMAL_A, _NORMAL_B = range(NSENSOR)[NORMALS]
-"""Where sensors have the normal forces."""
+_NEAR, _PART, _MOST = 32.0, 0.25, 1024
+"""Steps to the axis below which they are shorter, where it is nearer than that part of R; into how
+many parts, at most, a step is divided."""
+_CHANGE = 0.1
+"""Part of the weight: as long as a contact force changes by more in a step, those after a landing are
+divided, too. (Chosen after balls that hop had been seen.)"""
+SHARE = 1e-5
+"""`share` of the law: to that part of gravity a step knows beforehand what contacts bear."""
+_NORMAL_A, _NORMAL_B = range(NSENSOR)[recorder.NORMALS]
+_INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class Joints(NamedTuple):
-    """A ball on its joints: what the engine has in its memory, and from `last` on what is ours."""
+    """A ball on its joints: what the engine has in its memory, and what is ours."""
 
     qpos: Any
     qvel: Any
-    start: Any
-    """Accelerations from which the solver starts."""
-    margins: Any
-    """Of the contacts, m."""
-    contact: Any
-    """Generalised forces of the contacts: the second to the fifth are inward, upward, moments about
-    x and y."""
-    sensors: Any
     applied: Any
-    adhesion: Any
-    """By how much the engine tells that contacts bear less than they do, N."""
-    turn: Any
-    """Quaternion of floor and wall;"""
-    floor: Any
-    wall: Any
-    """and their surface velocities, m s-1."""
+    sensors: Any
+    tangent: Any
+    """Quaternion of floor and wall."""
+    margins: Any
+    """Gaps at which contacts are in sight, m."""
     last: Any
-    """Velocities a step ago."""
-    forces: Any
-    """Generalised forces of the contacts in the last step (6), N and N m, and normal ones (2),
-    N."""
-    marks: Any
-    """Whether the next step is due to be taken in fine ones, and whether the last one was, with its
-    forces held."""
+    """Velocities along the paper's axes a step ago."""
+    landing: Any
+    """Normal forces at A and B a step ago, N; whether the last step was divided for a landing."""
+    weight: float
+    """N"""
     ball: Ball
-    served: Any
-    """Addresses of the engine's model and data."""
+    ahead: float
+    """Steps by which places, and forces, are ahead of velocities."""
+    step: float
+    """The time step, s."""
+    model: int
+    data: int
+    """Addresses in the engine."""
 
 
-def seen_forces(body: Joints) -> None:
-    """Copy the contact forces of the last step from the engine, unless that step was taken in fine
-    ones."""
-    if body.marks[_HELD] == 0:
-        for i in range(6):
-            body.forces[i] = body.contact[i]
-        body.forces[6] = body.sensors[_NORMAL_A] + body.adhesion[0]
-        body.forces[7] = body.sensors[_NORMAL_B] + body.adhesion[1]
-
-
-def drive(omega_0: float, row: Any, body: Joints) -> None:
-    """Let the margins follow the gaps and set what drives the next step; say if the ball is due to
-    land in it.
-
-    Place and velocities are noted in the row.
-    """
-    qpos, forces, margins, applied, ball = (
-        body.qpos,
-        body.forces,
-        body.margins,
-        body.applied,
-        body.ball,
+def spin_axes(turned: Any) -> tuple[tuple[float, float, float], ...]:
+    """The ball's axes along the paper's, as the rows of a matrix, from a quaternion."""
+    w, a, b, c = float(turned[0]), float(turned[1]), float(turned[2]), float(turned[3])
+    return (
+        (w * w + a * a - b * b - c * c, 2 * (a * b - w * c), 2 * (a * c + w * b)),
+        (2 * (a * b + w * c), w * w - a * a + b * b - c * c, 2 * (b * c - w * a)),
+        (2 * (a * c - w * b), 2 * (b * c + w * a), w * w - a * a - b * b + c * c),
     )
-    seen_forces(body)
-    v, before = velocity_of(body.qvel), velocity_of(body.last)
-    theta, h, y = float(qpos[0]), float(qpos[1]), float(qpos[2])
-    given = float(forces[1]), float(forces[2]), float(forces[3]), float(forces[4])
-    loads = float(forces[6]), float(forces[7])
-    if body.marks[_DUE] == NOT and loads[0] * loads[1] == 0:
-        floor = loads[0] == 0 and lands(y, v.v_y, before.v_y, ball)
-        if floor or (
-            loads[1] == 0 and (lands(h, v.v_h, before.v_h, ball) or near_axis(ball.R - h, v, ball))
-        ):
-            body.marks[_DUE] = LANDS
-    if (
-        ball.gain > 0
-    ):  # a ball that sinks in rolls on a shorter lever: its contact point lies midway in the overlap
-        margins[0], margins[1] = (
-            max(0.0, margins[0] - ball.gain * y),
-            max(0.0, margins[1] - ball.gain * h),
-        )
-    body.turn[0], body.turn[3] = math.cos(theta / 2), math.sin(theta / 2)
-    qpos[3], qpos[4], qpos[5], qpos[6] = 1.0, 0.0, 0.0, 0.0
-    driving, surfaces, (lift_A, lift_B) = corrections(
-        v, before, ball.R - h, omega_0, given, loads, ball
-    )
-    for i in range(COORDINATES):
-        row[i] = qpos[i]
+
+
+def velocity_of(body: Joints) -> Velocity:
+    """The velocities of the joints, the spin's along the paper's axes."""
+    v, (x, y, z) = body.qvel, spin_axes(body.qpos[3:])
+    a, b, c = float(v[3]), float(v[4]), float(v[5])
+    return Velocity(
+        float(v[0]), float(v[1]), float(v[2]),
+        x[0] * a + x[1] * b + x[2] * c, y[0] * a + y[1] * b + y[2] * c, z[0] * a + z[1] * b + z[2] * c,
+    )  # fmt: skip
+
+
+def lands(body: Joints) -> bool:
+    """Whether the ball comes to touch floor or wall in the next step, faster than by the fall of a
+    part of it; or has done so, and contact forces still change. Notes these."""
+    slowest = body.weight / body.ball.mass * body.step / LANDING_PARTS
+    lands, changes = False, False
+    for k, i, normal in ((0, 2, _NORMAL_A), (1, 1, _NORMAL_B)):
+        v, load = body.qvel[i], body.sensors[normal]
+        way = body.step * (2 * v - body.last[i])  # if it goes on as in the last step
+        lands |= load == 0 and v < -slowest and body.qpos[i] + way < 0
+        changes |= abs(load - body.landing[k]) > _CHANGE * body.weight
+        body.landing[k] = load
+    lands |= changes and body.landing[2] > 0
+    lands &= body.ahead > 0
+    body.landing[2] = 1.0 if lands else 0.0
+    return lands
+
+
+def stop_landing(body: Joints) -> None:
+    """Stop a ball where it touches floor or wall, if it would overlap what it didn't touch in the
+    last step, so that one step has all of the blow."""
+    for i, normal in ((1, _NORMAL_B), (2, _NORMAL_A)):
+        if body.ahead > 0 and body.qpos[i] < 0 and body.sensors[normal] == 0:
+            body.qpos[i] = 0.0
+
+
+def take_step(body: Joints, step: float, omega_0: float) -> None:
+    """Take a step of so many seconds."""
+    qpos, applied, last, v = body.qpos, body.applied, body.last, velocity_of(body)
+    stop_landing(body)
+    before = Velocity(last[0], last[1], last[2], last[3], last[4], last[5])
+    body.tangent[0], body.tangent[3] = math.cos(qpos[0] / 2), math.sin(qpos[0] / 2)
+    rho = body.ball.R - float(qpos[1])
+    force = mid_step_forces(v, before, rho, omega_0, body.ahead, step, body.ball)
+    x, y, z = spin_axes(qpos[3:])
+    for i in range(3):
+        applied[i] = force[i]
+        applied[3 + i] = x[i] * force[3] + y[i] * force[4] + z[i] * force[5]
+    falls_on_A = v.v_y < 0 and body.sensors[_NORMAL_A] == 0
+    falls_on_B = v.v_h < 0 and body.sensors[_NORMAL_B] == 0
+    mj_step(body.model, body.data)
+    if (falls_on_A and body.sensors[_NORMAL_A] > 0) or (falls_on_B and body.sensors[_NORMAL_B] > 0):
+        v = velocity_of(body)  # of a blow nothing is extrapolated
     for i in range(6):
-        row[COORDINATES + i], applied[i] = body.qvel[i], driving[i]
-    body.floor[0], body.floor[1], body.wall[0], body.wall[1] = surfaces
-    # Adhesion of a contact adds R times itself to the reference acceleration of its normal row, and
-    # pulls the body by as much. With the pull taken back, minus what slip would take from the
-    # contact leaves De Saxce's share.
-    lift_A, lift_B = lift_A * (y < margins[0]), lift_B * (h < margins[1])
-    body.adhesion[0], body.adhesion[1] = -lift_A, -lift_B
-    applied[1] -= lift_B
-    applied[2] -= lift_A
+        last[i] = v[i]
 
 
-def velocity_of(v: Any) -> Velocity:
-    """The velocities of the six joints by name, from an array (6)."""
-    return Velocity(float(v[0]), float(v[1]), float(v[2]), float(v[3]), float(v[4]), float(v[5]))
+def change_step(body: Joints, old: float, new: float) -> None:
+    """Go on in steps of another length, s: places stay ahead by the same part of a step, and margins
+    are what a fall makes in one."""
+    v = velocity_of(body)
+    for i in range(COORDINATES):
+        body.qpos[i] += body.ahead * (new - old) * body.qvel[i]
+    for i in range(6):
+        body.last[i] = v[i] - new / old * (v[i] - body.last[i])
+    for i in range(len(body.margins)):
+        body.margins[i] *= (new / old) ** 2
+    models(body.model, 1)[0].opt.timestep = new
+
+
+def parts(body: Joints) -> int:
+    """In how many steps one is divided: a power of two, so that the ball has `_NEAR` of them to go
+    to the axis; `LANDING_PARTS` where it lands; else 1."""
+    rho, v_h = body.ball.R - float(body.qpos[1]), float(body.qvel[1])
+    along = rho * float(body.qvel[0])
+    way, speed, count = 0.0, math.hypot(v_h, along), LANDING_PARTS if lands(body) else 1
+    if rho < _PART * body.ball.R:
+        way = _NEAR * body.step * speed
+    nearest = max(rho - body.step * speed, rho * abs(along) / max(speed, 1e-300))
+    while count * nearest < way and count <= _MOST:
+        count *= 2
+    return count
 
 
 @entry
-def up_to_landing(body: Joints, fluid: Array, rows: Array, done: int) -> int:
-    """Take a step for each omega_0 from number `done` on, up to one with a landing: the number of
-    that.
+def advance(body: Joints, fluid: Array, rows: Array) -> None:
+    """Take a step for each omega_0, noted in rows (steps, `COLUMNS`).
 
-    Steps are noted in rows (steps, `COLUMNS`); a ball that has diverged takes none."""
-    while done < len(fluid):
-        row = rows[done]
-        drive(float(fluid[done]), row, body)
-        if body.marks[_DUE] != NOT:
-            sound = True
-            for i in range(6):
-                sound = sound and abs(body.qpos[i]) < HUGE and abs(body.qvel[i]) < HUGE
-            if sound:
-                return done
+    Place and velocities are those before the step, sensors those in it. All is nan of a ball that
+    has come to the axis, where its coordinates end.
+    """
+    for done in range(len(fluid)):
+        row, v, count = rows[done], velocity_of(body), parts(body)
+        for i in range(COORDINATES):
+            row[i] = body.qpos[i]
         for i in range(6):
-            body.last[i] = body.qvel[i]
-        body.marks[_DUE] = body.marks[_HELD] = 0
-        mj_step(body.served[0], body.served[1])
-        for i in range(NSENSOR):
-            row[SENSORS + i] = body.sensors[i]
-        row[SENSORS + _NORMAL_A] += body.adhesion[0]
-        row[SENSORS + _NORMAL_B] += body.adhesion[1]
-        done += 1
-    return done
+            row[COORDINATES + i] = v[i]
+        if count > _MOST:
+            rows[done:] = math.nan
+            return
+        short = body.step / count
+        if count > 1:
+            change_step(body, body.step, short)
+        for k in range(count):
+            take_step(body, short, float(fluid[done]))
+            for i in range(NSENSOR if k == 0 else 0):
+                row[SENSORS + i] = body.sensors[i]
+        if count > 1:
+            change_step(body, short, body.step)
 
 
 class JointedBall:
@@ -182,85 +200,53 @@ class JointedBall:
         self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float
     ) -> None:
         self.model, self.data = model, mujoco.MjData(model)
-        self._p, self._settings, self._h = p, settings, settings.timestep
-        self.lead = self._h * settings.midpoint
+        self.law = Coulomb(model, rigid=True, depth=0.0, share=SHARE) if settings.rigid else None
+        if settings.rigid:
+            model.pair_margin[:] = p.g * settings.timestep**2
+        self.lead = settings.midpoint * settings.timestep
         """How far places are ahead of velocities, s."""
-        data, (floor, wall) = self.data, (model.geom(name).id for name in ("floor", "wall"))
+        place, v = recorder.joint_state(x, theta_0, p)
+        data = self.data
+        data.qpos[:3], data.qvel[:] = place + self.lead * v[:3], v
         self.body = Joints(
             qpos=data.qpos,
             qvel=data.qvel,
-            start=data.qacc_warmstart,
-            margins=model.pair_margin,
-            contact=data.qfrc_constraint,
-            sensors=data.sensordata,
             applied=data.qfrc_applied,
-            adhesion=model.pair_adhesion,
-            turn=data.mocap_quat[0],
-            floor=model.geom_surfacevel[floor],
-            wall=model.geom_surfacevel[wall],
-            last=np.zeros(6),
-            forces=np.zeros(8),
-            marks=np.zeros(2, np.int8),
-            ball=Ball(*map(float, Ball.of(p, settings))),
-            served=(model._address, data._address),
+            sensors=data.sensordata,
+            tangent=data.mocap_quat[0],
+            margins=model.pair_margin,
+            last=np.array(v, float),
+            landing=np.zeros(3),
+            weight=p.m * p.g,
+            ball=Ball(*map(float, Ball.of(p))),
+            ahead=settings.midpoint,
+            step=settings.timestep,
+            model=model._address,
+            data=data._address,
         )
-        place, v = recorder.joint_state(x, theta_0, p)
-        fall = settings.slowest_fall(p.g)
-        calm = all(
-            speed >= -fall or gap > -self._h * speed for gap, speed in ((x.y, x.v_y), (x.h, x.v_h))
-        )
-        self.body.marks[_DUE] = (BEGINS if calm else LANDS) if settings.servo else NOT
-        self._set(place, v, np.zeros(6))
 
-    @functools.cached_property
-    def _fine(self) -> Fine:
-        """A free ball for steps that are taken in fine ones, made once one is."""
-        return Fine(self._p, self._settings)
-
-    def _set(self, place: Array, v: Array, rates: Array) -> None:
-        """Set place, velocities and accelerations, all at one time, from which to go on; contact
-        forces are kept."""
-        body = self.body
-        body.qvel[:], body.last[:], body.start[:] = v, v - self._h * rates, rates
-        body.qpos[:3] = place + self.lead * (v + rates * self.lead / 2)[:3]
-        body.marks[_HELD] = 1
+    def acting(self) -> AbstractContextManager[None]:
+        """Within this the engine's own steps obey the law, if there is one."""
+        return self.law.acting(self.data) if self.law else contextlib.nullcontext()
 
     def advance(self, fluid: Array, rows: Array) -> None:
-        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`); those in which it lands
-        in fine ones."""
-        p, body, done = self._p, self.body, 0
-        while (done := up_to_landing(body, fluid, rows, done)) < len(fluid):
-            how, v = int(body.marks[_DUE]), body.qvel.copy()
-            rates = (v - body.last) / self._h
-            place = body.qpos[:3] - self.lead * (v + rates * self.lead / 2)[:3]
-            x, theta = recorder.state(place, v, p), float(place[0])
-            step = self._fine.step(x, theta, rates, float(fluid[done]), how != LANDS)
-            place, v, rates, body.forces[:], change, rows[done, SENSORS:] = step
-            near = near_axis(p.R - place[1], Velocity(*v), body.ball) and body.forces[7] == 0
-            pace = max(abs(v[0]), math.sqrt(p.g / p.R))
-            most = max(p.m * (p.g + p.eta * p.R * pace**2), np.abs(body.forces[[1, 2]]).max())
-            fast = change > _CHANGE * self._h * pace * most and how != BEGINS
-            body.marks[_DUE] = (
-                GOES_ON if near or fast else NOT
-            )  # on the joints where forces change slowly
-            self._set(place, v, rates * (not near))
-            if self._settings.servo:  # margins with which contacts bear their forces
-                loads = body.forces[6:] / p.m
-                body.margins[:] = np.maximum(place[:0:-1] + self._settings.margin(loads), 0.0) * (
-                    loads > 0
-                )
-            done += 1
+        """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
+        with self.acting():
+            advance(self.body, fluid, rows)
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next, for `restore`."""
-        seen_forces(self.body)
-        self.body.marks[_HELD] = 1
-        return {name: getattr(self.body, name).copy() for name in _KEPT}
+        kept = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
+        mujoco.mj_getState(self.model, self.data, kept, _INTEGRATION)
+        remembered = self.law.state(self.data) if self.law else {}
+        body = self.body
+        own = {name: getattr(body, name).copy() for name in ("last", "landing", "sensors")}
+        return {"integration": kept} | own | remembered
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from what `state` returned."""
-        for name in _KEPT:
+        mujoco.mj_setState(self.model, self.data, state["integration"], _INTEGRATION)
+        for name in ("last", "landing", "sensors"):
             getattr(self.body, name)[:] = state[name]
-
-
-_KEPT = ("forces", "qvel", "last", "qpos", "margins", "start", "marks")
+        if self.law:
+            self.law.restore(state, self.data)

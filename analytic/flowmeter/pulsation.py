@@ -34,7 +34,7 @@ HARMONICS, FINE = 32, 128
 LAG_STEPS, SOLVED = 50, 1e-9
 """Most steps of Newton's method for it, and the largest residual, divided by the flow's
 acceleration."""
-ROUNDS, DEPTH, SETTLED, PERIODIC_RTOL = 100, 2, 1e-6, 1e-6
+ROUNDS, DEPTH, SETTLED, PERIODIC_RTOL = 100, 3, 1e-6, 1e-6
 """Of `mean_error`: most periods simulated, depth of Anderson's extrapolation, tolerance of the
 change in a period relative to the flow, and the integrator's rtol. The mean is then known to some
 1e-6 of the flow."""

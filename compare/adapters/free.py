@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compare.adapters.scene import FACETS, Scene, Surface, Vector
-from mjsim.world_axes import against
 from model import InputError
 from model.arrays import Array
 from model.kinematics import tangent
@@ -55,6 +54,24 @@ class Library:
         except ImportError as error:
             raise InputError(f"{self.name} can't be imported: {error}") from error
         return copy.copy(engine)
+
+
+def against(
+    place: Any, velocity: Any, spin: Any, ahead: float, R: float, r: float
+) -> tuple[float, float]:
+    """Surface velocity (inwards, up), m/s, that makes a tangent plane act like the cylinder during
+    a step.
+
+    What is at rest against it is so against the cylinder `ahead` s later, when velocities are where
+    the place is now. By then the normal has turned by ahead Omega: of the velocity Omega R along
+    the wall the share ahead Omega will point into the plane; and where ball and wall touch the
+    turning about the normal will show as ahead Omega r o_n of slip. Without the first the ball
+    would lose h Omega^2/2 of its speed a second."""
+    x, y = place[0] - ahead * velocity[0], place[1] - ahead * velocity[1]
+    rho = math.hypot(x, y)
+    out_x, out_y = (x / rho, y / rho) if rho > 0 else (0.0, 0.0)
+    rate = (out_x * velocity[1] - out_y * velocity[0]) / R
+    return ahead * rate * rate * R, -ahead * rate * r * (out_x * spin[0] + out_y * spin[1])
 
 
 class Touch(NamedTuple):
@@ -123,7 +140,7 @@ class Free(ABC):
                     self.push(scene.force(self.now, position, velocity))
                 for radius in radii:
                     azimuth = math.atan2(position[1], position[0])
-                    inwards, _, up = against(position, velocity, spin, half, radius - reach, reach)
+                    inwards, up = against(position, velocity, spin, half, radius - reach, reach)
                     point, normal = tangent(radius, azimuth)
                     point[2] = position[2]
                     self.turn(point, normal, np.append(inwards * normal[:2], up))

@@ -17,9 +17,8 @@ import numpy.typing as npt
 from compare.adapters.free import BreakdownError, Free, Library
 from compare.adapters.scene import Body, Scene, Surface, Vector
 from mjsim.classify import Classifier, Contacts
-from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, resistance
 from mjsim.engine import EVENT_TIMES, check_timestep, sampling
+from mjsim.mid_step import Ball, resistance
 from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.kinematics import Motion, check_place, frame, from_world, to_world
 from model.parameters import POSITIVE, check_number
@@ -73,10 +72,7 @@ class Vessel(Scene):
     @classmethod
     def of(cls, p: Parameters, x: State, flow: Flow) -> Vessel:
         """The scene of a ball with these parameters, which starts at azimuth zero."""
-        ball = Ball.of(
-            p, ContactSettings()
-        )  # for its drag, which has nothing to do with MuJoCo's settings
-        return cls(name="vessel", **scene_fields(p, x), ball=ball, fluid=flow)
+        return cls(name="vessel", **scene_fields(p, x), ball=Ball.of(p), fluid=flow)
 
     @property
     def forced(self) -> bool:

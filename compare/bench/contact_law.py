@@ -243,7 +243,7 @@ class Contacts:
             )
             depth = depth - self.rows[:, 0] @ (along.T @ lacking) / k
         creep = np.where(frictional, creep, 0)
-        bearing = np.where(
+        criterion = np.where(
             (self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1
         )  # one row, or all edges of a pyramid
         sideways = np.where(frictional & ~slides[:, None], sideways, 0)
@@ -253,7 +253,7 @@ class Contacts:
             turning=np.where(slides | (self.dim <= 3), np.nan, np.hypot.reduce(creep[:, 2:], 1)),
             hover=np.where(self.dim > 1, hover, np.inf),
             slides=slides,
-            weight=np.column_stack([bearing / softness, sideways]),
+            weight=np.column_stack([criterion / softness, sideways]),
             stiffness=slope,
             damping=np.column_stack([b, *[b_f] * 5]),
         )

@@ -357,9 +357,8 @@ def add_engine(parser: Parser, default: str = "mujoco") -> None:
 def add_engine_name(parser: argparse._ActionsContainer, default: str | None, usual: str) -> None:
     """The option that chooses an engine; `usual` says what is if none is named."""
     known = (
-        "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as "
-        "it comes; others: "
-        f"mujoco-coulomb, event, time-stepping, siconos, and NAME or NAME-defaults of {FOREIGN} "
+        "mujoco is under Coulomb's law, mujoco-plain isn't, mujoco-defaults is MuJoCo as it comes; "
+        f"others: mujoco-free, event, time-stepping, siconos, and NAME or NAME-defaults of {FOREIGN} "
         f"({usual})"
     )
     parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)

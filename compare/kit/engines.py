@@ -20,6 +20,7 @@ import mjsim
 from compare.adapters import KNOWN, siconos, vessel
 from compare.adapters.free import Library
 from mjsim import ContactSettings
+from mjsim.contact_settings import LANDING_PARTS
 from model import InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.errors import suggestion
@@ -58,8 +59,6 @@ class Engine:
     """Options of the command line that `configure` takes."""
     configure: Callable[[Mapping[str, float], Parameters], AnySettings]
     """Settings of a user's run from such options; those not given have their defaults."""
-    study: Callable[[float, Parameters], AnySettings] | None = None
-    """Settings of a study for a time step in s, where they differ from those of a user's run."""
     simulate: Simulate | None = None
     stream: Stream | None = None
     sources: tuple[str, ...]
@@ -68,6 +67,8 @@ class Engine:
     """Packages whose versions do."""
     torque: bool = False
     """Whether it takes `Parameters.fluid_torque`."""
+    lands_within: float = 1.0
+    """Part of a time step within which it finds when a contact closes."""
     needs: Library | None = None
     """An optional library that it needs; the version of that is one of `versions`."""
     title: str = ""
@@ -112,37 +113,34 @@ class Engine:
         """Settings of a study for a time step in s; engines without a step ignore it."""
         if step is None or "timestep" not in self.options:
             return self.configure({}, p)
-        return self.study(step, p) if self.study else self.configure({"timestep": step}, p)
+        return self.configure({"timestep": step}, p)
 
 
 STUDY_SLIP = 2.0
-"""Slip speed in m/s for which contact in the studies' settings is continuous, under the load of
+"""Slip speed in m/s for which MuJoCo's own contacts are continuous in studies, under the load of
 gravity, at mu = 1."""
 
 
 @cache
-def _rough(step: float) -> ContactSettings:
-    """Contact settings that suit a ball on the roughest floor."""
-    return ContactSettings.for_problem(
-        Parameters.named("reference").replace(mu=1.0, eta=0.0), step, STUDY_SLIP
-    )
-
-
 def plain(step: float) -> ContactSettings:
-    """The studies' settings for a step in s, and none of the corrections between the steps.
+    """MuJoCo's own contacts for a step in s, as they suit a ball that slides on the roughest floor.
 
     The implicit integrator damps the swinging of a spinning ball on the wall; with Euler's it grows
     at steps of 2 ms."""
-    return replace(_rough(step), servo=0.0, memory=False, order=1, integrator="implicit")
+    rough = Parameters.named("reference").replace(mu=1.0, eta=0.0)
+    return ContactSettings.for_problem(rough, step, STUDY_SLIP, integrator="implicit")
 
 
 def newcomer(step: float) -> ContactSettings:
-    """MuJoCo's own contact parameters on the joints of this study, and none of the corrections
-    between the steps."""
-    contacts = ContactSettings(
-        timestep=step, solref=(0.02, 1.0), solreffriction=0.02, solimp=0.9, impratio=1.0
+    """MuJoCo's own contact parameters on the joints of this study."""
+    return ContactSettings(
+        timestep=step,
+        rigid=False,
+        solref=(0.02, 1.0),
+        solreffriction=0.02,
+        solimp=0.9,
+        impratio=1.0,
     )
-    return replace(contacts, servo=0.0, memory=False, order=1)
 
 
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
@@ -194,50 +192,28 @@ MUJOCO = Engine(
     name="mujoco",
     settings=ContactSettings,
     options=("timestep",),
-    configure=lambda given, p: ContactSettings.at(
-        given.get("timestep", ContactSettings.timestep)
-    ).suited(p),
-    study=lambda step, p: _rough(step).suited(p),
+    configure=lambda given, p: ContactSettings(**given),  # type: ignore[arg-type]
     stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
     torque=True,
-    title="MuJoCo with corrections between its steps",
-    about="they make rigid stationary states exact by construction; measured at two time steps of "
-    "at most 4 and 2 ms",
+    lands_within=1 / LANDING_PARTS,
+    title="MuJoCo under Coulomb's law",
+    about="rigid contacts of a ball on the paper's coordinates, by mjsim.Coulomb, for any model; "
+    "measured at two time steps of at most 4 and 2 ms",
     mark="o",
 )
 PLAIN = replace(
     MUJOCO,
     name="mujoco-plain",
     configure=lambda given, p: plain(given.get("timestep", ContactSettings.timestep)).suited(p),
-    study=lambda step, p: plain(step).suited(p),
     stream=_unwarned,
-    title="MuJoCo without corrections, in the limit of no time step",
-    about="the same joints and contact settings, nothing between the steps but drag and the wall's "
-    "tangent plane",
+    lands_within=1.0,
+    title="MuJoCo without that law, in the limit of no time step",
+    about="the same ball, on MuJoCo's own contacts",
     role=Role.IN_THE_LIMIT,
     refine=(1, 2, 3, 4),
     mark="P",
-)
-COULOMB = replace(
-    PLAIN,
-    name="mujoco-coulomb",
-    configure=lambda given, p: ContactSettings.rigid_at(
-        given.get("timestep", ContactSettings.timestep)
-    ),
-    study=None,
-    stream=mjsim.Run,
-    title="MuJoCo under a law of friction for any model, in the limit of no time step",
-    about="a free ball in the vessel, its wall a plane that goes with it; contacts by "
-    "mjsim.Coulomb, for any model",
-    refine=(
-        2,
-        4,
-        8,
-        16,
-    ),  # (1, 2, 4) was tried, too: at 4 ms the onset of slip isn't yet where powers of the step tell
-    mark="X",
 )
 EVENT = Engine(
     name="event",
@@ -261,8 +237,10 @@ MOREAU = replace(
 _PACKAGES = {
     name: Library(KNOWN[name].partition(" ")[0], f"compare.adapters.{name}") for name in KNOWN
 }
+_FREE, _AS_IT_COMES = _adapted(_PACKAGES["mujoco_free"], "Xx")
+FREE = replace(_FREE, name="mujoco-free")
 NEWCOMER = replace(
-    _adapted(_PACKAGES["mujoco_free"], "ox")[1],
+    _AS_IT_COMES,
     name="mujoco-defaults",
     title="MuJoCo as it comes",
     about="a free ball in flat facets, MuJoCo's own parameters, 2 ms; confirmed is what is off by "
@@ -283,7 +261,7 @@ _OTHERS = (
 USUAL_ENGINES = (MUJOCO, PLAIN, NEWCOMER)
 """Who is heard of a claim where no engine is named: the one on trial, and two beside it."""
 ENGINES: dict[str, Engine] = {
-    each.name: each for each in (*USUAL_ENGINES, COULOMB, EVENT, MOREAU, *_OTHERS)
+    each.name: each for each in (*USUAL_ENGINES, FREE, EVENT, MOREAU, *_OTHERS)
 }
 """Every engine by name."""
 
@@ -301,19 +279,15 @@ def engine(name: str) -> Engine:
 
 
 def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
-    """Slip speeds (n,) at A and B, m s-1, less the creep of an engine whose friction yields to any
-    force.
+    """Slip speeds (n,) at A and B, m s-1, less what contacts of MuJoCo show of it while they roll.
 
-    A contact that rolls creeps at a speed proportional to its friction force, with a factor that
-    the settings give; a hundredth more than that is creep, too, since it lags behind a force that
-    still changes. A ball that rolls on both moves its load from one contact to the other, so that
-    one may be at the limit of friction while the other holds: where one of two contacts creeps, the
-    other slips no faster than it. Of two rigid contacts either may creep as the larger of both
-    forces lets it."""
-    m = run.header.parameters.m
+    That is proportional to their friction force, with a factor that the settings give, and a
+    hundredth more, since it lags behind a force that still changes. A ball that rolls on both moves
+    its load from one contact to the other, so that one may be at the limit of friction, and yield,
+    while the other holds: where both bear something, neither slips faster than the other."""
     if ENGINES[run.header.engine].settings is not ContactSettings:
         return run.slip_speed_A, run.slip_speed_B
-    kept = run.header.settings
+    m, kept = run.header.parameters.m, run.header.settings
     settings = ContactSettings.from_mapping(
         {f.name: kept[f.name] for f in fields(ContactSettings) if f.name in kept}
     )
@@ -321,15 +295,9 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
         np.hypot(run.force_A[:, 0], run.force_A[:, 2]),
         np.hypot(run.force_B[:, 1], run.force_B[:, 2]),
     )
-    both = (run.force_A[:, 1] > 0) & (run.force_B[:, 0] > 0)
-    shared = both & settings.rigid
-    creep = (
-        1.01 * settings.creep_speed(np.where(shared, np.maximum(*friction), force) / m)
-        for force in friction
-    )
     A, B = (
-        np.maximum(v - c, 0.0)
-        for v, c in zip((run.slip_speed_A, run.slip_speed_B), creep, strict=True)
+        np.maximum(v - 1.01 * settings.creep_speed(force / m), 0.0)
+        for v, force in zip((run.slip_speed_A, run.slip_speed_B), friction, strict=True)
     )
-    both &= not (settings.memory or settings.rigid)
+    both = (run.force_A[:, 1] > 0) & (run.force_B[:, 0] > 0)
     return np.where(both, np.minimum(A, B), A), np.where(both, np.minimum(A, B), B)

@@ -215,7 +215,7 @@ def engines(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
 
 QUESTIONS = {
     "mujoco-plain": "What does MuJoCo get right by itself?",
-    "mujoco": "What does it get right with corrections of ours?",
+    "mujoco": "What does it get right with Coulomb's law?",
     "mujoco-defaults": "What does it get right as it comes?",
 }
 """What a reader who simulates robots wants to know first, by the engine that answers."""

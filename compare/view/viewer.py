@@ -1,5 +1,4 @@
-"""MuJoCo's interactive viewer, with the ball driven by the study's own loop: drag, turning wall,
-corrections."""
+"""MuJoCo's interactive viewer, with the ball driven by the study's own loop."""
 
 from __future__ import annotations
 
@@ -52,8 +51,6 @@ def view(
 
 def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> JointedBall:
     """A simulation for the viewer, with what only serves contact hidden."""
-    if settings.rigid:
-        raise InputError("the viewer shows no rigid contacts")
     x = State.one(x0)
     engine.check_timestep(settings.timestep, p, flow, float(flow.start[-1]), x)
     engine.check_start(x, p, settings)

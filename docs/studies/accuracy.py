@@ -145,12 +145,12 @@ def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0))
         [
             "ω₀ (rad/s)",
             "admissible B_y (N)",
-            "no memory",
-            "memory, from 12 % off",
-            "memory, from rest",
+            "MuJoCo's contacts",
+            "Coulomb's law, from 12 % off",
+            "Coulomb's law, from rest",
         ]
     ]
-    plain, ours = ContactSettings(memory=False, order=1), ContactSettings()
+    plain, ours = ContactSettings(rigid=False), ContactSettings()
     for omega_0 in omegas:
         p = SMOOTH.replace(omega_0=omega_0)
         least, greatest = (float(end) for end in rolling_forces.admissible_interval(omega_0, p))

@@ -12,7 +12,6 @@ from docs.studies import states
 from docs.studies.states import EPS
 from mjsim import ContactSettings, Run, simulate
 from model import State
-from model.arrays import Array
 
 ROLLING = states.SMOOTH.replace(omega_0=10.0)
 SLIPPING = states.SLIPPING.p
@@ -46,7 +45,7 @@ class Row:
 
 def rows() -> list[Row]:
     """Predicted and measured values of every formula, a few settings each."""
-    return [*_depths(), *_margins(), *_creep(), *_hover(), *_decay()]
+    return [*_depths(), *_creep(), *_hover(), *_decay()]
 
 
 def table() -> list[list[str]]:
@@ -68,7 +67,8 @@ def table() -> list[list[str]]:
 def _at(timestep: float, solimp: float, damping: float = 0.5, **changes: float) -> ContactSettings:
     """Settings with the given impedance and friction damping b_f h."""
     friction = 2 * timestep / (solimp * damping)
-    return ContactSettings.at(timestep, solimp=solimp, solreffriction=friction, **changes)
+    given = {"solimp": solimp, "solreffriction": friction} | changes
+    return ContactSettings.at(timestep, rigid=False, **given)
 
 
 def _turning(timestep: float) -> float:
@@ -78,62 +78,39 @@ def _turning(timestep: float) -> float:
 
 
 def _depths() -> Iterator[Row]:
-    """Without servo a ball at rest on the floor sinks in by (1 - d) g tc^2, in slipping by less."""
+    """A ball at rest on the floor sinks in by (1 - d) g tc^2, one that slips by less."""
     still, inside = ROLLING.replace(omega_0=0.0), State(h=0.01)
     for timestep, solimp in itertools.product((4e-3, 1e-3), (0.03, 0.3)):
-        settings = _at(timestep, solimp, servo=0.0)
+        settings = _at(timestep, solimp)
         setting = f"h = {timestep * 1e3:g} ms, d = {solimp:g}"
-        run, depth = simulate(still, inside, 2.0, settings=settings), settings.margin(still.g)
+        run, depth = simulate(still, inside, 2.0, settings=settings), settings.depth(still.g)
         round_off = EPS * still.R / depth * len(run.time)
         yield Row(f"depth at rest, {setting}", "m", depth, -float(run.gap_A[-1]), round_off)
-        run = simulate(SLIPPING, SLIPPING_START, 10.0, settings=settings)
-        given = float(run.force_A[-1, 1]) / SLIPPING.m, SLIPPING.mu, float(run.slip_speed_A[-1])
-        # What slip would take from the load is given back as it is foreseen, but for the turning.
-        tolerance = _turning(timestep) * (1 + settings.hover_number(*given))
-        yield Row(
-            f"depth at A in slipping, {setting}",
-            "m",
-            settings.margin(given[0]),
-            -float(run.gap_A[-1]),
-            tolerance,
-        )
+    for solimp in (0.03, 0.1):
+        settings = _at(1e-3, solimp, impratio=30.0)
+        last = _steady_slipping(settings)
+        for contact, axis, friction in (("A", 1, SLIPPING.mu), ("B", 0, SLIPPING.eta)):
+            load = float(last[f"force_{contact}"][axis]) / SLIPPING.m
+            hover = settings.hover_number(load, friction, float(last[f"slip_speed_{contact}"]))
+            depth = settings.depth(load) * (1 - hover + friction**2 / settings.impratio)
+            what = f"depth at {contact} in slipping, d = {solimp:g}"
+            yield Row(what, "m", depth, -float(last[f"gap_{contact}"]), _turning(1e-3))
 
 
-def _margins() -> Iterator[Row]:
-    """With servo the margin comes to the depth, and the gap to nothing."""
-    for memory, solimp in itertools.product((True, False), (0.03, 0.1)):
-        settings = _at(1e-3, solimp, memory=memory, impratio=30.0)
-        last, margins = _steady_slipping(settings)
-        for k, (contact, axis, friction) in enumerate(
-            (("A", 1, SLIPPING.mu), ("B", 0, SLIPPING.eta))
-        ):
-            load, slip = (
-                last[f"force_{contact}"][axis] / SLIPPING.m,
-                float(last[f"slip_speed_{contact}"]),
-            )
-            what = (
-                f"margin at {contact} in slipping, d = {solimp:g}{'' if memory else ', no memory'}"
-            )
-            margin = settings.margin(load) * (
-                1 - (0.0 if memory else settings.hover_number(load, friction, slip))
-            )
-            yield Row(what, "m", margin, float(margins[k]), _turning(settings.timestep))
-
-
-def _steady_slipping(settings: ContactSettings) -> tuple[np.void, Array]:
-    """Last sample of a run that settles in slipping at both points, and the margins (2,) there."""
-    run = Run(SLIPPING, SLIPPING_START, 10.0, settings=settings)
-    *_, block = run
-    return block[-1], run.ball.body.margins
+def _steady_slipping(settings: ContactSettings) -> np.void:
+    """Last sample of a run that settles in slipping at both points."""
+    *_, block = Run(SLIPPING, SLIPPING_START, 10.0, settings=settings)
+    last: np.void = block[-1]
+    return last
 
 
 def _creep() -> Iterator[Row]:
-    """Without memory a rolling contact creeps at R_t f/b_f.
+    """A rolling contact creeps at R_t f/b_f.
 
     The solver stops within its tolerance of the least cost, which is quadratic in the force, and
     impratio times as steep in the friction rows."""
     for solimp, impratio in itertools.product((0.03, 0.3), (1e3, 1e5)):
-        settings = _at(1e-3, solimp, impratio=impratio, memory=False)
+        settings = _at(1e-3, solimp, impratio=impratio)
         run = simulate(ROLLING, (0.0, 0.0, ROLLING.omega_0, 0.0, 0.0, 0.0), 10.0, settings=settings)
         friction = float(np.hypot(run.force_A[-1, 0], run.force_A[-1, 2])) / ROLLING.m
         creep, stops = float(settings.creep_speed(friction)), float(np.sqrt(TOLERANCE * impratio))
@@ -142,14 +119,15 @@ def _creep() -> Iterator[Row]:
 
 
 def _hover() -> Iterator[Row]:
-    """The friction damping b_f at which steady slipping has no margin left, on a line through two
+    """The friction damping b_f at which steady slipping has no depth left, on a line through two
     smaller ones.
 
     There it would begin to hover; near that a contact that is disturbed goes on hovering.
     """
     for solimp in (0.3, 0.5):
-        settings = [_at(1e-3, solimp, damping, memory=False) for damping in (0.1, 0.2)]
-        (_, (first, _)), (last, (second, _)) = (_steady_slipping(each) for each in settings)
+        settings = [_at(1e-3, solimp, damping) for damping in (0.1, 0.2)]
+        before, last = (_steady_slipping(each) for each in settings)
+        first, second = -before["gap_A"], -last["gap_A"]
         load, slip = last["force_A"][1] / SLIPPING.m, float(last["slip_speed_A"])
         softer = settings[1].softness * load * (1 + SLIPPING.mu**2 / settings[1].impratio)
         limit = 0.2 * softer / (SLIPPING.mu * settings[1].b_f * slip)
@@ -161,11 +139,11 @@ def _decay() -> Iterator[Row]:
     """In rolling a slip velocity dies out by the factor 1 - b_f h A/(A + R_t) a step; drag adds c
     h."""
     for damping, impratio in itertools.product((0.2, 0.5), (1e2, 1e5)):
-        settings = _at(1e-3, 0.03, damping, impratio=impratio, memory=False, order=1, servo=0.0)
+        settings = _at(1e-3, 0.03, damping, impratio=impratio)
         p = ROLLING.replace(omega_0=0.0, mu=1.0, eta=0.0)  # it is away from the wall
         # A spin too slow to reach the cone; a friction row at the floor sees A_t = (1 + 1/j)/m.
-        spin = 0.5 * float(settings.regularisation_speed(p.mu * p.g)) / p.r
-        x0 = -settings.margin(p.g), 0, 0, 0, 0, spin, 0.01, 0  # as deep as the floor bears it
+        spin = 0.5 * float(settings.creep_speed(p.mu * p.g)) / p.r
+        x0 = -settings.depth(p.g), 0, 0, 0, 0, spin, 0.01, 0  # as deep as the floor bears it
         run = simulate(p, x0, 0.02, settings=settings, sample_interval=1e-3)
         share = 1 / (1 + settings.softness / impratio / (1 + 1 / p.j))
         left = float(run.slip_speed_A[3] / run.slip_speed_A[2])

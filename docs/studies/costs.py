@@ -191,9 +191,9 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
 
     There is a sample every 100 steps. Timings are taken in turn, each whole one between two bare
     ones: a machine that slows down does so for both. The bare steps are those of a settled run with
-    its forces, margins and surface velocities left as they are, and the ball held at its azimuth,
+    its forces left as they are, and the ball held at its azimuth,
     where the wall stands, by an assignment a step."""
-    settings, p = ContactSettings(), SLIPPING
+    settings, p = ContactSettings(rigid=False), SLIPPING
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
     settled = JointedBall(model, p, settings, State.one(state.x), 0.0)

@@ -1,7 +1,7 @@
 """The picture that README opens with: ``python -m docs.studies.opening`` draws docs/opening.png.
 
-Left the ball and what it touches; right how fast it goes round, by theory, by MuJoCo with
-corrections of ours and by MuJoCo as it comes: settled runs from rest, made by the command line."""
+Left the ball and what it touches; right how fast it goes round, by theory, by MuJoCo under
+Coulomb's law and by MuJoCo as it comes: settled runs from rest, made by the command line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PICTURE = Path(__file__).parents[1] / "opening.png"
 FLOWS = (4.0, 8.0, 12.0, 16.0, 20.0, 24.0, 28.0)
 """Angular velocities of the fluid, rad/s."""
 FASTEST = 30.0
-ENGINES = {"mujoco": "MuJoCo with our corrections", "mujoco-defaults": "MuJoCo as it comes"}
+ENGINES = {"mujoco": "MuJoCo under Coulomb's law", "mujoco-defaults": "MuJoCo as it comes"}
 DURATION = 30.0
 """Of a run, s; its last quarter counts."""
 

@@ -47,6 +47,7 @@ STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 Ways = Mapping[str, AnySettings]
 """Ways to set MuJoCo, named after ours or MuJoCo's defaults and what differs from them."""
 LONE = "MuJoCo's defaults"
+OURS, LAW = "our settings", "under Coulomb's law"
 FACETS = f"{LONE}, a free ball in facets, cone pyramidal"
 LOOKS: list[dict[str, Any]] = [
     {"marker": mark, "color": colour, "mfc": "white"}
@@ -72,25 +73,20 @@ def main() -> None:
 
 
 def rungs(step: float) -> Ways:
-    """From what a newcomer writes to ours, each with one thing more than the one before."""
+    """From what a newcomer writes to the law, each with one thing more than the one before."""
     return {
         FACETS: NEWCOMER.at(step, states.SLIPPING.p),
         f"{LONE}, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
         LONE: newcomer(step),
-        "ours, memory off, servo 0, order 1": ContactSettings.at(
-            step, memory=False, servo=0.0, order=1
-        ),
-        "ours, memory off, order 1": ContactSettings.at(step, memory=False, order=1),
-        "ours, order 1": ContactSettings.at(step, order=1),
-        "ours": ContactSettings.at(step),
+        OURS: ContactSettings.at(step, rigid=False),
+        LAW: ContactSettings.at(step),
     }
 
 
 def rivals(step: float) -> Ways:
     """Settings whose error is compared with their cost."""
     named = rungs(step)
-    chosen = ("ours", "ours, order 1", "ours, memory off, servo 0, order 1", LONE)
-    return {name: named[name] for name in chosen}
+    return {name: named[name] for name in (LAW, OURS, LONE)}
 
 
 def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
@@ -99,19 +95,15 @@ def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
 
 
 def landings(step: float) -> Rows:
-    """What a landing, and motions with one, come to as corrections are taken away: relative errors
-    of omega_c.
+    """What a landing, and motions with one, come to: relative errors of omega_c.
 
     That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball
     rebounds within 0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of
     `states.HITTING`."""
     bare = plain(step)
     ways: Ways = {
-        "ours (mujoco)": ContactSettings.at(step),
-        "ours, memory off": ContactSettings.at(step, memory=False),
-        "ours, servo 0, landings left to the contacts": ContactSettings.at(step, servo=0.0),
-        "ours, landings left to the contacts": states.Unwatched(**vars(ContactSettings.at(step))),
-        "ours, memory off, servo 0, order 1, integrator implicit (mujoco-plain)": bare,
+        f"{LAW} (mujoco)": ContactSettings.at(step),
+        f"{OURS}, integrator implicit (mujoco-plain)": bare,
         "mujoco-plain, damping ratio 2": replace(bare, solref=(2 * step, 2.0)),
         "mujoco-plain, damping ratio 2, step divided by 10": replace(
             plain(step / 10), solref=(step / 5, 2.0)

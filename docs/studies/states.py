@@ -27,7 +27,6 @@ from compare.kit.campaign import Campaign
 from compare.kit.engines import AnySettings, Engine
 from compare.kit.pages import Rows
 from compare.kit.tasks import Task, carry_out
-from mjsim import ContactSettings
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
@@ -191,13 +190,6 @@ HITTING = Transient(
     0.7,
     "slides on the floor, hits the wall, is lifted, lands, sticks",
 )
-
-
-class Unwatched(ContactSettings):
-    """Settings whose landings are left to the contacts."""
-
-    def slowest_fall(self, g: float) -> float:
-        return math.inf
 
 
 REPEATS = 3

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from compare.bench import league
 from compare.bench.runner import Result
@@ -28,7 +28,6 @@ from docs.studies import (
     accuracy,
     confirmation,
     extrapolation,
-    gains,
     settings,
     statements,
     states,
@@ -75,20 +74,20 @@ def variants(step: float) -> settings.Ways:
     """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction
     rows."""
     firm = {"solimp": 0.1, "solreffriction": 2 * step / 0.1}
-    firmly = f"ours, solreffriction {firm['solreffriction']:g}, solimp 0.1"
-    alone, pyramids = {"memory": False, "order": 1}, "memory off, order 1, cone pyramidal"
+    firmly = f"{settings.OURS}, solreffriction {firm['solreffriction']:g}, solimp 0.1"
+
+    def soft(**changes: Any) -> ContactSettings:
+        return ContactSettings.at(step, rigid=False, **changes)
+
     return {
         "MuJoCo's defaults, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
-        f"{firmly}, {pyramids}": ContactSettings.at(step, **firm, **alone, cone="pyramidal"),
-        "ours, integrator implicit": ContactSettings.at(step, integrator="implicit"),
-        "ours, integrator implicitfast": ContactSettings.at(step, integrator="implicitfast"),
-        f"{firmly}, integrator discrete": ContactSettings.at(step, **firm, integrator="discrete"),
-        "ours, integrator discrete": ContactSettings.at(step, integrator="discrete"),
-        "ours, memory off, noslip_iterations 10": ContactSettings.at(
-            step, memory=False, noslip_iterations=10
-        ),
-        "ours, memory off": ContactSettings.at(step, memory=False),
-        "ours": ContactSettings.at(step),
+        f"{firmly}, cone pyramidal": soft(**firm, cone="pyramidal"),
+        f"{settings.OURS}, integrator implicit": soft(integrator="implicit"),
+        f"{settings.OURS}, integrator implicitfast": soft(integrator="implicitfast"),
+        f"{firmly}, integrator discrete": soft(**firm, integrator="discrete"),
+        f"{settings.OURS}, integrator discrete": soft(integrator="discrete"),
+        f"{settings.OURS}, noslip_iterations 10": soft(noslip_iterations=10),
+        settings.OURS: soft(),
     }
 
 
@@ -98,7 +97,6 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "not-confirmed": lambda campaign: witnesses.not_confirmed(campaign.directory.parent),
     "chosen": lambda campaign: witnesses.chosen(campaign.directory.parent),
     "misses": lambda campaign: extrapolation.misses(),
-    "gains": lambda campaign: gains.gains(),
     "landings": lambda campaign: settings.landings(settings.STEP),
     "formulas": lambda campaign: confirmation.table(),
     "reached": accuracy.reached,

@@ -42,13 +42,9 @@ def verdicts(results: Path) -> list[Verdict]:
 
 def counted(results: Path) -> Rows:
     """How many claims each witness was asked, and how they came out, with its deviations at a step
-    of 2 ms.
-
-    `mujoco-coulomb`, which measures by itself, has a directory of its own below, as `make mutants`
-    leaves it."""
+    of 2 ms."""
     said = verdicts(results)
     told = wording.engines(said)
-    told += wording.engines(verdicts(results / "coulomb"))
     head = [
         "witness",
         "asked",

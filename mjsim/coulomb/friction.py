@@ -15,6 +15,7 @@ from .compiling import kernel
 from .contacts import axis_of, kind_of
 from .engine import reals
 from .memory import NEW, OPEN, SLIDES, STICKS, contacts_of, dry_of, rows_of
+from .parameters import FEEDBACK, STEADIER
 from .rows import multiply
 
 # -- forces ----------------------------------------------------------------------------------------
@@ -121,6 +122,17 @@ def shift(rows: Any, contact: Any) -> float:
 
 
 @kernel
+def feedback(contact: Any, estimate: Any) -> float:
+    """By how much friction changes its slip, where what its load lacks is one: mu^2 (1 + 1/j) of a
+    ball."""
+    gain = 0.0
+    for t in range(contact.dim - 1):
+        across = contact.mu[t] ** 2 * estimate[contact.address + 1 + t]
+        gain = max(gain, across / estimate[contact.address])
+    return float(gain)
+
+
+@kernel
 def subtract_references(memory: Any) -> None:
     """Take the reference accelerations of contacts off their residuals."""
     rows = rows_of(memory)
@@ -148,7 +160,8 @@ def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: flo
         else:
             contact.extrapolated = slip
             contact.predicted = max(slip + contact.bias, 0.0)
-            doubt |= contact.error > enough
+            surely = STEADIER if rigid and feedback(contact, estimate) > FEEDBACK else 1.0
+            doubt |= contact.error > enough * surely
         # the force of a rigid contact will change by a weight
         changes = abs(normal) > gravity or (contact.predicted == 0 and slip > gravity)
         doubt |= rigid and changes

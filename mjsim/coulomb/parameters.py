@@ -84,6 +84,9 @@ FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 the shortest."""
 SOFTER = 100.0
 """How much larger R is in Newton's method, until what contacts hold takes its part away."""
+FEEDBACK, STEADIER = 0.5, 1e-4
+"""`friction.feedback` beyond which errors of predicted slip grow from step to step; part of `share`
+to which it must be known there."""
 FALLING = 0.1
 """Part to which the error of rigid contacts must fall by a solution for another one to be tried."""
 OVER = 0.75

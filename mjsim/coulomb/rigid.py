@@ -20,7 +20,8 @@ from .memory import SLIDES, bodies_at, contacts_of, rows_of
 from .parameters import APART, BOUNCES, ITERATIONS, STUCK, USUAL_STEP
 
 AFFINE, JOINT = int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtTrn.mjTRN_JOINT)
-SLIDE, BIASES = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjNBIAS)
+FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+BIASES = int(mujoco.mjNBIAS)
 PGS = 0
 """MuJoCo's solver that has the regularisation in its matrix."""
 
@@ -51,10 +52,13 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
 
 @kernel
 def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -> float:
-    """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1."""
+    """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1.
+
+    So it does of the gap of a contact that has borne something: closed at once, that would be a blow.
+    """
     h, law = model.opt.timestep, memory.law
     if contact.gap > 0:
-        return float(-contact.gap / h)
+        return float(-contact.gap / h * (law.push if contact.load > 0 else 1.0))
     kept = law.depth * (h / USUAL_STEP) ** 2 * smaller_radius(model, contact)
     return float(min(law.push * max(-contact.gap - kept, 0.0) / h, fastest))
 
@@ -113,16 +117,19 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
 
 
 @kernel
-def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
+def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any, gravity: float) -> bool:
     """Let friction of what slides fast oppose its slip at mid step; whether there is any.
 
-    That is of second order; where slip may end within the step, it must oppose that at the end.
+    That is of second order; where slip may end within the step, it must oppose that at the end, and
+    in a blow, where a load changes by more than a weight, that after it (Moreau).
     """
     contacts, rows, h, some = contacts_of(memory), rows_of(memory), model.opt.timestep, False
-    velocity = reals(data.efc_vel, data.nefc)
+    velocity, estimate = reals(data.efc_vel, data.nefc), reals(data.efc_diagA, data.nefc)
     for i in range(memory.contacts):
         contact = contacts[i]
-        if contact.state != SLIDES or contact.predicted == 0:
+        gained = rows[contact.address].remembered - contact.load
+        blow = abs(gained) * estimate[contact.address] > gravity
+        if contact.state != SLIDES or contact.predicted == 0 or blow:
             continue
         speed, change = 0.0, 0.0
         for t in range(contact.dim - 1):
@@ -233,12 +240,16 @@ def rotated(a: Any, turn: Any) -> Any:
 
 
 @kernel
-def turn_accelerations(model: Any, data: Any, memory: Any) -> None:
-    """Turn the angular accelerations of the last step along with the bodies, in whose axes they are."""
-    bodies, velocity = bodies_at(memory.body_at, memory.free_bodies), reals(data.qvel, model.nv)
-    for i in range(len(bodies)):
-        first = bodies[i].dof + 3
-        back = times_vector(-model.opt.timestep, vector_at(velocity, first))
+def turn_accelerations(model: Any, data: Any, memory: Any, elapsed: float) -> None:
+    """Turn the angular accelerations of the last step, of so many seconds, along with the bodies, in
+    whose axes they are."""
+    types, dofs = integers(model.jnt_type, model.njnt), integers(model.jnt_dofadr, model.njnt)
+    velocity = reals(data.qvel, model.nv)
+    for i in range(model.njnt if memory.law.rigid else 0):
+        if types[i] >= SLIDE:
+            continue
+        first = dofs[i] + 3 if types[i] == FREE else dofs[i]
+        back = times_vector(-elapsed, vector_at(velocity, first))
         for of in (reals(data.qacc, model.nv), reals(data.qacc_warmstart, model.nv)):
             turned = rotated(vector_at(of, first), back)
             for j in range(3):

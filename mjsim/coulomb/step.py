@@ -89,9 +89,9 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
         add_turning(model, data, memory, since)
     set_up(data, memory)
     if predict_slip(model, data, memory, enough, gravity) or not known:
-        solve(model, data, memory, enough)
+        solve(model, data, memory, enough, gravity)
     elif memory.law.rigid:
-        oppose_slip_at_mid_step(model, data, memory)
+        oppose_slip_at_mid_step(model, data, memory, gravity)
     write_references(data, memory)
 
 
@@ -121,7 +121,7 @@ def begin(model: Any, data: Any, memory: Any) -> Any:
         if abs(start[i]) < memory.law.calm:
             start[i] = 0.0
     if known and over:
-        turn_accelerations(model, data, memory)
+        turn_accelerations(model, data, memory, elapsed)
     return known, over, since
 
 
@@ -177,7 +177,7 @@ def size_of_gravity(model: Any) -> float:
 
 
 @kernel
-def solve(model: Any, data: Any, memory: Any, enough: float) -> None:
+def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> None:
     """Solve for the accelerations, until contacts slip as predicted, to `enough`, m s-2.
 
     Of rigid contacts Newton's method finds slip and forces, for softer ones. Then MuJoCo solves, as
@@ -206,7 +206,7 @@ def solve(model: Any, data: Any, memory: Any, enough: float) -> None:
                 return
             multiply(model, data, memory)
             subtract_references(memory)
-            if not oppose_slip_at_mid_step(model, data, memory):
+            if not oppose_slip_at_mid_step(model, data, memory, gravity):
                 return
             mid_step_due, worst = False, math.inf
         last = worst
@@ -301,10 +301,3 @@ def settle(m: int, d: int, at: int) -> None:
     if not memory.stored:  # what goes on from here does as what is restored
         store(model, data, memory, True)
         memory.stored, memory.ncon = 1, -1
-
-
-@kernel
-def start_anew(at: int) -> None:
-    """Let the next step remember nothing."""
-    memory = memories(at, 1)[0]
-    memory.time, memory.pending, memory.stored = math.nan, 0, 0

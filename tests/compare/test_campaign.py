@@ -450,7 +450,7 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
         Lock(tmp_path / "absent")
 
 
-ON_JOINTS, FREE = ContactSettings.at(2.5e-4), ContactSettings.rigid_at(2.5e-4)
+RIGID, SOFT = ContactSettings.at(2.5e-4), ContactSettings.at(2.5e-4, rigid=False)
 
 
 def run_of(settings, state=None):
@@ -465,7 +465,7 @@ def run_of(settings, state=None):
     )
 
 
-@pytest.mark.parametrize("settings", [ON_JOINTS, FREE])
+@pytest.mark.parametrize("settings", [RIGID, SOFT])
 def test_a_run_that_is_taken_up_has_the_bits_of_a_whole_one(settings):
     whole = np.concatenate(list(run_of(settings)))
     for blocks in (1, 3):

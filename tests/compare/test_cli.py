@@ -17,7 +17,6 @@ from compare.bench import league
 from compare.catalogue import CLAIMS
 from compare.commands import cli, design, parsers, simulate
 from compare.kit import engines, tasks
-from mjsim import ContactSettings
 from model import Parameters, storage
 from tests.commands import ROOT, carried_out, parser_of, refused, told
 
@@ -113,12 +112,12 @@ def test_a_foreign_model_is_named(tmp_path):
 
 def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeypatch, capsys):
     run = tmp_path / "run.h5"
-    printed = told(capsys, f"simulate --omega-0 20 --start omega_c=5 --time 1 -o {run} --json")
+    printed = told(capsys, f"simulate --omega-0 25 --time 2 -o {run} --json")
     about, kept = json.loads(printed), storage.load(run)
     assert about["complete"]
     assert len(about["cases"]) > 1
     assert about["last"]["omega_c"] == kept.omega_c[-1]
-    assert "omega_0 = 20" in told(capsys, f"inspect {run} --plot {tmp_path / 'run.png'}")
+    assert "omega_0 = 25" in told(capsys, f"inspect {run} --plot {tmp_path / 'run.png'}")
     assert (tmp_path / "run.png").stat().st_size > 10_000
     monkeypatch.setattr("compare.view.motions.PART", 7)
     assert told(capsys, f"inspect {run} --json") == printed
@@ -143,12 +142,13 @@ def test_flows(tmp_path, monkeypatch, capsys, flow, last):
 @pytest.mark.parametrize("design", ["--vary eta=0.1,0.5", "--vary eta=0.1:0.5 --random 2"])
 def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path, capsys, design):
     """Fast contacts would chatter where mu eta is large; on the other set they are the defaults."""
-    told(capsys, f"sweep {design} --mu 0.5 --timestep 0.002 --time 0.05 --workers 0 -o {tmp_path}")
+    given = "--engine mujoco-plain --mu 0.5 --timestep 0.002 --time 0.05"
+    told(capsys, f"sweep {design} {given} --workers 0 -o {tmp_path}")
     headers = [
         run.header for path in tmp_path.glob("*.h5") for run in storage.load_runs(path).values()
     ]
     for header in headers:
-        suited = ContactSettings.at(0.002).suited(header.parameters)
+        suited = engines.plain(0.002).suited(header.parameters)
         assert tuple(header.settings["solref"]) == suited.solref
     assert len({tuple(header.settings["solref"]) for header in headers}) == 2
 

@@ -235,9 +235,9 @@ def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
     monkeypatch.setattr(
         "compare.validation.validate", lambda output, **given: asked.append(given["engine"]) or []
     )
-    for words in ("--engine mujoco-coulomb", ""):
+    for words in ("--engine mujoco-free", ""):
         assert told(capsys, f"validate {words} --workers 0 --json") == "[]"
-    assert asked == [ENGINES["mujoco-coulomb"], None]
+    assert asked == [ENGINES["mujoco-free"], None]
 
 
 OWN = "compare.adapters"
@@ -362,7 +362,7 @@ def ends(seed, step=1.25e-4):
     simulators = (
         analytic.simulate,
         partial(analytic.simulate, method="time-stepping", timestep=step),
-        partial(mjsim.simulate, settings=ContactSettings.for_problem(p, step)),
+        partial(mjsim.simulate, settings=ContactSettings(timestep=step)),
         partial(analytic.simulate, leave_rolling="infeasible"),
     )
     return [

@@ -217,7 +217,7 @@ def outputs_of(words: list[str]) -> set[str]:
     return {os.path.normpath(name) for name in named}
 
 
-def carried_out(words: list[str], patience: float) -> tuple[int, str, str]:
+def carried_out(words: list[str], criteria: float) -> tuple[int, str, str]:
     """The exit code of a line, what it prints and says of trouble; Ctrl-C comes after so many
     seconds, if need be.
 
@@ -233,7 +233,7 @@ def carried_out(words: list[str], patience: float) -> tuple[int, str, str]:
 
     out, err = io.StringIO(), io.StringIO()
     usual = signal.signal(signal.SIGALRM, press)
-    signal.setitimer(signal.ITIMER_REAL, patience, 60.0)
+    signal.setitimer(signal.ITIMER_REAL, criteria, 60.0)
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = cli.main(words)
@@ -257,12 +257,12 @@ def carried_out(words: list[str], patience: float) -> tuple[int, str, str]:
 
 
 def problems(
-    words: list[str], here: Path, codes: Sequence[int], patience: float = 10.0
+    words: list[str], here: Path, codes: Sequence[int], criteria: float = 10.0
 ) -> list[str]:
     """All that is wrong with what a line does, which may end with one of these exit codes."""
     before, wrong = contents(here), list[str]()
     try:
-        code, out, said = carried_out(words, patience)
+        code, out, said = carried_out(words, criteria)
     except Exception as error:
         return [f"{type(error).__name__}: {error}"]
     if code not in codes:
@@ -324,7 +324,7 @@ def test_odd_lines(
     for words in itertools.islice(
         lines(command, np.random.default_rng(COMMANDS.index(command))), count
     ):
-        wrong[shlex.join(words)] = problems(words, here, [0, 1, 2, 130], patience=1.0)
+        wrong[shlex.join(words)] = problems(words, here, [0, 1, 2, 130], criteria=1.0)
         if contents(here) != whole:
             shutil.rmtree(here)
             furnish(here, stocked)

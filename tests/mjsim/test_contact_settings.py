@@ -28,7 +28,7 @@ def test_for_problem_keeps_slipping_continuous(timestep, name) -> None:
 
 
 def test_contacts_die_out_for_all_friction_up_to_one() -> None:
-    fast = ContactSettings.at(2e-3)
+    fast = ContactSettings.at(2e-3, rigid=False)
     for mu in np.linspace(0, 3, 13):
         for eta in np.linspace(0, 3, 13):
             assert (
@@ -52,5 +52,5 @@ def test_decay_tells_which_contacts_hold_a_slipping_ball(solref, holds) -> None:
     assert (settings.contact_decay(p.mu, p.eta) < 1) == holds
     with contextlib.nullcontext() if holds else pytest.warns(UserWarning, match="chatters"):
         run = mjsim.simulate(p, steady.x, 0.4, settings=settings, sample_interval=step)
-    load, expected = run.force_A[100:, 1], steady.force_A[1]
-    assert (np.abs(load - expected).max() < 1e-3 * expected) == holds
+    load, expected = run.force_A[-20:, 1], steady.force_A[1]
+    assert (np.abs(load - expected).max() < 1e-2 * expected) == holds

@@ -39,7 +39,7 @@ def wrong_engine(
     name: str,
     ball: Callable[[Parameters], Parameters] = lambda p: p,
     fault: Stretch = nullcontext,
-    **changes: Any,
+    other: Callable[[ContactSettings], ContactSettings] = lambda settings: settings,
 ) -> Engine:
     """MuJoCo with one fault: it moves another ball than it says, under a fault that lasts as long as
     a run, or with other settings."""
@@ -48,7 +48,7 @@ def wrong_engine(
         p: Parameters, x0: Any, t_end: float, flow: Any, settings: ContactSettings, **more: Any
     ) -> mjsim.Run:
         with fault():
-            run = _Disguised(ball(p), x0, t_end, flow, replace(settings, **changes), **more)
+            run = _Disguised(ball(p), x0, t_end, flow, other(settings), **more)
         run.fault = fault
         run.header = replace(run.header, parameters=p)
         return run
@@ -66,6 +66,11 @@ def _altered(change: Callable[[Any], None]) -> AbstractContextManager[Any]:
         return model, mjcf
 
     return mock.patch.object(scene, "build", altered)
+
+
+def _patched(name: str, value: float) -> AbstractContextManager[Any]:
+    """A property of the settings has another value."""
+    return mock.patch.object(ContactSettings, name, property(lambda settings: value))
 
 
 def _smooth(model: Any) -> None:
@@ -87,11 +92,10 @@ WRONG_ENGINES: tuple[Engine, ...] = (
     wrong_engine("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
     wrong_engine("the friction of the floor is missing", fault=partial(_altered, _smooth)),
     wrong_engine("the plane of the wall turned by 0.01 rad", fault=partial(_altered, _turn)),
-    wrong_engine("no servo of the margins", servo=0.0),
-    wrong_engine("no memory of friction", memory=False),
-    wrong_engine("forces taken at the beginning of a step", order=1),
     wrong_engine(
-        "landings left to the contacts",
-        fault=partial(mock.patch.object, ContactSettings, "slowest_fall", return_value=math.inf),
+        "contacts that yield", other=lambda own: ContactSettings.at(own.timestep, rigid=False)
+    ),
+    wrong_engine(
+        "forces taken at the beginning of a step", fault=partial(_patched, "midpoint", 0.0)
     ),
 )

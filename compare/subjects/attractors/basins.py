@@ -117,7 +117,7 @@ def basins(
     tasks = [
         Task(
             engine=MUJOCO.name, parameters=p, x0=start_state(x0, p, Settings()), t_end=lasts,
-            settings=ContactSettings.for_problem(p, timestep), sample_interval=lasts / INSTANTS,
+            settings=ContactSettings(timestep=timestep), sample_interval=lasts / INSTANTS,
         )
         for x0 in few.reshape(-1, len(VARIABLES))
     ]  # fmt: skip

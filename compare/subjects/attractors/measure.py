@@ -49,10 +49,8 @@ MEASURED = 3.0
 """The last part of a held flow that is measured, s."""
 DISTURBED = 2.0
 """The first part of it, in which disturbances are not yet linear, s."""
-REFINED_HOPS = (8, 16)
-"""Time steps in a coarse one, of hops that attract."""
-REFINED_MARGINAL = (16, 32)
-"""Time steps in a coarse one, of hops that hardly attract."""
+REFINED_HOPS = (16, 32)
+"""Time steps in a coarse one."""
 SAMPLE = 1e-3
 """Time between samples, s: a parabola through three samples then gives a top to 1e-6 of the height."""
 FOLLOWED = 10.0
@@ -233,7 +231,7 @@ def followed(
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (
                 steady[-1] - steady[-2]
             )
-        both = zip(ahead, REFINED_MARGINAL, strict=True)
+        both = zip(ahead, REFINED_HOPS, strict=True)
         tasks.append([task(q, x, FOLLOWED, refined) for x, refined in both])
         (runs,) = runner.groups(tasks[-1:])
         parts = [] if isinstance(runs, str) else [tops(run, DISTURBED, FOLLOWED) for run in runs]
@@ -249,7 +247,7 @@ def followed(
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
     yield measurement(runner, "followed", SET, walls[-4], "orbit_death", place, used, **near)
     again = [
-        task(walls[k], np.array(tasks[k][1].x0), LEFT_ALONE, REFINED_MARGINAL[0]) for k in (-4, -1)
+        task(walls[k], np.array(tasks[k][1].x0), LEFT_ALONE, REFINED_HOPS[0]) for k in (-4, -1)
     ]
     yield from _hops_at_end(runner, "followed", SET, again)
 

@@ -160,8 +160,10 @@ class Push:
         ]
 
     def tasks(self, runner: Runner) -> list[Task]:
-        """Tasks with every size of slip and both time steps."""
-        return [task for size in self.sizes for task in self.pair(runner, size)]
+        """Tasks with every size of slip and both time steps; of the engine on trial these are half as
+        long, since the first ones of a run are seen in it for a while."""
+        refine = 1 if runner.has_own_steps else 2
+        return [task for size in self.sizes for task in self.pair(runner, size, refine)]
 
     def rates(self, run: Trajectory) -> Array:
         """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in

@@ -17,6 +17,8 @@ from model.arrays import Array
 SLIPPING_SPEED = 3e-8
 """Slip speed, divided by sqrt(g R), that counts as slip: contacts are solved to 1e-12, and a ball
 whose friction falls short by a millionth reaches it within a run."""
+LAGS = 1e-3
+"""Relative lag behind the fluid from which on a ball that has slipped may have to slip again."""
 CREEPS = 100.0
 """Slip, in units of that, at which a ball may creep while it comes to rest jammed between floor and
 wall."""
@@ -52,7 +54,8 @@ def stays_rolling(run: Trajectory) -> bool | None:
     """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip
     still dies out.
 
-    None, too, while it touches the floor now and then: where friction alone could hold it, it may
+    None, too, while a ball that has slipped lags behind the fluid: it rolls more slowly than it is
+    asked about; and while it touches the floor now and then: where friction alone could hold it, it may
     come to rest there. Slip dies out that has fallen below 0.6 of what it was in the second half
     (moved from 0.9 after results had been seen); slip below a hundredth of what counts is none. On
     a floor that carries next to nothing slip up to `CREEPS` shows nothing (chosen after a set with
@@ -65,7 +68,9 @@ def stays_rolling(run: Trajectory) -> bool | None:
         m, g = run.header.parameters.m, run.header.parameters.g
         creeps = last < CREEPS and run.force_A[tail(run), 1].mean() < PRESSES * m * g
         return False if last > 0.6 * before and not creeps else None
-    return True if last < 1e-2 else None
+    lag = 1 - run.omega_c[-1] / run.omega_0[-1]
+    caught_up = lag < LAGS or slip(speeds, run, share=1.0) < 1
+    return True if last < 1e-2 and caught_up else None
 
 
 def may_settle(run: Trajectory) -> bool | None:
