@@ -33,9 +33,6 @@ mutants: $(VENV)/installed
 blind: $(VENV)/installed
 	$(BIN)/python -m tests.mutants.blind $(SEED)
 
-blind: $(VENV)/installed
-	$(BIN)/python -m tests.mutants.blind $(SEED)
-
 test: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist worksteal
 

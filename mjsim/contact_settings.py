@@ -61,7 +61,8 @@ class ContactSettings:
     timestep: float = _number(1e-3, "s", POSITIVE)
     """Time step, s."""
     rigid: bool = _choice(True, False)
-    """Whether contacts are rigid and obey `mjsim.Coulomb`: nothing below decides anything, then."""
+    """Whether contacts are rigid and obey `mjsim.Coulomb`: then of all below only the integrator
+    counts."""
     solref: tuple[float, float] = (2e-3, 0.5)
     """Time constant (s) and damping ratio of the normal rows; `suited` makes them slower where
     friction asks for it."""

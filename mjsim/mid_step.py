@@ -88,7 +88,7 @@ def mid_step_forces(
     omega_c, v_h = v.omega_c + ahead * change.omega_c, v.v_h + ahead * change.v_h
 
     # Drag (9), -m c (v - v_fluid).
-    lag, w_y = v.omega_c + ahead * change.omega_c - omega_0, v.v_y + ahead * change.v_y
+    lag, w_y = omega_c - omega_0, v.v_y + ahead * change.v_y
     mc = resistance(rho * lag, v_h, w_y, ball)
 
     # In the co-rotating frame inertial forces are 2 m omega_c v_h along the orbit and

@@ -34,7 +34,9 @@ _CHANGE = 0.1
 """Part of the weight: as long as a contact force changes by more in a step, those after a landing are
 divided, too. (Chosen after balls that hop had been seen.)"""
 SHARE = 1e-5
-"""`share` of the law: to that part of gravity a step knows beforehand what contacts bear."""
+"""`share` of the law: part of gravity to which the slip of contacts must be predicted."""
+_CARRIED = ("last", "loads", "landed", "sensors")
+"""What is carried from one step to the next beside MuJoCo's own state."""
 _NORMAL_A, _NORMAL_B = range(NSENSOR)[recorder.NORMALS]
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -52,8 +54,10 @@ class Joints(NamedTuple):
     """Gaps at which contacts are in sight, m."""
     last: Any
     """Velocities along the paper's axes a step ago."""
-    landing: Any
-    """Normal forces at A and B a step ago, N; whether the last step was divided for a landing."""
+    loads: Any
+    """Normal forces at A and B a step ago, N."""
+    landed: Any
+    """Whether the last step was divided for a landing, an array of one."""
     weight: float
     """N"""
     ball: Ball
@@ -95,11 +99,11 @@ def lands(body: Joints) -> bool:
         v, load = body.qvel[i], body.sensors[normal]
         way = body.step * (2 * v - body.last[i])  # if it goes on as in the last step
         lands |= load == 0 and v < -slowest and body.qpos[i] + way < 0
-        changes |= abs(load - body.landing[k]) > _CHANGE * body.weight
-        body.landing[k] = load
-    lands |= changes and body.landing[2] > 0
+        changes |= abs(load - body.loads[k]) > _CHANGE * body.weight
+        body.loads[k] = load
+    lands |= changes and body.landed[0]
     lands &= body.ahead > 0
-    body.landing[2] = 1.0 if lands else 0.0
+    body.landed[0] = lands
     return lands
 
 
@@ -216,7 +220,8 @@ class JointedBall:
             tangent=data.mocap_quat[0],
             margins=model.pair_margin,
             last=np.array(v, float),
-            landing=np.zeros(3),
+            loads=np.zeros(2),
+            landed=np.zeros(1, bool),
             weight=p.m * p.g,
             ball=Ball(*map(float, Ball.of(p))),
             ahead=settings.midpoint,
@@ -240,13 +245,13 @@ class JointedBall:
         mujoco.mj_getState(self.model, self.data, kept, _INTEGRATION)
         remembered = self.law.state(self.data) if self.law else {}
         body = self.body
-        own = {name: getattr(body, name).copy() for name in ("last", "landing", "sensors")}
+        own = {name: getattr(body, name).copy() for name in _CARRIED}
         return {"integration": kept} | own | remembered
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from what `state` returned."""
         mujoco.mj_setState(self.model, self.data, state["integration"], _INTEGRATION)
-        for name in ("last", "landing", "sensors"):
+        for name in _CARRIED:
             getattr(self.body, name)[:] = state[name]
         if self.law:
             self.law.restore(state, self.data)

@@ -16,7 +16,7 @@ from model import State
 ROLLING = states.SMOOTH.replace(omega_0=10.0)
 SLIPPING = states.SLIPPING.p
 TOLERANCE = 1e-12
-"""Of the solver, as mjsim/scene.xml has it."""
+"""Of a solver, to which the formulas are held; that of mjsim/scene.xml is tighter."""
 SLIPPING_START = State(omega_c=13.85, slip_x=-4.0, slip_z=10.0)
 """A start close enough to steady slipping to settle within a few seconds."""
 

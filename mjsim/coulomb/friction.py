@@ -123,8 +123,7 @@ def shift(rows: Any, contact: Any) -> float:
 
 @kernel
 def feedback(contact: Any, estimate: Any) -> float:
-    """By how much friction changes its slip, where what its load lacks is one: mu^2 (1 + 1/j) of a
-    ball."""
+    """How strongly a contact's load acts on its slip, through friction: mu^2 (1 + 1/j) of a ball."""
     gain = 0.0
     for t in range(contact.dim - 1):
         across = contact.mu[t] ** 2 * estimate[contact.address + 1 + t]
