@@ -32,8 +32,6 @@ EXCEPTIONS = {
     "analytic/simulation/solvers.py:explicit_steps",
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
     "mjsim/mid_step.py:mid_step_forces",
-    *(f"mjsim/coulomb/newton.py:{name}" for name in ("add_unit", "assemble", "find_residual")),
-    *("mjsim/coulomb/newton.py:solve_closed", "mjsim/coulomb/newton.py:solve_island"),
     # what an exact case is made of
     "compare/bench/closed_forms.py:closed_form",
     # a figure of two panels

@@ -18,6 +18,8 @@ import numpy.typing as npt
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.types.functions import ExternalFunction
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic, register_jitable
@@ -25,18 +27,49 @@ from numba.extending import intrinsic, register_jitable
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
 
 
-def kernel(function: Any) -> Any:
+class _Part(JITCodeLibrary):  # type: ignore[misc]
+    """Code that is nothing by itself: what calls it is optimised and made to run with it."""
+
+    codegen = property(lambda self: self)
+
+    def set_env(self, name: str, environment: Any) -> None:
+        pass
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+
+class _PartCompiler(Compiler):  # type: ignore[misc]
+    """Numba's compiler, for parts."""
+
+    def __init__(self, typing: Any, target: Any, library: None, *given: Any) -> None:
+        super().__init__(typing, target, _Part(target.codegen(), "part"), *given)
+
+
+def kernel(function: Any, views: bool = False) -> Any:
     """A decorator: compile a function that other compiled ones call.
 
-    It is compiled once for arguments of the same types, whatever constants it is called with.
+    It is compiled once for arguments of the same types, whatever constants it is called with. No
+    references are counted: it makes no arrays, and returns none unless it `views` memory.
     """
-    options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    dispatcher = numba.njit(**options)(function)
+    options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": views}
+    dispatcher = numba.njit(pipeline_class=_PartCompiler, **options)(function)
     template = dispatcher.get_call_template
     dispatcher.get_call_template = lambda given, named: template(
         tuple(map(types.unliteral, given)), named
     )
     return dispatcher
+
+
+def view(function: Any) -> Any:
+    """A decorator: a kernel that returns memory as an array."""
+    return kernel(function, views=True)
 
 
 def entry(function: Any) -> Any:
@@ -102,7 +135,7 @@ def c_address(call: Any) -> int:
 def _alone(function: Any) -> Iterator[None]:
     """Within this no other process compiles: those that wait take what this one keeps on disk.
 
-    Nor is garbage collected, of which numba's compiler leaves none, and which takes a fifth of its time.
+    Nor is garbage looked for, which takes a fifth of the time.
     """
     with contextlib.ExitStack() as stack:
         if gc.isenabled():

@@ -200,22 +200,24 @@ def jacobian_length(model: Any, data: Any, memory: Any) -> int:
 
 @kernel
 def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
-    """Copy the Jacobians of all rows: MuJoCo's own are gone when the next step asks for forces."""
+    """Copy the Jacobians of all rows, without zeros: MuJoCo's own are gone when the next step asks for forces."""
     rows, sparse, limit = (
         rows_of(memory),
         mj_isSparse(memory.model),
         reals(data.efc_frictionloss, data.nefc),
     )
     lengths, begins = integers(data.efc_J_rownnz, data.nefc), integers(data.efc_J_rowadr, data.nefc)
-    size = jacobian_length(model, data, memory)
+    size, total = jacobian_length(model, data, memory), 0
     given, columns = reals(data.efc_J, size), integers(data.efc_J_colind, size)
     jacobian, column = reals(memory.jacobian_at, size), integers(memory.column_at, size)
-    for n in range(size):
-        jacobian[n], column[n] = given[n], columns[n] if sparse else n % model.nv
     for r in range(len(rows)):
-        row = rows[r]
-        row.first = begins[r] if sparse else r * model.nv
-        row.length, row.limit = lengths[r] if sparse else model.nv, limit[r]
+        row, begin = rows[r], begins[r] if sparse else r * model.nv
+        row.first, row.limit = total, limit[r]
+        for n in range(begin, begin + (lengths[r] if sparse else model.nv)):
+            if given[n] != 0:
+                jacobian[total], column[total] = given[n], columns[n] if sparse else n - begin
+                total += 1
+        row.length = total - row.first
         row.kind, row.remembered = ONE_SIDED if r >= data.ne + data.nf else EQUALITY, 0.0
         if data.ne <= r < data.ne + data.nf:
             row.kind = DRY

@@ -8,6 +8,7 @@ addresses: an array would cost five microseconds, as much as a step of a small s
 from __future__ import annotations
 
 import ctypes
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 from mujoco.introspect import ast_nodes, structs
 from numba import types
 from numba.extending import intrinsic
+from numba.np.arrayobj import np_cfarray
 
 from .compiling import c_function
 
@@ -102,26 +104,23 @@ WARNINGS = tuple(
 # -- addresses in compiled code --------------------------------------------------------------------
 
 
-def _pointer(item: Any) -> Any:
-    """A compiled function: an address as a pointer to items of a numba type."""
-
-    @intrinsic  # type: ignore[untyped-decorator]
-    def pointer(context: Any, address: Any) -> Any:
-        def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
-            return builder.inttoptr(args[0], context.get_value_type(call.return_type))
-
-        return types.CPointer(item)(types.int64), code
-
-    return pointer
-
-
 def array_at(item: Any) -> Any:
     """A compiled function: the array of a shape at an address, of a structured or numba type."""
-    pointer = _pointer(numba.from_dtype(item) if isinstance(item, np.dtype) else item)
+    kind = numba.from_dtype(item) if isinstance(item, np.dtype) else item
+    if isinstance(item, np.dtype):  # its own name has all fields, and is in those of all functions
+        kind.name = f"Record{zlib.crc32(kind.name.encode())}"
 
-    @numba.njit(no_cpython_wrapper=True)  # type: ignore[untyped-decorator]
-    def array(address: int, shape: Any) -> Any:
-        return numba.carray(pointer(address), shape)
+    @intrinsic  # type: ignore[untyped-decorator]
+    def array(context: Any, address: Any, shape: Any) -> Any:
+        whole = types.Array(kind, getattr(shape, "count", 1), "C")
+
+        def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
+            pointer = types.CPointer(kind)
+            first = builder.inttoptr(args[0], context.get_value_type(pointer))
+            view = whole(pointer, call.args[1])
+            return np_cfarray(context, builder, view, (first, args[1]))
+
+        return whole(types.int64, shape), code
 
     return array
 

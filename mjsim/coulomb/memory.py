@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import types
 
-from .compiling import c_function, kernel
-from .engine import MJ_CONTACT, array_at, reals
+from .compiling import c_function, view
+from .engine import MJ_CONTACT, array_at, integers, reals
 from .parameters import LAW, Law
 
 NEW, OPEN, STICKS, SLIDES = range(4)
@@ -56,6 +56,8 @@ CONTACT = np.dtype(
         ("mu", _f8, 5),  # coefficients of friction: two of sliding, of spin, two of rolling, m
         ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
+        ("closes", _i4),  # whether Newton's method has just found that it does
+        ("share", _f8),  # part of friction without a limit that it has
     ],
     align=True,
 )
@@ -73,8 +75,11 @@ friction of MuJoCo's own contacts, which a solution leaves out."""
 ROW = np.dtype(
     [
         ("kind", _i4),
-        ("first", _i4),  # where its Jacobian begins, and how long that is
+        ("first", _i4),  # where its Jacobian begins, and how long that is without zeros
         ("length", _i4),
+        # if it is the first of a unit of Newton's method: how many rows that has, else 0; its contact,
+        # or -1; a degree of freedom that it moves, -1: none; the next unit of its island
+        *((name, _i4) for name in ("dim", "contact", "dof", "next")),
         ("R", _f8),  # regularisation: acceleration per force, kg-1
         ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
         ("remembered", _f8),  # force of the step before, or of the last solution of this one, N
@@ -88,6 +93,18 @@ ROW = np.dtype(
     align=True,
 )
 """A constraint row, of the same number as in mjData."""
+
+DOF = np.dtype(
+    [
+        ("label", _i4),  # the first one of its island
+        ("next", _i4),  # the next one of its island; -1: it is the last
+        ("unit", _i4),  # of the first one: the first unit of the island
+        ("closes", _i4),  # of the first one: whether a contact of the island has just closed
+        ("place", _i4),  # its number in its island
+        ("envelope", _i4),  # where the row of that number begins in the derivative
+    ]
+)
+"""A degree of freedom, in Newton's method."""
 
 POSE = np.dtype(
     [("geoms", _i4, 2), ("dim", _i4), ("address", _i4)]
@@ -116,6 +133,7 @@ MEMORY = np.dtype(
     [
         ("law", LAW),
         *((name, _i8) for name in ("address", "model", "data")),  # of this, mjModel and mjData
+        ("nv", _i8),
         *((name, _f8) for name in ("time", "timestep", "called")),  # of the last step, call; s
         ("bounces", _i8),  # how many geoms have a restitution: all or none
         ("least", _f8),  # distance by which contacts move at least where points are put back, m
@@ -134,7 +152,8 @@ MEMORY = np.dtype(
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
-        ("restitution_at", _i8),
+        *((f"{name}_at", _i8) for name in ("restitution", "dof")),
+        *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "lower", "upper")),
     ],
     align=True,
 )
@@ -142,21 +161,40 @@ MEMORY = np.dtype(
 
 memories, contacts_at, rows_at = array_at(MEMORY), array_at(CONTACT), array_at(ROW)
 poses_at, pairs_at, bodies_at = array_at(POSE), array_at(PAIR), array_at(FREE_BODY)
+dofs_at = array_at(DOF)
 
 
-@kernel
+@view
 def contacts_of(memory: Any) -> Any:
     """The contacts of this step."""
     return contacts_at(memory.contact_at, memory.contacts)
 
 
-@kernel
+@view
 def rows_of(memory: Any) -> Any:
     """All constraint rows."""
     return rows_at(memory.row_at, memory.rows)
 
 
-@kernel
+@view
+def dofs_of(memory: Any) -> Any:
+    """All degrees of freedom, of a rigid simulation."""
+    return dofs_at(memory.dof_at, memory.nv)
+
+
+@view
+def columns_of(memory: Any, row: Any) -> Any:
+    """The degrees of freedom that a row moves."""
+    return integers(memory.column_at + 4 * row.first, row.length)
+
+
+@view
+def jacobian_of(memory: Any, row: Any) -> Any:
+    """The Jacobian of a row, of those degrees of freedom."""
+    return reals(memory.jacobian_at + 8 * row.first, row.length)
+
+
+@view
 def dry_of(memory: Any, count: int) -> Any:
     """Forces of dry friction that are remembered, N or N m."""
     return reals(memory.dry_at, count)
@@ -200,6 +238,12 @@ class Simulation:
         self._own("point", np.zeros(MJ_CONTACT.itemsize // 8, np.int64))
         record["bounces"] = len(law.restitution)
         self._own("restitution", np.array(law.restitution, np.float64))
+        record["nv"] = nv = model.nv if law.rigid else 0
+        self._own("dof", np.zeros(nv, DOF))
+        for name in ("residual", "tried", "step"):
+            self._own(name, np.zeros(nv))
+        for name in ("lower", "upper"):
+            self._own(name, np.zeros((nv, nv)))
         self._own("xpos", np.zeros((model.ngeom, 3)))
         self._own("xmat", np.zeros((model.ngeom, 9)))
         self.make_room(16, 64, 64 * min(model.nv, 16))

@@ -6,16 +6,15 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .engine import integers, reals
-from .memory import STICKS, contacts_of, rows_of
+from .engine import reals
+from .memory import STICKS, columns_of, contacts_of, jacobian_of, rows_of
 
 
 @kernel
-def times(model: Any, memory: Any, row: Any, vector: Any) -> float:
+def times(memory: Any, row: Any, vector: Any) -> float:
     """A row of the Jacobian times a vector of all degrees of freedom."""
-    jacobian = reals(memory.jacobian_at + 8 * row.first, row.length)
-    column, total = integers(memory.column_at + 4 * row.first, row.length), 0.0
-    for n in range(row.length):
+    column, jacobian, total = columns_of(memory, row), jacobian_of(memory, row), 0.0
+    for n in range(len(column)):
         total += jacobian[n] * vector[column[n]]
     return total
 
@@ -23,11 +22,9 @@ def times(model: Any, memory: Any, row: Any, vector: Any) -> float:
 @kernel
 def multiply(model: Any, data: Any, memory: Any) -> None:
     """Set the residuals of all rows to their Jacobian times the accelerations."""
-    rows, accelerations, moves = rows_of(memory), reals(data.qacc, model.nv), False
-    for i in range(model.nv):
-        moves |= accelerations[i] != 0
+    rows, accelerations = rows_of(memory), reals(data.qacc, model.nv)
     for r in range(len(rows)):
-        rows[r].residual = times(model, memory, rows[r], accelerations) if moves else 0.0
+        rows[r].residual = times(memory, rows[r], accelerations)
 
 
 @kernel
@@ -66,7 +63,7 @@ def store_speeds(model: Any, data: Any, memory: Any) -> None:
         for j in range(3):
             contact.speed[j] = 0.0
         for t in range(2 if contact.dim > 1 else 0):
-            speed = times(model, memory, rows[contact.address + 1 + t], velocity)
+            speed = times(memory, rows[contact.address + 1 + t], velocity)
             for j in range(3):
                 contact.speed[j] += speed * contact.frame[1 + t, j]
 
@@ -91,5 +88,5 @@ def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
             before = 0.0
             for j in range(3):
                 before += contact.frame[1 + t, j] * contact.speed[j]
-            change = times(model, memory, rows[contact.address + 1 + t], velocity) - before
+            change = times(memory, rows[contact.address + 1 + t], velocity) - before
             reference[contact.address + 1 + t] -= change * share
