@@ -39,12 +39,12 @@ from .memory import (
     dry_of,
     make_room,
     pairs_at,
-    poses_at,
     rows_of,
 )
 from .parameters import AT_MOST, CORNER, FLUSH, STILL, UNMOVED
 
 SIZE = MJ_CONTACT.itemsize
+WORDS = SIZE // 8
 
 
 @kernel
@@ -55,26 +55,38 @@ def smaller_radius(model: Any, contact: Any) -> float:
     return float(min(one, other) or max(one, other))
 
 
+@kernel
+def same_geoms(one: Any, other: Any) -> bool:
+    """Whether two contacts are of the same geoms."""
+    return bool(one[0] == other[0] and one[1] == other[1])
+
+
 # -- nothing has moved -----------------------------------------------------------------------------
+
+
+@kernel
+def copy(source: int, target: int, count: int) -> None:
+    """Copy so many words of eight bytes from one address to another."""
+    given, kept = words(source, count), words(target, count)
+    for n in range(count):
+        kept[n] = given[n]
 
 
 @kernel
 def store_poses(model: Any, data: Any, memory: Any) -> None:
     """Store where geoms and contacts are, on which axes and Jacobians depend."""
-    xpos, xmat = reals(data.geom_xpos, 3 * model.ngeom), reals(data.geom_xmat, 9 * model.ngeom)
-    kept_xpos, kept_xmat = reals(memory.xpos_at, len(xpos)), reals(memory.xmat_at, len(xmat))
-    for i in range(len(xpos)):
-        kept_xpos[i] = xpos[i]
-    for i in range(len(xmat)):
-        kept_xmat[i] = xmat[i]
-    found, poses = engine_contacts(data.contact, data.ncon), poses_at(memory.pose_at, data.ncon)
-    for i in range(data.ncon):
-        contact, pose = found[i], poses[i]
-        pose.geoms[0], pose.geoms[1] = contact.geom[0], contact.geom[1]
-        pose.dim, pose.address = contact.dim, contact.efc_address
-        for j in range(3):
-            pose.pos[j], pose.mu[j] = contact.pos[j], contact.friction[j]
-            pose.normal[j], pose.tangent[j] = contact.frame[j], contact.frame[3 + j]
+    copy(data.geom_xpos, memory.xpos_at, 3 * model.ngeom)
+    copy(data.geom_xmat, memory.xmat_at, 9 * model.ngeom)
+    copy(data.contact, memory.pose_at, data.ncon * WORDS)
+
+
+@kernel
+def stayed(one: Any, other: Any) -> bool:
+    """Whether numbers are what they were."""
+    still = True
+    for i in range(len(one)):
+        still = still and abs(one[i] - other[i]) < STILL
+    return still
 
 
 @kernel
@@ -82,28 +94,22 @@ def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
     """Whether geoms and contacts are where they were when their poses were stored."""
     if memory.ncon != data.ncon or memory.rows != data.nefc or memory.dry != data.nf:
         return False
-    xpos, xmat = reals(data.geom_xpos, 3 * model.ngeom), reals(data.geom_xmat, 9 * model.ngeom)
-    kept_xpos, kept_xmat = reals(memory.xpos_at, len(xpos)), reals(memory.xmat_at, len(xmat))
-    for i in range(len(xpos)):
-        if not abs(xpos[i] - kept_xpos[i]) < STILL:
-            return False
-    for i in range(len(xmat)):
-        if not abs(xmat[i] - kept_xmat[i]) < STILL:
-            return False
-    found, poses = engine_contacts(data.contact, data.ncon), poses_at(memory.pose_at, data.ncon)
+    places, axes = 3 * model.ngeom, 9 * model.ngeom
+    if not stayed(reals(data.geom_xpos, places), reals(memory.xpos_at, places)):
+        return False
+    if not stayed(reals(data.geom_xmat, axes), reals(memory.xmat_at, axes)):
+        return False
+    found = engine_contacts(data.contact, data.ncon)
+    poses = engine_contacts(memory.pose_at, data.ncon)
     for i in range(data.ncon):
         contact, pose = found[i], poses[i]
-        if pose.geoms[0] != contact.geom[0] or pose.geoms[1] != contact.geom[1]:
+        if not same_geoms(contact.geom, pose.geom) or pose.dim != contact.dim:
             return False
-        if pose.dim != contact.dim or pose.address != contact.efc_address:
+        if pose.efc_address != contact.efc_address or not stayed(contact.frame, pose.frame):
             return False
         for j in range(3):
-            if not (
-                FLUSH * abs(contact.pos[j] - pose.pos[j]) < STILL
-                and abs(contact.friction[j] - pose.mu[j]) < STILL
-                and abs(contact.frame[j] - pose.normal[j]) < STILL
-                and abs(contact.frame[3 + j] - pose.tangent[j]) < STILL
-            ):
+            moved = FLUSH * abs(contact.pos[j] - pose.pos[j])
+            if not max(moved, abs(contact.friction[j] - pose.friction[j])) < STILL:
                 return False
     return True
 
@@ -237,7 +243,7 @@ def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
 @kernel
 def square_apart(one: Any, other: Any) -> float:
     """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms."""
-    if one.geoms[0] != other.geoms[0] or one.geoms[1] != other.geoms[1]:
+    if not same_geoms(one.geoms, other.geoms):
         return math.inf
     square = 0.0
     for side in range(2):
@@ -475,12 +481,6 @@ def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
 
 
 @kernel
-def same_geoms(one: Any, other: Any) -> bool:
-    """Whether two contacts are of the same geoms."""
-    return bool(one[0] == other[0] and one[1] == other[1])
-
-
-@kernel
 def complete_frame(frame: Any) -> None:
     """Give a normal two tangents."""
     normal, across, along, thin = frame[0], frame[1], frame[2], 0
@@ -524,12 +524,7 @@ def angle_to(pos: Any, old: Any) -> float:
 @kernel
 def add_point(data: Any, memory: Any, old: Any) -> None:
     """Add a lost point to mjData, else as the last of its pair of geoms there is."""
-    template, copy = (
-        words(data.contact + SIZE * old.index, SIZE // 8),
-        words(memory.point_at, SIZE // 8),
-    )
-    for n in range(SIZE // 8):
-        copy[n] = template[n]
+    copy(data.contact + SIZE * old.index, memory.point_at, WORDS)
     point = engine_contacts(memory.point_at, 1)[0]
     point.dist = old.gap
     for j in range(3):

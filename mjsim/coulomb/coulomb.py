@@ -17,7 +17,7 @@ import numpy.typing as npt
 from .callback import CALLBACK
 from .memory import Simulation, check_state, sizes
 from .parameters import CCD_TOLERANCE, Law
-from .step import finish, settle
+from .step import finish
 
 _RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
 _INTEGRATORS = {
@@ -217,7 +217,7 @@ class Coulomb:
                 raise ValueError(
                     "the data whose last forces are asked for are unknown: state(data)"
                 )
-            settle(self.model._address, of._address, simulation.address)
+            finish(self.model._address, of._address, simulation.address, True)
         return simulation.state()
 
     def restore(self, state: Mapping[str, npt.NDArray[Any]], data: Any = None) -> None:
@@ -321,7 +321,7 @@ class Coulomb:
         return simulation, active
 
     def _leave(self, data: Any, simulation: Simulation, active: int) -> None:
-        finish(self.model._address, data._address, simulation.address)
+        finish(self.model._address, data._address, simulation.address, False)
         simulation.active[0] = active
         CALLBACK.unset(self.model)
 

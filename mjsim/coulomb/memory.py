@@ -106,13 +106,6 @@ DOF = np.dtype(
 )
 """A degree of freedom, in Newton's method."""
 
-POSE = np.dtype(
-    [("geoms", _i4, 2), ("dim", _i4), ("address", _i4)]
-    + [(name, _f8, 3) for name in ("pos", "normal", "tangent", "mu")],
-    align=True,
-)
-"""Where a contact of mjData was when the Jacobians were copied."""
-
 PAIR = np.dtype([("geoms", _i8), ("contact", _i8)])
 """A contact by its pair of geoms, one number for both."""
 
@@ -160,8 +153,7 @@ MEMORY = np.dtype(
 """All that a simulation remembers; arrays by their addresses."""
 
 memories, contacts_at, rows_at = array_at(MEMORY), array_at(CONTACT), array_at(ROW)
-poses_at, pairs_at, bodies_at = array_at(POSE), array_at(PAIR), array_at(FREE_BODY)
-dofs_at = array_at(DOF)
+pairs_at, bodies_at, dofs_at = array_at(PAIR), array_at(FREE_BODY), array_at(DOF)
 
 
 @view
@@ -262,7 +254,7 @@ class Simulation:
         """Make the arrays at least so long; what they hold stays."""
         wanted = {"contacts": contacts, "rows": rows, "jacobian": jacobian}
         kinds: dict[str, dict[str, Any]] = {
-            "contacts": {"contact": CONTACT, "before": CONTACT, "pose": POSE, "pair": PAIR},
+            "contacts": {"contact": CONTACT, "before": CONTACT, "pose": MJ_CONTACT, "pair": PAIR},
             "rows": {"row": ROW, "dry": np.float64},
             "jacobian": {"jacobian": np.float64, "column": np.int32},
         }

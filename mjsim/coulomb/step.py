@@ -288,16 +288,13 @@ def serve(m: int, d: int) -> None:
 
 
 @entry
-def finish(m: int, d: int, at: int) -> None:
-    """Find the forces of the last step, before anybody changes accelerations in mjData."""
-    conclude(models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0])
+def finish(m: int, d: int, at: int, storing: bool) -> None:
+    """Find the forces of the last step, before anybody changes accelerations in mjData.
 
-
-@entry
-def settle(m: int, d: int, at: int) -> None:
-    """Find the forces of the last step, and store them as a state has them."""
+    If they are for `storing`, put them where a state has them.
+    """
     model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
     conclude(model, data, memory)
-    if not memory.stored:  # what goes on from here does as what is restored
+    if storing and not memory.stored:  # what goes on from here does as what is restored
         store(model, data, memory, True)
         memory.stored, memory.ncon = 1, -1
