@@ -23,7 +23,7 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     for name in ("timestep", "impratio", "noslip_iterations"):
         setattr(option, name, getattr(settings, name))
     if settings.rigid:  # stiffer friction takes more iterations, softer friction creeps more
-        option.impratio = 1e3
+        option.impratio = 300
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     body.pos, body.mass, body.inertia = (p.R, 0.0, p.r), p.m, (p.j * p.m * p.r**2,) * 3

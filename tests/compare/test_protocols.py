@@ -216,15 +216,15 @@ def test_what_changes_by_little_among_what_changes_by_much_is_not_sure():
     assert unlike(np.zeros(0)).size == 0
 
 
-def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it(runner):
+def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it():
     """Also where neither half the step nor other starts change it; what is measured takes the place
     of what errors of one sign could come to."""
     p = Parameters.named("reference")
     value = estimate(12.0, drift=0.0, solver=1.0)
-    sure = settled._with_changes(runner, value, 0.0, p, 12.0).uncertainty
+    sure = settling.with_changes(value, 0.0, p, 12.0, 2).uncertainty
     steps = 2 / (p.c * coarse_step(p))
     assert sure == pytest.approx(12.0 * settling.SOLVED * math.sqrt(steps))
-    assert settled._with_changes(runner, value, 3.0, p, 12.0).uncertainty == pytest.approx(6.0)
+    assert settling.with_changes(value, 3.0, p, 12.0, 2).uncertainty == pytest.approx(6.0)
 
 
 def test_first_top_lies_between_samples():

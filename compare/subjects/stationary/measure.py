@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 from compare.kit import settling
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.runner import Runner, coarse_step
+from compare.kit.runner import Runner
 from compare.kit.scales import time_unit
-from compare.kit.settling import SOLVED, SettlingCriteria, SteadyState
-from compare.kit.statistics import Estimate, estimate
+from compare.kit.settling import SettlingCriteria, SteadyState
+from compare.kit.statistics import Estimate
 from compare.kit.step_pairs import Start
 from model import Case, Parameters, State
 from model.drag import QUADRATIC
@@ -31,7 +31,7 @@ def measure(
     runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The case that every start ends in, and once for every distinct state its values."""
-    sharp, refine = runner.effort.settled_sharp, runner.effort.settled_refine
+    sharp = runner.effort.settled_sharp
     alike: dict[Attractor, list[SteadyState]] = {}
     without: dict[Attractor, Missing] = {}
     starts = []
@@ -59,16 +59,10 @@ def measure(
             alike.setdefault(Attractor.of(state), []).append(state)
     yield from (each for kind, each in without.items() if kind not in alike)
     groups = [alike[kind] for kind in sorted(alike)]
-    again = []  # with half the step, from the mean, at the height from which it started
-    for state, *_ in groups:
-        x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
-        again.append(replace(state.start, x0=x0.stacked()))
     # With several time steps the limit is extrapolated from all of them, and half the step isn't
     # needed here.
-    criteria = SettlingCriteria(refine=refine, span=20.0, sharp=sharp)
-    refined = (
-        settling.settle(runner, again, criteria) if refine > 1 else [state for state, *_ in groups]
-    )
+    firsts = [state for state, *_ in groups]
+    refined = settling.settle_finer(runner, firsts, SettlingCriteria(span=20.0, sharp=sharp))
     for same, fine in zip(groups, refined, strict=True):
         yield from _values(runner, same, fine)
 
@@ -130,34 +124,11 @@ def _values(
                 for s in same
                 for n in sizes
             ]
+            refine = runner.effort.settled_refine
             for n, size in sizes.items():
-                yield _row(
-                    runner,
-                    fine,
-                    n,
-                    _with_changes(runner, fine.values[n], max(changes) * size, p, size),
-                )
-
-
-def _with_changes(
-    runner: Runner, value: Estimate, change: float, p: Parameters, size: float
-) -> Estimate:
-    """A value of a settled state, of which half the step and other starts change so much; `size` is its
-    natural size.
-
-    Errors of solving for forces add up from step to step, for a time 1/c. What adds up with one sign
-    is twice as much with half the step, so that it is about twice the change; what adds up at random
-    the change may not show. Both take the place of what `settling` allows for them. (The second was
-    added after a round played blind, where two claims were refuted without it.)"""
-    if runner.effort.settled_refine == 1:
-        return value.also(start=change)
-    steps = runner.effort.settled_refine / (p.c * coarse_step(p))
-    return estimate(
-        value.value,
-        drift=value.budget["drift"],
-        solver_or_start=2 * change,
-        solver_at_random=SOLVED * math.sqrt(steps) * size,
-    )
+                change = max(changes) * size
+                sure = settling.with_changes(fine.values[n], change, p, size, refine)
+                yield _row(runner, fine, n, sure)
 
 
 def mirrored(
