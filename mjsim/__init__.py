@@ -21,13 +21,13 @@ if not hasattr(mujoco.MjModel, "pair_adhesion"):
         "runs on 3.3.6 and later"
     )
 
-from mjsim.contact_settings import ContactSettings
+from mjsim.contact_settings import ContactSettings, RigidContacts
 from mjsim.engine import Run, simulate, simulate_many
 
 if TYPE_CHECKING:
     from mjsim.coulomb import Coulomb
 
-__all__ = ["ContactSettings", "Coulomb", "Run", "simulate", "simulate_many"]
+__all__ = ["ContactSettings", "Coulomb", "RigidContacts", "Run", "simulate", "simulate_many"]
 
 
 def __getattr__(name: str) -> Any:

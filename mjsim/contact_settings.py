@@ -18,7 +18,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -50,19 +50,54 @@ def _choice(*known: Any) -> Any:
     return dataclasses.field(default=known[0], metadata={"known": known})
 
 
+def _check(settings: Any) -> None:
+    """Check the fields of settings as they are declared."""
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        if "unit" in field.metadata:
+            check_number(field.name, value, field.metadata["unit"], field.metadata["allowed"])
+        elif "known" in field.metadata:
+            check_choice(field.name, value, field.metadata["known"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidContacts:
+    """Rigid contacts that obey Coulomb's law as `mjsim.Coulomb` has it for any model.
+
+    Raises `InputError` if the time step isn't positive.
+    """
+
+    timestep: float = _number(1e-3, "s", POSITIVE)
+    """Time step, s."""
+    midpoint: ClassVar[float] = 0.5
+    """Where in a step forces are taken, in steps after its beginning."""
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    def creep_speed(self, load: npt.ArrayLike) -> Array:
+        """Slip speed (m s-1) of a contact that rolls steadily, under a friction force of m times
+        `load` (m s-2): what a step changes by a share `YIELDS` of that."""
+        return np.asarray(YIELDS * self.timestep * np.asarray(load, dtype=float))
+
+    def dead_band(self, load: npt.ArrayLike) -> Array:
+        """Slip speed (m s-1) below which a contact counts as rolling, under such a force."""
+        return FORESEEN / YIELDS * self.creep_speed(load)
+
+    def touching(self, g: float) -> float:
+        """Gap (m) within which a ball at the start counts as touching."""
+        return 0.0
+
+
 @dataclass(frozen=True, kw_only=True)
 class ContactSettings:
-    """How contacts are set; names are MuJoCo's own where it has one. The defaults of its own contacts
-    belong to a step of 1 ms.
+    """How MuJoCo's own contacts are set, by its own names. The defaults belong to a step of 1 ms.
 
     Raises `InputError` if a value is outside what the engine can do or would be unstable.
     """
 
     timestep: float = _number(1e-3, "s", POSITIVE)
     """Time step, s."""
-    rigid: bool = _choice(True, False)
-    """Whether contacts are rigid and obey `mjsim.Coulomb`: then of all below only the integrator
-    counts."""
     solref: tuple[float, float] = (2e-3, 0.5)
     """Time constant (s) and damping ratio of the normal rows; `suited` makes them slower where
     friction asks for it."""
@@ -75,6 +110,8 @@ class ContactSettings:
     cone: str = _choice("elliptic", "pyramidal")
     integrator: str = _choice("Euler", "implicit", "implicitfast", "discrete")
     noslip_iterations: int = _number(0, "1", Range(0, whole=True))
+    midpoint: ClassVar[float] = 0.0
+    """Where in a step forces are taken, in steps after its beginning."""
 
     def __post_init__(self) -> None:
         if len(self.solref) != 2:
@@ -83,20 +120,7 @@ class ContactSettings:
             )
         check_number("solref time constant", self.solref[0], "s", POSITIVE)
         check_number("solref damping ratio", self.solref[1], "1", POSITIVE)
-        for field in dataclasses.fields(self):
-            if "unit" in field.metadata:
-                check_number(
-                    field.name,
-                    getattr(self, field.name),
-                    field.metadata["unit"],
-                    field.metadata["allowed"],
-                )
-            elif "known" in field.metadata:
-                check_choice(field.name, getattr(self, field.name), field.metadata["known"])
-        if self.rigid and (self.noslip_iterations or self.integrator == "discrete"):
-            raise InputError(
-                "rigid contacts need noslip_iterations = 0 and another integrator than 'discrete'"
-            )
+        _check(self)
         if self.timestep > self.largest_timestep * (1 + 1e-12):
             raise InputError(
                 f"timestep = {self.timestep:g} s is too large for the contact settings: solref "
@@ -110,8 +134,7 @@ class ContactSettings:
 
         The normal rows need tc >= 2 h (else the engine silently replaces tc), the friction rows b_f
         h <= 1 to die out without changing sign."""
-        own = min(self.solref[0] / 2, self.solreffriction * self.solimp / 2)
-        return math.inf if self.rigid else own
+        return min(self.solref[0] / 2, self.solreffriction * self.solimp / 2)
 
     @property
     def b_f(self) -> float:
@@ -136,23 +159,13 @@ class ContactSettings:
         return friction * self.b_f * slip_speed / (self.softness * load)
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) of a contact that rolls steadily, under a friction force of m times
-        `load`.
-
-        Soft ones creep at R_t f_t / b_f. Of rigid ones it is what a step changes by a share `YIELDS`
-        of the force."""
-        time = YIELDS * self.timestep if self.rigid else self.softness / self.impratio / self.b_f
-        return np.asarray(time * np.asarray(load, dtype=float))
+        """Slip speed (m s-1) of a contact that rolls steadily, R_t f_t / b_f, under a friction force of
+        m times `load` (m s-2)."""
+        return np.asarray(self.softness / self.impratio / self.b_f * np.asarray(load, dtype=float))
 
     def dead_band(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) below which a contact counts as rolling, for a friction force of m
-        times `load`."""
-        return self.creep_speed(load) * (FORESEEN / YIELDS if self.rigid else 0.4)
-
-    @property
-    def midpoint(self) -> float:
-        """Where in a step the forces are taken, in steps after its beginning."""
-        return 0.5 if self.rigid else 0.0
+        """Slip speed (m s-1) below which a contact counts as rolling, under such a force."""
+        return 0.4 * self.creep_speed(load)
 
     def contact_decay(self, mu: float, eta: float) -> float:
         """Largest factor by which a small displacement changes in a step, where a ball slips at
@@ -160,9 +173,7 @@ class ContactSettings:
 
         With a low impedance the accelerations are those of springs and dampers, -K (2/tc v + 1/(tc
         dr)^2 gap), and friction turns them against each other: K = [[1, eta], [-mu, 1]], with the
-        eigenvalues 1 +- i sqrt(mu eta). Beyond 1 the contacts chatter. 0 if they are rigid."""
-        if self.rigid:
-            return 0.0
+        eigenvalues 1 +- i sqrt(mu eta). Beyond 1 the contacts chatter."""
         (time, ratio), pull = self.solref, 1 + 1j * math.sqrt(mu * eta)
         damping, stiffness = 2 * self.timestep / time, (self.timestep / (time * ratio)) ** 2
         return float(
@@ -172,7 +183,7 @@ class ContactSettings:
     def depth(self, load: float) -> float:
         """How deep the ball sinks under a steady load (force divided by mass, m s-2) while it rolls,
         m; slip lifts it."""
-        return 0.0 if self.rigid else self.softness * load / self.k
+        return self.softness * load / self.k
 
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching: twice the depth to which
@@ -225,7 +236,7 @@ class ContactSettings:
         its own), and impratio is raised with the softness, so that that of the friction rows stays
         the same. The engine's least impedance, 1e-4, may stop that short."""
         check_type("p", p, Parameters)
-        settings = cls.at(timestep, rigid=False, **changes)
+        settings = cls.at(timestep, **changes)
         if "solref" not in changes:
             settings = settings.suited(p)
         speed = abs(p.R * p.omega_0) if max_slip_speed is None else max_slip_speed
@@ -241,3 +252,7 @@ class ContactSettings:
             for name in ("solreffriction", "impratio")
         }
         return dataclasses.replace(settings, **fitting | {"solimp": solimp} | changes)
+
+
+ContactModel = RigidContacts | ContactSettings
+"""How the ball's contacts are set."""

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from mjsim import recorder, scene
 from mjsim.classify import Classifier
-from mjsim.contact_settings import ContactSettings
+from mjsim.contact_settings import ContactModel, ContactSettings, RigidContacts
 from mjsim.mid_step import Ball, resistance
 from model import (
     Events,
@@ -54,7 +54,7 @@ class Run:
     p : parameters; its omega_0 is used if there is no `flow`
     x0 : state (19) at the start, 6 entries, or 8 with h and v_h
     t_end : duration, s
-    settings : rigid contacts under Coulomb's law if None, in steps of 1 ms
+    settings : `RigidContacts` under Coulomb's law, those of 1 ms if None; or `ContactSettings`
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
     state : `state()` of an earlier process, from which to go on
@@ -76,7 +76,7 @@ class Run:
         x0: npt.ArrayLike,
         t_end: float,
         flow: Flow | None = None,
-        settings: ContactSettings | None = None,
+        settings: ContactModel | None = None,
         *,
         sample_interval: float | None = None,
         theta_0: float = 0.0,
@@ -85,8 +85,8 @@ class Run:
     ) -> None:
         check_type("p", p, Parameters)
         check_type("flow", flow, Flow | None)
-        check_type("settings", settings, ContactSettings | None)
-        self._flow, self._settings = flow or Flow.steady(p.omega_0), settings or ContactSettings()
+        check_type("settings", settings, ContactModel | None)
+        self._flow, self._settings = flow or Flow.steady(p.omega_0), settings or RigidContacts()
         self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
         self._state, self._progress = state, progress or (lambda done: None)
         self._timestep = self._settings.timestep
@@ -172,9 +172,9 @@ class Run:
         return block
 
 
-def check_start(x: State, p: Parameters, settings: ContactSettings) -> None:
+def check_start(x: State, p: Parameters, settings: ContactModel) -> None:
     """`check_place`, and a warning if friction at both contacts makes soft ones chatter."""
-    if settings.contact_decay(p.mu, p.eta) > 1:
+    if isinstance(settings, ContactSettings) and settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
             f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters "
             f"with these settings; "
@@ -208,7 +208,7 @@ def simulate(
     x0: npt.ArrayLike,
     t_end: float,
     flow: Flow | None = None,
-    settings: ContactSettings | None = None,
+    settings: ContactModel | None = None,
     *,
     sample_interval: float | None = None,
     theta_0: float = 0.0,
@@ -232,7 +232,7 @@ def simulate_many(
     x0s: Sequence[npt.ArrayLike],
     t_end: float,
     flow: Flow | Sequence[Flow] | None = None,
-    settings: ContactSettings | None = None,
+    settings: ContactModel | None = None,
     *,
     sample_interval: float | None = None,
     theta_0: float = 0.0,

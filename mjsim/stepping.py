@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from mjsim import recorder
-from mjsim.contact_settings import LANDING_PARTS, ContactSettings
+from mjsim.contact_settings import LANDING_PARTS, ContactModel, RigidContacts
 from mjsim.coulomb import Coulomb
 from mjsim.coulomb.compiling import entry
 from mjsim.coulomb.engine import mj_step, models
@@ -201,11 +201,12 @@ class JointedBall:
     """
 
     def __init__(
-        self, model: Any, p: Parameters, settings: ContactSettings, x: State, theta_0: float
+        self, model: Any, p: Parameters, settings: ContactModel, x: State, theta_0: float
     ) -> None:
         self.model, self.data = model, mujoco.MjData(model)
-        self.law = Coulomb(model, rigid=True, depth=0.0, share=SHARE) if settings.rigid else None
-        if settings.rigid:
+        self.law = None
+        if isinstance(settings, RigidContacts):
+            self.law = Coulomb(model, rigid=True, depth=0.0, share=SHARE)
             model.pair_margin[:] = p.g * settings.timestep**2
         self.lead = settings.midpoint * settings.timestep
         """How far places are ahead of velocities, s."""

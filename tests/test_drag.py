@@ -9,7 +9,7 @@ import pytest
 import analytic
 import mjsim
 from analytic.mechanics import drag
-from mjsim import ContactSettings, engine
+from mjsim import RigidContacts, engine
 from mjsim.mid_step import Ball
 from mjsim.mid_step import resistance as in_mujoco
 from model import Flow, InputError, Parameters, State
@@ -56,7 +56,7 @@ def test_slipping_converges_with_the_square_of_the_step(law):
     p, x = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0), [0, 0, 13.0, -20.0, -5.0, 22.0]
     exact = analytic.simulate(p, x, 0.08, rtol=1e-12).x[-1]
     coarse, fine = (
-        mjsim.simulate(p, x, 0.08, settings=ContactSettings(timestep=h), sample_interval=0.02).x[-1]
+        mjsim.simulate(p, x, 0.08, settings=RigidContacts(timestep=h), sample_interval=0.02).x[-1]
         - exact
         for h in (4e-4, 1e-4)
     )

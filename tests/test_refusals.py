@@ -14,7 +14,7 @@ from analytic.bifurcation.diagram import number_of_folds
 from analytic.flowmeter import response
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary.slipping_branch import hopf_places
-from mjsim import ContactSettings
+from mjsim import ContactSettings, RigidContacts
 from model import Case, Flow, InputError, Parameters, State
 from model.drag import LAWS
 from model.kinematics import full_state
@@ -62,7 +62,7 @@ REFUSED = [
     (lambda: mjsim.simulate(P, AT_REST, 1.0, 25.0), "^flow must be Flow, not float$"),
     (
         lambda: mjsim.simulate(P, AT_REST, 1.0, settings=""),
-        "^settings must be ContactSettings, not str$",
+        "^settings must be RigidContacts or ContactSettings, not str$",
     ),
     (
         lambda: mjsim.simulate_many(P, [AT_REST], 1.0),
@@ -202,12 +202,13 @@ REFUSED = [
     ),
     *((lambda n=n: mjsim.simulate_many([P] * n, [], 0.1), EVERY) for n in (0, 1)),
     (lambda: mjsim.simulate_many([P] * 3, [AT_REST] * 3, 0.1, [Flow.steady(1.0)] * 2), EVERY),
+    (lambda: RigidContacts(timestep=0.0), r"timestep = 0 s is out of range: must be > 0"),
     *(
         (lambda given=given: ContactSettings(**given), says)
         for given, says in (
             ({"timestep": 0.0}, r"timestep = 0 s is out of range: must be > 0"),
             (
-                {"timestep": 2e-3, "rigid": False},
+                {"timestep": 2e-3},
                 "timestep = 0.002 s is too large for the contact settings: .* at most 0.001 s",
             ),
             ({"solimp": 1.0}, r"solimp = 1 is out of range"),
@@ -215,12 +216,6 @@ REFUSED = [
             ({"solref": (0.1,)}, r"solref = .* must be two numbers"),
             ({"cone": "eliptic"}, r"cone = 'eliptic' must be one of .*did you mean 'elliptic'"),
             ({"integrator": "RK4"}, r"integrator = 'RK4' must be one of"),
-            ({"rigid": "no"}, "rigid = 'no' must be one of True, False"),
-            ({"noslip_iterations": 5}, "rigid contacts need noslip_iterations = 0"),
-            (
-                {"integrator": "discrete"},
-                "rigid contacts need .* another integrator than 'discrete'",
-            ),
         )
     ),
     (

@@ -14,7 +14,7 @@ from compare.commands import options, running, signals
 from compare.kit import collection, steady, sweep
 from compare.kit.tasks import failed_path, store
 from compare.view import motions
-from mjsim import ContactSettings
+from mjsim.contact_settings import ContactModel
 from model import Flow, InputError, storage, table
 from model.files import reading_json, write_text
 
@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
         from compare.view import viewer  # here, because nothing else needs it
 
         settings = running.settings(args, p)
-        if not isinstance(settings, ContactSettings):
+        if not isinstance(settings, ContactModel):
             raise InputError(f"--view shows MuJoCo, not {args.engine.name}")
         viewer.view(
             p, running.start(args), flow or Flow.steady(p.omega_0), settings, args.speed or 1.0

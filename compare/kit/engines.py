@@ -19,8 +19,8 @@ import analytic
 import mjsim
 from compare.adapters import KNOWN, siconos, vessel
 from compare.adapters.free import Library
-from mjsim import ContactSettings
-from mjsim.contact_settings import LANDING_PARTS
+from mjsim import ContactSettings, RigidContacts
+from mjsim.contact_settings import LANDING_PARTS, ContactModel
 from model import InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.errors import suggestion
@@ -37,7 +37,7 @@ class Role(Enum):
     """With its own settings and step, beside the one on trial."""
 
 
-AnySettings = ContactSettings | analytic.Settings | vessel.Settings
+AnySettings = RigidContacts | ContactSettings | analytic.Settings | vessel.Settings
 """Numerical settings of any engine."""
 Simulate = Callable[[Any, Callable[[float], None]], Trajectory]
 """One whole run of a `compare.kit.tasks.Task`; the function is called with the fraction done, from
@@ -135,7 +135,6 @@ def newcomer(step: float) -> ContactSettings:
     """MuJoCo's own contact parameters on the joints of this study."""
     return ContactSettings(
         timestep=step,
-        rigid=False,
         solref=(0.02, 1.0),
         solreffriction=0.02,
         solimp=0.9,
@@ -190,9 +189,9 @@ def _adapted(library: Library, marks: str) -> list[Engine]:
 
 MUJOCO = Engine(
     name="mujoco",
-    settings=ContactSettings,
+    settings=RigidContacts,
     options=("timestep",),
-    configure=lambda given, p: ContactSettings(**given),  # type: ignore[arg-type]
+    configure=lambda given, p: RigidContacts(**given),
     stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
@@ -206,6 +205,7 @@ MUJOCO = Engine(
 PLAIN = replace(
     MUJOCO,
     name="mujoco-plain",
+    settings=ContactSettings,
     configure=lambda given, p: plain(given.get("timestep", ContactSettings.timestep)).suited(p),
     stream=_unwarned,
     lands_within=1.0,
@@ -285,12 +285,13 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
     hundredth more, since it lags behind a force that still changes. A ball that rolls on both moves
     its load from one contact to the other, so that one may be at the limit of friction, and yield,
     while the other holds: where both bear something, neither slips faster than the other."""
-    if ENGINES[run.header.engine].settings is not ContactSettings:
+    if ENGINES[run.header.engine].settings not in (RigidContacts, ContactSettings):
         return run.slip_speed_A, run.slip_speed_B
     m, kept = run.header.parameters.m, run.header.settings
-    settings = ContactSettings.from_mapping(
-        {f.name: kept[f.name] for f in fields(ContactSettings) if f.name in kept}
-    )
+    settings: ContactModel = RigidContacts(timestep=kept["timestep"])
+    if not kept.get("rigid", "solref" not in kept):  # as files of versions before have it
+        known = {f.name: kept[f.name] for f in fields(ContactSettings) if f.name in kept}
+        settings = ContactSettings.from_mapping(known)
     friction = (
         np.hypot(run.force_A[:, 0], run.force_A[:, 2]),
         np.hypot(run.force_B[:, 1], run.force_B[:, 2]),

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mjsim import ContactSettings, engine, recorder, scene
+from mjsim import engine, recorder, scene
+from mjsim.contact_settings import ContactModel
 from mjsim.stepping import JointedBall
 from model import Flow, InputError, Parameters, State
 from model.parameters import POSITIVE, check_number
@@ -22,7 +23,7 @@ BEHIND = 0.1
 
 
 def view(
-    p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings, speed: float = 1.0
+    p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactModel, speed: float = 1.0
 ) -> None:
     """Open a window and simulate in real time, times `speed`, until it is closed.
 
@@ -49,7 +50,7 @@ def view(
         run(handle, ball, flow, settings.timestep, speed)
 
 
-def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> JointedBall:
+def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactModel) -> JointedBall:
     """A simulation for the viewer, with what only serves contact hidden."""
     x = State.one(x0)
     engine.check_timestep(settings.timestep, p, flow, float(flow.start[-1]), x)

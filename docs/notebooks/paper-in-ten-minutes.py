@@ -83,7 +83,7 @@ for omega_0 in flows:
     ]
 
 starts = np.linspace(4, 44, 11)
-settings = mjsim.ContactSettings.at(4e-3)
+settings = mjsim.RigidContacts(timestep=4e-3)
 at_rest = [0.0] * 6
 runs = mjsim.simulate_many(
     [p.replace(omega_0=float(omega_0)) for omega_0 in starts],
@@ -193,7 +193,7 @@ figure, axes = plt.subplots()
 theory = analytic.simulate(
     p, slipping.x, 180.0, flow=there_and_back, sample_interval=0.1
 )
-coarse = mjsim.ContactSettings.at(2e-3)
+coarse = mjsim.RigidContacts(timestep=2e-3)
 engine = mjsim.simulate(
     p, slipping.x, 180.0, flow=there_and_back, sample_interval=0.1, settings=coarse
 )

@@ -26,7 +26,8 @@ from docs.studies.states import (
     Stationary,
     number,
 )
-from mjsim import ContactSettings
+from mjsim import ContactSettings, RigidContacts
+from mjsim.contact_settings import ContactModel
 from model import Case, Contact, Events, State
 
 STEPS = (4e-3, 1e-3)
@@ -45,9 +46,9 @@ FINE = (4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4)
 KINDS = CLOSE, STICK = "close", "stick"
 
 
-def _at(step: float, settings: ContactSettings | None = None) -> Contestant:
+def _at(step: float, settings: ContactModel | None = None) -> Contestant:
     """MuJoCo with our settings for a time step, or others."""
-    return Contestant(MUJOCO.name, MUJOCO, step, settings or ContactSettings.at(step))
+    return Contestant(MUJOCO.name, MUJOCO, step, settings or RigidContacts(timestep=step))
 
 
 def reached(
@@ -150,7 +151,7 @@ def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0))
             "Coulomb's law, from rest",
         ]
     ]
-    plain, ours = ContactSettings(rigid=False), ContactSettings()
+    plain, ours = ContactSettings(), RigidContacts()
     for omega_0 in omegas:
         p = SMOOTH.replace(omega_0=omega_0)
         least, greatest = (float(end) for end in rolling_forces.admissible_interval(omega_0, p))

@@ -68,7 +68,7 @@ def _at(timestep: float, solimp: float, damping: float = 0.5, **changes: float) 
     """Settings with the given impedance and friction damping b_f h."""
     friction = 2 * timestep / (solimp * damping)
     given = {"solimp": solimp, "solreffriction": friction} | changes
-    return ContactSettings.at(timestep, rigid=False, **given)
+    return ContactSettings.at(timestep, **given)
 
 
 def _turning(timestep: float) -> float:

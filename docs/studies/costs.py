@@ -193,7 +193,7 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     ones: a machine that slows down does so for both. The bare steps are those of a settled run with
     its forces left as they are, and the ball held at its azimuth,
     where the wall stands, by an assignment a step."""
-    settings, p = ContactSettings(rigid=False), SLIPPING
+    settings, p = ContactSettings(), SLIPPING
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
     settled = JointedBall(model, p, settings, State.one(state.x), 0.0)

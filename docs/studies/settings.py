@@ -35,7 +35,8 @@ from compare.kit.pages import Rows
 from compare.kit.tasks import carry_out
 from docs.studies import states
 from docs.studies.states import CONTACT, ERRORS, OPEN, Contestant, Entry
-from mjsim import ContactSettings
+from mjsim import ContactSettings, RigidContacts
+from mjsim.contact_settings import ContactModel
 from model.files import make_directory
 
 STEP = 1e-3
@@ -78,8 +79,8 @@ def rungs(step: float) -> Ways:
         FACETS: NEWCOMER.at(step, states.SLIPPING.p),
         f"{LONE}, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
         LONE: newcomer(step),
-        OURS: ContactSettings.at(step, rigid=False),
-        LAW: ContactSettings.at(step),
+        OURS: ContactSettings.at(step),
+        LAW: RigidContacts(timestep=step),
     }
 
 
@@ -102,7 +103,7 @@ def landings(step: float) -> Rows:
     `states.HITTING`."""
     bare = plain(step)
     ways: Ways = {
-        f"{LAW} (mujoco)": ContactSettings.at(step),
+        f"{LAW} (mujoco)": RigidContacts(timestep=step),
         f"{OURS}, integrator implicit (mujoco-plain)": bare,
         "mujoco-plain, damping ratio 2": replace(bare, solref=(2 * step, 2.0)),
         "mujoco-plain, damping ratio 2, step divided by 10": replace(
@@ -173,8 +174,7 @@ def _contestants(ways: Ways) -> list[Contestant]:
     """They run without a warning where contacts chatter: what poor settings do is the question
     here."""
     engines = {
-        name: PLAIN if isinstance(each, ContactSettings) else NEWCOMER
-        for name, each in ways.items()
+        name: PLAIN if isinstance(each, ContactModel) else NEWCOMER for name, each in ways.items()
     }
     return [Contestant(name, engines[name], each.timestep, each) for name, each in ways.items()]
 

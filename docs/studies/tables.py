@@ -77,7 +77,7 @@ def variants(step: float) -> settings.Ways:
     firmly = f"{settings.OURS}, solreffriction {firm['solreffriction']:g}, solimp 0.1"
 
     def soft(**changes: Any) -> ContactSettings:
-        return ContactSettings.at(step, rigid=False, **changes)
+        return ContactSettings.at(step, **changes)
 
     return {
         "MuJoCo's defaults, cone pyramidal": replace(newcomer(step), cone="pyramidal"),

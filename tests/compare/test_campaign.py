@@ -26,7 +26,7 @@ from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
 from compare.kit.lock import Lock
 from compare.kit.tasks import Task
 from compare.kit.workers import Workers, _without_signals, dask, processes
-from mjsim import ContactSettings, Run
+from mjsim import ContactSettings, RigidContacts, Run
 from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 from tests.commands import refused, started, told
@@ -195,7 +195,7 @@ def test_every_input_is_part_of_the_identity():
         ),
         *(
             {"sample_interval": 0.1},
-            {"settings": ContactSettings.at(5e-4)},
+            {"settings": RigidContacts(timestep=5e-4)},
             {"flow": Flow.ramp(1, 2, 1)},
         ),
     )
@@ -450,7 +450,7 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
         Lock(tmp_path / "absent")
 
 
-RIGID, SOFT = ContactSettings.at(2.5e-4), ContactSettings.at(2.5e-4, rigid=False)
+RIGID, SOFT = RigidContacts(timestep=2.5e-4), ContactSettings.at(2.5e-4)
 
 
 def run_of(settings, state=None):

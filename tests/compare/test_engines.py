@@ -27,7 +27,7 @@ from compare.kit.engines import ENGINES
 from compare.kit.tasks import Task, carry_out, store
 from compare.validation import validate
 from docs.studies.states import LANDING, STATES
-from mjsim import ContactSettings
+from mjsim import RigidContacts
 from model import Flow, InputError, Parameters, State
 from model.drag import LAWS
 from model.kinematics import rotated, to_world
@@ -362,7 +362,7 @@ def ends(seed, step=1.25e-4):
     simulators = (
         analytic.simulate,
         partial(analytic.simulate, method="time-stepping", timestep=step),
-        partial(mjsim.simulate, settings=ContactSettings(timestep=step)),
+        partial(mjsim.simulate, settings=RigidContacts(timestep=step)),
         partial(analytic.simulate, leave_rolling="infeasible"),
     )
     return [

@@ -20,12 +20,12 @@ from PIL import Image
 import analytic
 import mjsim
 from compare.view import explore, geometry, page, viewer
-from mjsim import ContactSettings, recorder
+from mjsim import RigidContacts, recorder
 from model import Case, Flow, InputError, Parameters, State, storage
 from model.kinematics import rotated
 from tests.commands import refused, started, told
 
-P, SETTINGS = Parameters.named("reference"), ContactSettings()
+P, SETTINGS = Parameters.named("reference"), RigidContacts()
 
 
 @pytest.fixture(scope="module")

@@ -108,7 +108,7 @@ from model import Flow, Parameters
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 p, hopping, rest = Parameters.named("reference").replace(omega_0=25.0), Parameters.named("hopping"), [0] * 6
-soft = mjsim.ContactSettings(rigid=False)
+soft = mjsim.ContactSettings()
 calls = {
     "event": lambda t: analytic.simulate(p, rest, t, Flow.sine(20, 5, 1)),
     "time-stepping": lambda t: analytic.simulate(p, rest, t, method="time-stepping"),

@@ -9,7 +9,7 @@ import pytest
 
 from compare.kit import pages
 from docs.studies import confirmation, settings, statements, tables
-from mjsim import ContactSettings
+from mjsim import ContactSettings, RigidContacts
 from model import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -66,9 +66,8 @@ def test_formulas_are_what_mujoco_does_and_one_that_is_off_is_noticed():
 
 
 def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time():
-    rungs = list(settings.rungs(1e-3).values())[
-        1:
-    ]  # below them MuJoCo as it comes, an engine of its own
+    _, *rungs, law = settings.rungs(1e-3).values()  # the first one is an engine of its own
+    assert law == RigidContacts()
     assert rungs[-1] == ContactSettings()
     contact = {
         "solref",

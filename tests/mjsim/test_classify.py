@@ -6,12 +6,12 @@ import pytest
 
 import mjsim
 from docs.studies.states import HITTING, LANDING
-from mjsim import ContactSettings
+from mjsim import RigidContacts
 from mjsim.classify import PERSISTENCE, Classifier, Contacts
 from model import Case, Parameters
 
 P = Parameters.named("reference")
-SETTINGS = ContactSettings()
+SETTINGS = RigidContacts()
 FAST = 0.1
 WEIGHT = P.m * P.g
 

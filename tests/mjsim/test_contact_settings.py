@@ -28,7 +28,7 @@ def test_for_problem_keeps_slipping_continuous(timestep, name) -> None:
 
 
 def test_contacts_die_out_for_all_friction_up_to_one() -> None:
-    fast = ContactSettings.at(2e-3, rigid=False)
+    fast = ContactSettings.at(2e-3)
     for mu in np.linspace(0, 3, 13):
         for eta in np.linspace(0, 3, 13):
             assert (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, scene
+from mjsim import ContactSettings, RigidContacts, scene
 from model import Case, Flow, Parameters, SimulationError, Trajectory
 from model.drag import LAWS
 from model.trajectory import columns
@@ -23,7 +23,7 @@ def test_a_spin_under_which_the_axes_turn_stays_as_large_as_it_is() -> None:
     after two turns."""
     p = P.replace(eta=0.0, omega_0=100.0)
     x0 = [1e3, -p.g / p.c, 100.0, 30.0, 0, 0]
-    run = mjsim.simulate(p, x0, 4.0, settings=ContactSettings(timestep=2e-3))
+    run = mjsim.simulate(p, x0, 4.0, settings=RigidContacts(timestep=2e-3))
     spin = np.hypot(run.slip_x + p.R / p.r * run.omega_c, run.slip_z + run.v_y / p.r)
     np.testing.assert_allclose(spin[30:], spin[30], rtol=1e-7)
 
@@ -31,7 +31,7 @@ def test_a_spin_under_which_the_axes_turn_stays_as_large_as_it_is() -> None:
 def test_batch_is_the_single_run() -> None:
     """To the bit; slipping along a ramp, and through landings of both kinds."""
     rough = Parameters.named("high-wall-friction").replace(omega_0=20.0)
-    p, slips, settings = P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], ContactSettings()
+    p, slips, settings = P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], RigidContacts()
     landings = [0.02, -0.2, 12.0, 30, -10, 20, 0, 0], [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3]
     for sets, x0s, flow, t_end in (
         ([p, rough.replace(r=0.02, m=0.1)], [slips, slips], Flow.ramp(20.0, 25.0, 0.2), 0.3),
@@ -45,7 +45,7 @@ def test_batch_is_the_single_run() -> None:
             np.testing.assert_array_equal(run.case, alone.case)
 
 
-SOFT = ContactSettings(rigid=False)
+SOFT = ContactSettings()
 
 
 @pytest.mark.parametrize("settings", [None, SOFT])
@@ -103,9 +103,9 @@ def test_a_ball_that_passes_the_axis_goes_on(miss) -> None:
         [0, 0, 0, 0, 0, 0, 0.2 * p.R, 0],
     )
     together = mjsim.simulate_many(
-        [p, p], [x0, still], 0.35, settings=ContactSettings(), sample_interval=0.01
+        [p, p], [x0, still], 0.35, settings=RigidContacts(), sample_interval=0.01
     )
-    alone = mjsim.simulate(p, x0, 0.35, settings=ContactSettings(), sample_interval=0.01)
+    alone = mjsim.simulate(p, x0, 0.35, settings=RigidContacts(), sample_interval=0.01)
     for run in (alone, together[0]):
         exact = np.hypot(miss, a - v * run.time)
         np.testing.assert_allclose(p.R - run.h, exact, rtol=0, atol=1 / 6 / 32**2 * p.R)
@@ -126,7 +126,7 @@ def test_a_ball_that_slides_down_the_wall_as_fast_as_drag_lets_it_stays_on_it(st
     """Its load on the wall is a fifth of the weight, its slip 10 m/s; it falls as drag says."""
     p = P.replace(m=0.02, r=0.004, R=0.03, j=0.35, mu=0.15, eta=0.7, g=9.1, c=0.8, omega_0=7.489)
     run = mjsim.simulate(
-        p, [100.0, -9.7, 7.489, 0, 0, 0], 2.0, settings=ContactSettings(timestep=step)
+        p, [100.0, -9.7, 7.489, 0, 0, 0], 2.0, settings=RigidContacts(timestep=step)
     )
     assert set(run.cases[len(run.time) // 2 :]) == {Case.NS}
     # Friction of the wall, eta R omega_c^2 upwards, slows it: less than the weight, which drag
@@ -140,7 +140,7 @@ def test_a_ball_that_slides_down_the_wall_as_fast_as_drag_lets_it_stays_on_it(st
 
 def test_file_opens_as_it_is_and_holds_the_reference() -> None:
     model = mujoco.MjModel.from_xml_path(str(scene.SCENE))
-    built, mjcf = scene.build(P, ContactSettings())
+    built, mjcf = scene.build(P, RigidContacts())
     for name in (
         "body_mass",
         "body_inertia",

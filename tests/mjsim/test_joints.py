@@ -26,7 +26,7 @@ def test_a_settled_state_is_that_of_the_closed_form(case, omega_0, eta):
     assert {Case(code) for code in run.case[10:]} == {Case[case]}
     # The depth that rigid contacts keep by default is a lever: RR would seem to slip by 1e-6 rad/s.
     for slip in ("slip_x", "slip_y", "slip_z"):
-        assert getattr(run, slip)[-1] == pytest.approx(getattr(exact, slip), abs=1e-7)
+        assert getattr(run, slip)[-1] == pytest.approx(getattr(exact, slip), abs=3e-7)
 
 
 def test_what_rolls_doesnt_slip_while_it_settles():
@@ -43,7 +43,7 @@ def test_loads_are_steady_however_much_friction_lifts() -> None:
     to step, until a step is solved, and loads went to and fro by 4e-4."""
     p = P.replace(omega_0=7.0, eta=0.8)
     exact = State.one(analytic.solution(p, "NS").state)._replace(y=100.0)
-    run = mjsim.simulate(p, exact, 4.0, settings=mjsim.ContactSettings(timestep=4e-3))
+    run = mjsim.simulate(p, exact, 4.0, settings=mjsim.RigidContacts(timestep=4e-3))
     load = p.m * (p.R * exact.omega_c**2)
     assert run.force_B[-100:, 0] == pytest.approx(load, abs=3 * SHARE * p.m * p.g)
 
@@ -53,7 +53,7 @@ def test_what_rolls_on_the_wall_and_slides_on_the_floor_goes_on_in_short_steps(s
     """However little a contact moves in a step, one that rolls is not fixed on its bodies; else the
     law chattered."""
     p = Parameters(m=0.03, r=0.01, R=0.05, j=0.4, mu=0.2, eta=0.6, g=9.81, c=1.0, omega_0=20.5)
-    settings = mjsim.ContactSettings(timestep=step)
+    settings = mjsim.RigidContacts(timestep=step)
     x = State(omega_c=18.77, slip_x=29.37)
     run = mjsim.simulate(p, x, 20 * step, settings=settings, sample_interval=step)
     assert set(run.cases) == {Case.SR}

@@ -6,7 +6,7 @@ import pytest
 
 import analytic
 import mjsim
-from mjsim import ContactSettings
+from mjsim import RigidContacts
 from model import Case, Parameters
 
 REFERENCE, HOPS = Parameters.named("reference"), Parameters.named("hopping")
@@ -21,9 +21,7 @@ def off(p, x0, lasts, step, initial_impact=False):
     exact = analytic.simulate(
         p, x0, lasts, sample_interval=lasts, rtol=1e-12, initial_impact=initial_impact
     ).x[-1]
-    run = mjsim.simulate(
-        p, x0, lasts, settings=ContactSettings(timestep=step), sample_interval=lasts
-    )
+    run = mjsim.simulate(p, x0, lasts, settings=RigidContacts(timestep=step), sample_interval=lasts)
     sizes = np.array([1, p.R, p.r, p.r, p.r])
     speed = float(np.abs(exact[1:6] * sizes).max())
     return np.abs(run.x[-1] - exact)[1:6] * sizes / (step * max(p.g, p.omega_0 * speed))
@@ -63,7 +61,7 @@ def test_landing_gives_the_impulses_of_impact(spin) -> None:
     slip."""
     p, t_end = REFERENCE.replace(c=0.0, omega_0=0.0), 0.06
     x = [0.01, 0, 0, spin, 0, 0, 0.02, 0]
-    run = mjsim.simulate(p, x, t_end, settings=ContactSettings(timestep=1e-4))
+    run = mjsim.simulate(p, x, t_end, settings=RigidContacts(timestep=1e-4))
     stops, slides = p.j / (1 + p.j) * p.r * abs(spin), p.mu * p.g * t_end
     assert run.v_y[-1] == pytest.approx(0.0, abs=1e-6)
     assert np.hypot((p.R - run.h[-1]) * run.omega_c[-1], run.v_h[-1]) == pytest.approx(
@@ -77,7 +75,7 @@ def test_in_a_blow_all_friction_opposes_the_slip_after_it() -> None:
     p = REFERENCE.replace(omega_0=12.0461)
     x0, lasts = [2.761e-4, -0.1112, 5.819, -16.39, -12.29, 59.02, 0, 0], 5e-3
     exact = analytic.simulate(p, x0, lasts, sample_interval=lasts, rtol=1e-12)
-    step = ContactSettings(timestep=1.25e-4)
+    step = RigidContacts(timestep=1.25e-4)
     run = mjsim.simulate(p, x0, lasts, settings=step, sample_interval=lasts)
     assert run.cases[-1] is exact.cases[-1] is Case.SS
     assert run.x[-1] == pytest.approx(exact.x[-1], abs=1e-3)
@@ -93,7 +91,7 @@ def test_a_ball_stays_where_theory_has_it_at_rest(step: float) -> None:
         for each in analytic.stationary_solutions(p)
         if each.case is Case.SS and not each.stable
     ]
-    run = mjsim.simulate(p, x, step, settings=ContactSettings(timestep=step), sample_interval=step)
+    run = mjsim.simulate(p, x, step, settings=RigidContacts(timestep=step), sample_interval=step)
     speeds = np.abs(run.x[-1] - x)[1:6] * [1, p.R, p.r, p.r, p.r]
     # what forces of the size of the weight do in a step, times the square of its angle, and of the
     # part of them that gives way

@@ -14,7 +14,8 @@ import mujoco
 
 import mjsim
 from compare.kit.engines import MUJOCO, Engine
-from mjsim import ContactSettings, scene
+from mjsim import ContactSettings, RigidContacts, scene
+from mjsim.contact_settings import ContactModel
 from model import Parameters
 
 LEAST = 1e-5
@@ -39,13 +40,13 @@ def wrong_engine(
     name: str,
     ball: Callable[[Parameters], Parameters] = lambda p: p,
     fault: Stretch = nullcontext,
-    other: Callable[[ContactSettings], ContactSettings] = lambda settings: settings,
+    other: Callable[[RigidContacts], ContactModel] = lambda settings: settings,
 ) -> Engine:
     """MuJoCo with one fault: it moves another ball than it says, under a fault that lasts as long as
     a run, or with other settings."""
 
     def stream(
-        p: Parameters, x0: Any, t_end: float, flow: Any, settings: ContactSettings, **more: Any
+        p: Parameters, x0: Any, t_end: float, flow: Any, settings: RigidContacts, **more: Any
     ) -> mjsim.Run:
         with fault():
             run = _Disguised(ball(p), x0, t_end, flow, other(settings), **more)
@@ -60,7 +61,7 @@ def _altered(change: Callable[[Any], None]) -> AbstractContextManager[Any]:
     """The scene is built with another model."""
     built = scene.build
 
-    def altered(p: Parameters, settings: ContactSettings) -> Any:
+    def altered(p: Parameters, settings: ContactModel) -> Any:
         model, mjcf = built(p, settings)
         change(model)
         return model, mjcf
@@ -69,8 +70,8 @@ def _altered(change: Callable[[Any], None]) -> AbstractContextManager[Any]:
 
 
 def _patched(name: str, value: float) -> AbstractContextManager[Any]:
-    """A property of the settings has another value."""
-    return mock.patch.object(ContactSettings, name, property(lambda settings: value))
+    """An attribute of the settings has another value."""
+    return mock.patch.object(RigidContacts, name, value)
 
 
 def _smooth(model: Any) -> None:
@@ -92,9 +93,7 @@ WRONG_ENGINES: tuple[Engine, ...] = (
     wrong_engine("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
     wrong_engine("the friction of the floor is missing", fault=partial(_altered, _smooth)),
     wrong_engine("the plane of the wall turned by 0.01 rad", fault=partial(_altered, _turn)),
-    wrong_engine(
-        "contacts that yield", other=lambda own: ContactSettings.at(own.timestep, rigid=False)
-    ),
+    wrong_engine("contacts that yield", other=lambda own: ContactSettings.at(own.timestep)),
     wrong_engine(
         "forces taken at the beginning of a step", fault=partial(_patched, "midpoint", 0.0)
     ),

@@ -24,7 +24,7 @@ from compare.kit.engines import MUJOCO
 from compare.kit.statistics import hops_on
 from compare.kit.sweep import Axis, check_size
 from compare.kit.tasks import Task
-from mjsim import ContactSettings
+from mjsim import RigidContacts
 from model import Case, Contact, InputError, Parameters, State
 from model.arrays import Array
 from model.files import reading_json, write_text
@@ -117,7 +117,7 @@ def basins(
     tasks = [
         Task(
             engine=MUJOCO.name, parameters=p, x0=start_state(x0, p, Settings()), t_end=lasts,
-            settings=ContactSettings(timestep=timestep), sample_interval=lasts / INSTANTS,
+            settings=RigidContacts(timestep=timestep), sample_interval=lasts / INSTANTS,
         )
         for x0 in few.reshape(-1, len(VARIABLES))
     ]  # fmt: skip
