@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -178,23 +178,6 @@ class Classifier:
             {"from_case": before.astype(np.int8), "to_case": after.astype(np.int8)},
         )
         return Events(time=time, **codes, impulse_A=none, impulse_B=none)
-
-    def state(self) -> dict[str, npt.NDArray[Any]]:
-        """Copies of all that is carried from one call to the next, for `restore`."""
-        counts = np.array([self.decided, self._waiting])
-        return {
-            "latest": self._latest.copy(),
-            "counts": counts,
-            "changes": np.array(self._changes).reshape(-1, 4),
-        }
-
-    def restore(self, state: dict[str, npt.NDArray[Any]]) -> None:
-        """Go on from what `state` returned."""
-        self._latest, (self.decided, self._waiting) = state["latest"], state["counts"].tolist()
-        changes = state["changes"].tolist()
-        self._changes = [
-            (int(step), time, int(before), int(after)) for step, time, before, after in changes
-        ]
 
 
 def _case_number(states: Array) -> int:

@@ -25,7 +25,6 @@ import numpy.typing as npt
 
 from model import InputError, Parameters
 from model.arrays import Array
-from model.errors import check_type
 from model.parameters import POSITIVE, Range, check_choice, check_names, check_number
 
 FORESEEN, YIELDS = 2e-3, 1e-5
@@ -220,38 +219,24 @@ class ContactSettings:
         return next((each for each in slower if each.contact_decay(p.mu, p.eta) <= 1), slower[-1])
 
     @classmethod
-    def for_problem(
-        cls,
-        p: Parameters,
-        timestep: float = 1e-3,
-        max_slip_speed: float | None = None,
-        **changes: Any,
-    ) -> Self:
-        """MuJoCo's own contacts, so set that those of this ball which slide stay closed instead of
-        hovering, with a reserve.
+    def for_problem(cls, p: Parameters, timestep: float, speed: float, **changes: Any) -> Self:
+        """MuJoCo's own contacts, so soft that those of this ball which slide with `speed` (m s-1) under
+        the load of gravity stay closed instead of hovering.
 
-        `max_slip_speed` (m s-1) is the fastest slip to expect under the load of gravity; by default
-        that of the fluid, R omega_0. The impedance is lowered, where need be, until the hover
-        number is at most 1/20 (a contact about to lift off carries little, and shall lift off on
-        its own), and impratio is raised with the softness, so that that of the friction rows stays
-        the same. The engine's least impedance, 1e-4, may stop that short."""
-        check_type("p", p, Parameters)
+        The impedance is lowered, where need be, until the hover number is 1/20, since a contact about
+        to lift off carries little; the engine's least one, 1e-4, may stop that short. Damping and
+        softness of the friction rows stay what they are."""
         settings = cls.at(timestep, **changes)
-        if "solref" not in changes:
-            settings = settings.suited(p)
-        speed = abs(p.R * p.omega_0) if max_slip_speed is None else max_slip_speed
-        hover = settings.hover_number(
-            p.g, max(p.mu, p.eta), check_number("max_slip_speed", speed, "m s-1")
-        )
-        if hover <= 0.05 or "solimp" in changes:
+        hover = settings.hover_number(p.g, max(p.mu, p.eta), speed)
+        if hover <= 0.05:
             return settings
-        # Softness in proportion; b_f stays what it is, so tc_f goes with 1/d.
         solimp = max(1 / (1 + settings.softness * hover / 0.05), 1e-4)
-        fitting = {
-            name: getattr(settings, name) * settings.solimp / solimp
-            for name in ("solreffriction", "impratio")
-        }
-        return dataclasses.replace(settings, **fitting | {"solimp": solimp} | changes)
+        return dataclasses.replace(
+            settings,
+            solimp=solimp,
+            solreffriction=settings.solreffriction * settings.solimp / solimp,
+            impratio=settings.impratio * settings.solimp / solimp,
+        )
 
 
 ContactModel = RigidContacts | ContactSettings

@@ -57,7 +57,6 @@ class Run:
     settings : `RigidContacts` under Coulomb's law, those of 1 ms if None; or `ContactSettings`
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
-    state : `state()` of an earlier process, from which to go on
     progress : called with the fraction done, from time to time; an error that it raises ends the
         run
 
@@ -80,7 +79,6 @@ class Run:
         *,
         sample_interval: float | None = None,
         theta_0: float = 0.0,
-        state: dict[str, Any] | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
         check_type("p", p, Parameters)
@@ -88,7 +86,7 @@ class Run:
         check_type("settings", settings, ContactModel | None)
         self._flow, self._settings = flow or Flow.steady(p.omega_0), settings or RigidContacts()
         self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
-        self._state, self._progress = state, progress or (lambda done: None)
+        self._progress = progress or (lambda done: None)
         self._timestep = self._settings.timestep
         self._interval, self._count = sampling(t_end, self._timestep, sample_interval)
         check_timestep(self._timestep, p, self._flow, t_end, self._x0)
@@ -116,37 +114,19 @@ class Run:
 
         given = self._model, self._p, self._settings, self._x0, self._theta_0
         self.ball = ball = JointedBall(*given)
-        self._step, self._waiting = 0, np.empty((0, recorder.COLUMNS))
-        if self._state:
-            self._step, self._waiting = int(self._state["step"]), self._state["waiting"]
-            ball.restore(self._state)
-            self._classifier.restore(self._state)
-        noted, steps = np.empty((NOTED, recorder.COLUMNS)), (self._count - 1) * self._interval + 1
-        # nothing is needed of steps after the last sample
-        while self._step < steps and not self.header.failure:
-            rows = noted[: steps - self._step]
-            ball.advance(
-                self._flow((self._step + np.arange(len(rows)) + 0.5) * self._timestep), rows
-            )
-            waiting = np.concatenate(
-                [self._waiting, rows[-self._step % self._interval :: self._interval]]
-            )
-            self._step += len(rows)
-            self._classifier.add(recorder.contacts(rows), self._step == steps)
-            self._progress(self._step / steps)
-            first = -(-self._step // self._interval) - len(waiting)
-            raw, self._waiting = np.split(
-                waiting, [-(-self._classifier.decided // self._interval) - first]
-            )
+        step, steps = 0, (self._count - 1) * self._interval + 1  # none after the last sample
+        noted, waiting = np.empty((NOTED, recorder.COLUMNS)), np.empty((0, recorder.COLUMNS))
+        while step < steps and not self.header.failure:
+            rows = noted[: steps - step]
+            ball.advance(self._flow((step + np.arange(len(rows)) + 0.5) * self._timestep), rows)
+            waiting = np.concatenate([waiting, rows[-step % self._interval :: self._interval]])
+            step += len(rows)
+            self._classifier.add(recorder.contacts(rows), step == steps)
+            self._progress(step / steps)
+            first = -(-step // self._interval) - len(waiting)
+            told = -(-self._classifier.decided // self._interval) - first
+            raw, waiting = waiting[:told], waiting[told:]
             yield self._finish(first, raw)
-
-    def state(self) -> dict[str, Any]:
-        """All that is carried on from the blocks so far, for another run of the same to go on."""
-        return (
-            {"step": np.array(self._step), "waiting": self._waiting}
-            | self.ball.state()
-            | self._classifier.state()
-        )
 
     def trajectory(self) -> Trajectory:
         """The whole run, carried out to its end."""

@@ -35,10 +35,7 @@ _CHANGE = 0.1
 divided, too. (Chosen after balls that hop had been seen.)"""
 SHARE = 1e-5
 """`share` of the law: part of gravity to which the slip of contacts must be predicted."""
-_CARRIED = ("last", "loads", "landed", "sensors")
-"""What is carried from one step to the next beside MuJoCo's own state."""
 _NORMAL_A, _NORMAL_B = range(NSENSOR)[recorder.NORMALS]
-_INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class Joints(NamedTuple):
@@ -239,20 +236,3 @@ class JointedBall:
         """Take a step for each omega_0, noted in rows (steps, `COLUMNS`)."""
         with self.acting():
             advance(self.body, fluid, rows)
-
-    def state(self) -> dict[str, Array]:
-        """Copies of all that is carried from one step to the next, for `restore`."""
-        kept = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
-        mujoco.mj_getState(self.model, self.data, kept, _INTEGRATION)
-        remembered = self.law.state(self.data) if self.law else {}
-        body = self.body
-        own = {name: getattr(body, name).copy() for name in _CARRIED}
-        return {"integration": kept} | own | remembered
-
-    def restore(self, state: dict[str, Array]) -> None:
-        """Go on from what `state` returned."""
-        mujoco.mj_setState(self.model, self.data, state["integration"], _INTEGRATION)
-        for name in _CARRIED:
-            getattr(self.body, name)[:] = state[name]
-        if self.law:
-            self.law.restore(state, self.data)

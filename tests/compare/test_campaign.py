@@ -6,7 +6,6 @@ of a whole one."""
 
 import contextlib
 import functools
-import itertools
 import json
 import math
 import os
@@ -26,7 +25,7 @@ from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
 from compare.kit.lock import Lock
 from compare.kit.tasks import Task
 from compare.kit.workers import Workers, _without_signals, dask, processes
-from mjsim import ContactSettings, RigidContacts, Run
+from mjsim import RigidContacts
 from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 from tests.commands import refused, started, told
@@ -448,28 +447,3 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == said
     with pytest.raises(StorageError, match="cannot write to"):
         Lock(tmp_path / "absent")
-
-
-RIGID, SOFT = RigidContacts(timestep=2.5e-4), ContactSettings.at(2.5e-4)
-
-
-def run_of(settings, state=None):
-    """Spin-up from rest through rolling into slipping, about four blocks of samples."""
-    return Run(
-        P.replace(omega_0=25.0),
-        np.zeros(8),
-        4.5,
-        settings=settings,
-        sample_interval=5e-3,
-        state=state,
-    )
-
-
-@pytest.mark.parametrize("settings", [RIGID, SOFT])
-def test_a_run_that_is_taken_up_has_the_bits_of_a_whole_one(settings):
-    whole = np.concatenate(list(run_of(settings)))
-    for blocks in (1, 3):
-        first = run_of(settings)
-        seen = list(itertools.islice(first, blocks))
-        seen += run_of(settings, first.state())
-        np.testing.assert_array_equal(np.concatenate(seen), whole)

@@ -21,7 +21,7 @@ def test_mapping_round_trip() -> None:
 @pytest.mark.parametrize("name", Parameters.names())
 def test_for_problem_keeps_slipping_continuous(timestep, name) -> None:
     p = Parameters.named(name).replace(omega_0=60.0)
-    settings = ContactSettings.for_problem(p, timestep)
+    settings = ContactSettings.for_problem(p, timestep, p.R * p.omega_0)
     for friction in (p.mu, p.eta):
         assert settings.hover_number(p.g, friction, p.R * p.omega_0) <= 0.5
     assert settings.largest_timestep >= timestep * (1 - 1e-12)
@@ -48,7 +48,9 @@ def test_decay_tells_which_contacts_hold_a_slipping_ball(solref, holds) -> None:
     )
     (steady,) = (each for each in analytic.stationary_solutions(p) if each.case is Case.SS)
     step = 2e-3
-    settings = ContactSettings.for_problem(p, step, solref=(solref[0] * step, solref[1]))
+    settings = ContactSettings.for_problem(
+        p, step, p.R * p.omega_0, solref=(solref[0] * step, solref[1])
+    )
     assert (settings.contact_decay(p.mu, p.eta) < 1) == holds
     with contextlib.nullcontext() if holds else pytest.warns(UserWarning, match="chatters"):
         run = mjsim.simulate(p, steady.x, 0.4, settings=settings, sample_interval=step)
