@@ -18,7 +18,7 @@ from compare.judge import forget, select
 from compare.kit import programme
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import Evidence
-from compare.kit.engines import USUAL_ENGINES, Engine
+from compare.kit.engines import FREE, USUAL_ENGINES, Engine, Role
 from compare.kit.levels import Level
 from compare.kit.plan import planned
 from compare.kit.programme import Job, Protocol
@@ -148,7 +148,9 @@ def plan(
         names = [protocol.name for protocol in PROTOCOLS]
     results.open_directory(output)
     needed = programme.with_needed(PROTOCOLS, names)
-    return Study(output, level, [engine] if engine else [*USUAL_ENGINES], chosen, needed, sets)
+    free = [replace(FREE, role=Role.FREE_BODY)] if level > Level.QUICK else []
+    engines = [engine] if engine else [*USUAL_ENGINES, *free]
+    return Study(output, level, engines, chosen, needed, sets)
 
 
 @dataclass

@@ -172,8 +172,7 @@ def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
     ]
     if beside:
         shown.append(
-            f"\nBeside it {', '.join(beside)}: that is what goes wrong without them, and "
-            "doesn't count in the exit code.",
+            f"\nBeside it {', '.join(beside)}: none of that counts in the exit code.",
             "not bold",
         )
     coarse = wording.coarse_and_missing(ran)

@@ -35,6 +35,9 @@ class Role(Enum):
     """Of no time step, beside the one on trial."""
     AS_IT_COMES = auto()
     """With its own settings and step, beside the one on trial."""
+    FREE_BODY = auto()
+    """The ball as a free body, beside the one on trial, above the quick level: what its joints could
+    be to blame for."""
 
 
 AnySettings = RigidContacts | ContactSettings | analytic.Settings | vessel.Settings
@@ -238,7 +241,13 @@ _PACKAGES = {
     name: Library(KNOWN[name].partition(" ")[0], f"compare.adapters.{name}") for name in KNOWN
 }
 _FREE, _AS_IT_COMES = _adapted(_PACKAGES["mujoco_free"], "Xx")
-FREE = replace(_FREE, name="mujoco-free")
+FREE = replace(
+    _FREE,
+    name="mujoco-free",
+    title="MuJoCo under that law with a free ball",
+    about="a free body in the place of joints along the paper's coordinates, rigid contacts by "
+    "mjsim.Coulomb",
+)
 NEWCOMER = replace(
     _AS_IT_COMES,
     name="mujoco-defaults",

@@ -43,6 +43,8 @@ class Entry:
     above."""
     as_it_comes: Names = ()
     """Sets that an engine with its own settings measures, at every level."""
+    free: Names = ()
+    """Sets that the ball as a free body measures, above the quick level."""
     _: KW_ONLY
     level: Level = Level.QUICK
     """The least level of which the protocol is a part."""
@@ -85,9 +87,9 @@ PLAN: dict[str, Entry] = {
     "growth":     Entry(VARIED,           LIMIT_SETS, settles=False),
     "steepest":   Entry(VARIED,           LIMIT_SETS, settles=False),
     "lift":       Entry(VARIED,           ENDS_OF_ROLLING, (4, 4), settles=False),
-    "field":      Entry(VARIED,           LIMIT_SETS, settles=False),
+    "field":      Entry(VARIED,           LIMIT_SETS, free=ONE_BALL, settles=False),
     "motions":    Entry(ONE_BALL,         ONE_BALL, settles=False),
-    "runs":       Entry(DRAG_LAWS,        ONE_BALL, settles=False),
+    "runs":       Entry(DRAG_LAWS,        ONE_BALL, free=ONE_BALL, settles=False),
     "torque":     Entry(ONE_BALL,         ONE_BALL,        (4, 4)),
     "impacts":    Entry(ENDS_OF_ROLLING,  ONE_BALL, settles=False),
     "hysteresis": Entry(ONE_BALL,         ONE_BALL,        (4, 4)),
@@ -108,6 +110,8 @@ def planned(protocol: str, engine: Engine, divisor: int, level: Level) -> dict[s
     names: Iterable[str] = known if above else entry.trial
     if engine.role is Role.AS_IT_COMES:
         names = entry.as_it_comes
+    elif engine.role is Role.FREE_BODY:
+        names = entry.free if above else ()
     elif engine.role is Role.IN_THE_LIMIT:
         names = tuple(known)[: MOST_LIMIT_SETS if entry.limit else 1] if above else entry.limit
         if divisor not in engine.refine[: entry.steps[above]]:
