@@ -187,7 +187,7 @@ def clear(contact: Any) -> None:
     """Make it a new contact, of which nothing is known."""
     contact.state, contact.lift, contact.load = NEW, 0.0, 0.0
     contact.predicted, contact.found, contact.extrapolated = 0.0, 0.0, 0.0
-    contact.bias, contact.error = 0.0, 0.0
+    contact.bias, contact.error, contact.weakened = 0.0, 0.0, 0
     for axis in range(3):
         contact.speed[axis] = 0.0
         for kind in range(2):

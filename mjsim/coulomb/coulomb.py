@@ -49,6 +49,8 @@ class Coulomb:
         Euler's, and dampers are inertia of the same effect, which contacts know
     restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1; or
         one for each geom, of which two in contact have the larger, as MuJoCo mixes friction
+    kinetic : friction of contacts that slide, in units of the friction that keeps them from it, above
+        0 up to 1
     servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It
         needs geoms with a `margin`, more than bodies sink in, of which an open contact then takes no
         notice; and it must be slower than the contact, best five times the time constant of `solref`
@@ -74,6 +76,7 @@ class Coulomb:
         *,
         rigid: bool = False,
         restitution: float | Sequence[float] = 0.0,
+        kinetic: float = 1.0,
         servo: float | None = None,
         share: float = Law.share,
         depth: float = Law.depth,
@@ -92,11 +95,13 @@ class Coulomb:
             _check_number("servo", servo, " s", float(model.opt.timestep), _LARGEST)
             if rigid:
                 raise ValueError("servo is for soft contacts: rigid ones have no depth")
+        _check_number("kinetic", kinetic, "", 1e-3, 1.0)
         _check_number("share", share, "", 1e-9, 1.0)
         _check_number("depth", depth, "", 0.0, 0.1)
         law = Law(
             rigid=bool(rigid),
             restitution=bounces,
+            kinetic=float(kinetic),
             servo=float(servo or 0.0),
             share=float(share),
             depth=float(depth),

@@ -13,10 +13,49 @@ from typing import Any
 
 from .compiling import kernel
 from .contacts import axis_of, kind_of
+from .engine import contacts_of as engine_contacts
 from .engine import reals
 from .memory import NEW, OPEN, SLIDES, STICKS, contacts_of, dry_of, rows_of
-from .parameters import FEEDBACK, STEADIER
+from .parameters import FEEDBACK, SLOWEST, STEADIER
 from .rows import multiply
+
+# -- static and kinetic -------------------------------------------------------------------------------
+
+
+@kernel
+def strengthen(data: Any, memory: Any) -> None:
+    """Give contacts their static friction back, if they are the very ones that were weakened."""
+    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
+    for i in range(memory.contacts if memory.ncon == data.ncon else 0):
+        contact = contacts[i]
+        given = found[contact.index]
+        if contact.weakened and given.friction[0] == contact.mu[0] and given.mu == contact.cone:
+            scale(contact, given, 1 / memory.law.kinetic)
+
+
+@kernel
+def weaken(model: Any, data: Any, memory: Any, gravity: float) -> None:
+    """Give contacts that slide kinetic friction, mu_k = `kinetic` mu; what stops holds by mu again."""
+    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
+    velocity, slowest = reals(data.efc_vel, data.nefc), SLOWEST * gravity * model.opt.timestep
+    for i in range(memory.contacts):
+        contact, square = contacts[i], 0.0
+        given = found[contact.index]
+        for t in range(2 if contact.dim > 1 else 0):
+            square += velocity[contact.address + 1 + t] ** 2
+        contact.weakened = contact.state != STICKS and square > slowest**2
+        scale(contact, given, memory.law.kinetic if contact.weakened else 1.0)
+
+
+@kernel
+def scale(contact: Any, given: Any, factor: float) -> None:
+    """Change the friction of a contact, also in mjData."""
+    given.mu *= factor
+    contact.cone = given.mu
+    for j in range(5):
+        given.friction[j] *= factor
+        contact.mu[j] = given.friction[j]
+
 
 # -- forces ----------------------------------------------------------------------------------------
 

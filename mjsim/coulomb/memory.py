@@ -55,6 +55,7 @@ CONTACT = np.dtype(
         ("carried", _f8, (3, 2)),  # friction remembered along the frame: axis, force or moment
         ("mu", _f8, 5),  # coefficients of friction: two of sliding, of spin, two of rolling, m
         ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
+        ("weakened", _i4),  # whether they are kinetic
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
         ("closes", _i4),  # whether Newton's method has just found that it does
         ("share", _f8),  # part of friction without a limit that it has

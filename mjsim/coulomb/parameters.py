@@ -17,6 +17,8 @@ class Law:
     rigid: bool = False
     restitution: tuple[float, ...] = ()
     """Of each geom; two in contact have the larger one, as of friction. None: nothing bounces."""
+    kinetic: float = 1.0
+    """Friction of contacts that slide, in units of what keeps them from it."""
     servo: float = 0.0
     """Time in which contacts lose their depth, s; 0: never."""
     share: float = 5e-2
@@ -93,6 +95,9 @@ OVER = 0.75
 """Part of a time step after which the next one has begun: stages of Runge and Kutta are in one."""
 NEXT = 1.5
 """Time steps up to which a step is the next one."""
+SLOWEST = 1e-3
+"""Slip of a contact that slides at least, in units of what gravity adds in a step: of several that
+hold a body one may bear all that it can, and doesn't move."""
 STUCK = 100.0
 """Load above which a rigid contact isn't pushed out of its depth, in units of a weight: bodies that
 can't part would be pushed for ever, by ever larger forces."""

@@ -29,7 +29,14 @@ from .engine import (
     reals,
     words,
 )
-from .friction import find_forces, predict_slip, store_forces, subtract_references
+from .friction import (
+    find_forces,
+    predict_slip,
+    store_forces,
+    strengthen,
+    subtract_references,
+    weaken,
+)
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
 from .parameters import EXACT, FALLING, NEXT, OVER, SOFTER
@@ -49,6 +56,8 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     """Apply Coulomb's law: velocities are known, and MuJoCo hasn't found the forces yet."""
     model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
     memory.model, memory.data = m, d
+    if memory.law.kinetic < 1:
+        strengthen(data, memory)
     known, over, since = begin(model, data, memory)
     if data.ncon == 0 and not memory.law.rigid:  # nothing touches: all is MuJoCo's own
         forget_contacts(memory)
@@ -77,6 +86,8 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
         return
     gravity = size_of_gravity(model)
     enough = memory.law.share * gravity
+    if memory.law.kinetic < 1:
+        weaken(model, data, memory, gravity)
     multiply(model, data, memory)
     if memory.law.rigid:
         stiffen(model, data, memory, gravity)

@@ -562,6 +562,44 @@ def test_geoms_that_cannot_part_come_to_rest(rigid, bodies):
     assert np.abs(data.qvel).max() < 1e-6
 
 
+@WAYS
+@pytest.mark.parametrize("direction", [0.0, 0.5])
+def test_what_slides_has_kinetic_friction_and_what_stops_holds_by_static_friction(rigid, direction):
+    """Beyond mu W a box breaks away, with kinetic mu it slides, in any direction; at rest it holds again."""
+    mu, kinetic, h = 0.5, 0.6, 2e-3
+    model, data = scene(mu=mu, geom=FLAT, option=f'timestep="{h}"')
+    law, along = Coulomb(model, rigid=rigid, kinetic=kinetic), np.array([1.0, 0.0, 0.0])
+    along[:2] = np.cos(direction), np.sin(direction)
+
+    def pull(start, end, steps):
+        """Speed and mean acceleration of a box pulled by a force that grows, in weights."""
+        before = data.qvel[:3] @ along
+        for force in np.linspace(start, end, steps):
+            data.xfrc_applied[1, :3] = force * G * along
+            law.step(data)
+        speed = data.qvel[:3] @ along
+        return speed, (speed - before) / (steps * h)
+
+    for _ in range(2):
+        assert abs(pull(0.0, 0.99 * mu, 1000)[0]) < 1e-3 * G * h  # held, up to what is soft
+        assert pull(0.99 * mu, 1.01 * mu, 200)[0] > G * h  # gone
+        _, acceleration = pull(0.45, 0.45, 100)
+        assert acceleration == pytest.approx((0.45 - kinetic * mu) * G, rel=1e-4)
+        pull(0.0, 0.0, 1000)
+
+
+def test_kinetic_friction_is_not_taken_twice_from_contacts_that_are_asked_again():
+    model, data = scene(mu=0.5, geom=FLAT)
+    law, moving = Coulomb(model, rigid=True, kinetic=0.5), [1.0, 0, 0, 0, 0, 0]
+    data.qvel[:] = moving
+    law.step(data, 10)
+    with law.acting(data):
+        mujoco.mj_forward(model, data)
+        for _ in range(2):
+            assert data.contact.friction[:, 0] == pytest.approx(0.25)
+            mujoco.mj_forwardSkip(model, data, mujoco.mjtStage.mjSTAGE_POS, 0)
+
+
 def test_restitution_of_each_geom():
     """A ball bounces by what it has, another one not at all."""
     model = mujoco.MjModel.from_xml_string(

@@ -389,7 +389,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize("name", ["nstep", "rigid", "restitution", "servo", "share"])
+@pytest.mark.parametrize("name", ["nstep", "rigid", "restitution", "kinetic", "servo", "share"])
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: f"{str(wrong)[:9]}")
 def test_wrong_types_and_values_are_told_in_a_line(name, wrong):
     model, data = scene()
