@@ -78,7 +78,13 @@ def _chain(args: argparse.Namespace) -> int:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Lay two motions side by side."""
+    """Lay two motions side by side, or a measured curve and theory."""
+    if args.b is None:
+        from compare.commands import measured  # here, because two motions need no theory
+
+        return measured.run(args)
+    if args.set or args.parameters:
+        raise InputError("--set and --parameters are for a measured curve, without OTHER")
     a, b = testing.read(args.a), testing.read(args.b)
     about = motions.compared(a, b)
     if args.plot:

@@ -308,13 +308,12 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
     print("\n".join(line.rstrip() for line in text.get().splitlines()))
 
 
-def add_own_set(parser: Parser) -> None:
+def add_own_set(parser: Parser, which: str = "instead of many") -> None:
     """Options for a parameter set: one of the study by its name, or a file of one's own."""
     own = parser.add_mutually_exclusive_group()
-    own.add_argument(
-        "--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}"
-    )
-    own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
+    named = f"one set, {which}: {', '.join(Parameters.names())}"
+    own.add_argument("--set", metavar="NAME", help=named)
+    own.add_argument("--parameters", type=Path, help=f"your own set, a TOML file, {which}")
 
 
 def add_axes(

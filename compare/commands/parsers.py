@@ -181,10 +181,15 @@ def inspect(parser: Parser) -> None:
 
 @command("the ball", "look.compare", "mine.csv theory.h5 --plot difference.png")
 def compare(parser: Parser) -> None:
-    """Two motions side by side: differences, cases, parameters."""
-    what = "a run, or time and some of its quantities from CSV or any HDF5 file"
+    """Two motions side by side; or a meter's measured calibration curve beside theory.
+
+    A curve is a table of omega_0 in rad/s or Q in m3/s, and omega_c in rad/s. Theory is fitted to
+    it with friction and drag free, as far as the curve tells them."""
+    what = "a run, or time and some of its quantities from CSV or any HDF5 file; or a curve"
     parser.add_argument("a", metavar="FILE", help=what)
-    parser.add_argument("b", metavar="OTHER", help="what it is compared with, the same")
+    other = "what a motion is compared with, the same"
+    parser.add_argument("b", metavar="OTHER", nargs="?", help=other)
+    options.add_own_set(parser, "the meter of a curve")
     options.add_plot(parser, "both")
     options.add_json(parser)
 

@@ -1,0 +1,113 @@
+"""``dualball compare curve.csv``: a measured calibration curve of a meter beside theory."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+import numpy as np
+
+from analytic.flowmeter import measured, real_fluid
+from analytic.flowmeter.measured import Fit
+from compare.commands import options
+from compare.kit import drawing, pages
+from compare.kit.doubt import model_warning
+from compare.report.meter import SYMBOLS, rounded
+from model import InputError, table
+from model.arrays import Array
+from model.parameters import POSITIVE, check_number
+
+COLUMNS: dict[str, tuple[str, Sequence[str]]] = {
+    "omega_0": ("rad s-1", []),
+    "Q": ("m3 s-1", []),
+    "omega_c": ("rad s-1", ["omega_c rising"]),
+    "omega_c falling": ("rad s-1", []),
+}
+"""What a curve may have, by the labels that `dualball calibrate -o` writes."""
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit theory to the curve, say what it tells, and draw both."""
+    if not (own := options.own_set(args)):
+        raise InputError("a measured curve needs its meter, --parameters FILE; motions come in two")
+    (p,) = own.values()
+    name, flow, read = curve(args.a)
+    found = measured.fits(p, flow, read)
+    best = next((fit for fit in found[::-1] if fit.told), None)
+    if args.plot:
+        from compare.subjects.flowmeter import figures  # here, because drawing is slow to load
+
+        shown, omega_0 = (best.p, best.factor * flow) if best else (p, np.mean(read / flow) * flow)
+        figure = figures.draw_calibration(shown, 1.05 * float(omega_0.max()))
+        figure.axes[0].plot(omega_0, read, "k.", ms=4, label="measured")
+        figure.axes[0].legend(loc="upper left", fontsize=8.5)
+        drawing.save(figure, args.plot)
+    doubt = model_warning(real_fluid.model_error(p.replace(omega_0=float(read.max()))))
+    data = {"flow is": name, "flow": flow, "omega_c": read, "fits": found, "best": best}
+    rows = [["fitted", "μ", "η", "c (1/s)", "scatter (%)"], *map(_row, found)]
+    tables = [pages.table("Fits: what isn't fitted is the meter's", rows)] * bool(found)
+    options.show(data, args.json, *doubt, *in_words(found, best, name, flow, read), *tables)
+    return 0
+
+
+def curve(path: str) -> tuple[str, Array, Array]:
+    """What the flow is, omega_0 or Q, flows and readings (n,) of a file; raises `InputError`."""
+    columns, lines = table.read(path, COLUMNS, ["omega_c"], ("omega_0", "omega_c"))
+    for name, values in columns.items():
+        for line, value in zip(lines, values, strict=True):
+            check_number(f"{path}, line {line}: {name}", value, COLUMNS[name][0], POSITIVE)
+    flow = next((name for name in ("omega_0", "Q") if name in columns), None)
+    if flow is None:
+        raise InputError(f"{path}: no column is called omega_0 (rad/s) or Q (m3/s)")
+    reads = [columns[name] for name in ("omega_c", "omega_c falling") if name in columns]
+    return flow, np.tile(columns[flow], len(reads)), np.concatenate(reads)
+
+
+def in_words(found: list[Fit], best: Fit | None, name: str, flow: Array, read: Array) -> list[str]:
+    """What a curve tells: its kink, the factor of its flows, parameters, and what theory is off
+    by."""
+    symbol, unit = ("Q", "m³/s") if name == "Q" else ("ω₀", "rad/s")
+    if not found:
+        within = _percent(read / flow / np.mean(read / flow) - 1)
+        top = f"up to {symbol} = {rounded(float(flow.max()))} {unit}"
+        said = (
+            f"No kink: {len(flow)} readings {top} are in proportion to the flow, within {within} %."
+        )
+        return [said, "The ball rolls, and tells nothing of friction and drag."]
+    fit = best or found[0]
+    rolls = flow < fit.kink
+    others = " and ".join(_symbol(each) for each in found[-1].free if each not in fit.free)
+    alone = ", ".join(map(_symbol, fit.free)) + (f", if {others} are as given" * bool(others))
+    off = [f"{_percent(fit.off[side])} % in {side.sum()} readings" for side in (rolls, ~rolls)]
+    factor = f"{_with(fit.factor, fit.u['factor'])} {'rad/m³ ' * (name == 'Q')}times {symbol}"
+    return [
+        f"Kink: from {symbol} = {_with(fit.kink, fit.u['kink'])} {unit} on it slips, ω₀₁ (84): one "
+        "combination of μ and η.",
+        f"Flow: the fluid turns with {factor}{', by theory 1' * (name == 'omega_0')}.",
+        f"Told: {alone if best else 'no parameter by itself'}.",
+        f"Theory is off by {off[0]} before the kink, where any theory fits, and by {off[1]} beyond.",
+    ]
+
+
+def _row(fit: Fit) -> list[str]:
+    """A fit as a row of the table."""
+    values = [
+        _with(value, fit.u[name]) if name in fit.free else f"{value:.3g} (given)"
+        for name in measured.FITS[-1]
+        for value in [getattr(fit.p, name)]
+    ]
+    return [", ".join(map(_symbol, fit.free)), *values, _percent(fit.off)]
+
+
+def _with(value: float, u: float) -> str:
+    """A value with its standard uncertainty, of which it is given the relative one."""
+    told = f"{rounded(value, u)} ± {rounded(value * u, most=2)}"
+    return told if u <= measured.TOLD else "not told"
+
+
+def _percent(off: Array) -> str:
+    return rounded(100 * float(np.sqrt(np.mean(off**2))), most=2)
+
+
+def _symbol(name: str) -> str:
+    return SYMBOLS.get(name, name)
