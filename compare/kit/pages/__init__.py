@@ -78,17 +78,24 @@ def _is_greek(letter: str) -> bool:
     return unicodedata.name(letter, "").startswith("GREEK") if letter else False
 
 
-_SYMBOL = (  # compiled where it is first needed
-    r"((?:(?<![\w.])[A-Za-z]|[Α-ω])\u0303?)(?:_([A-Za-z0-9]{1,3})(?![A-Za-z0-9_(])|([₀-₉]+))"  # with an index
-    r"|([Α-ω](?![ms]\b|[a-z]{2})"  # alone
-    r"|(?<![A-Za-z_.'’])(?<!\d )(?<![A-Z]\. )(?!RR|cm|(?<=\()R\)|m(?![gRrcjΑ-ω·]| =))"  # or a product:
-    r"[mgRrcj]+(?![A-Za-z'’_])"
-    r"|(?<![\w.'’])(?<!\d )(?<!&#39;)(?:[yht](?![\w'’.])|[A-Za-z](?= "
-    r"[=&≤≥])|[A-Ca-ce-z](?=[Α-ω])|K(?= [Α-ω])))"
-    r"|\^\(?([\d/]+)\)?"  # a power
-    r"|((?<= )-(?= )|(?<![\w).])-(?=\d))"  # minus
-)
-_DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
+_SYMBOL = r"""
+  (?P<letter> (?: [Α-ω] | (?<![\w.])[A-Za-z] )\u0303? )   # ω_c, B_x, ω̃_x, ω₀: a letter and index,
+  (?: _(?P<index>[A-Za-z0-9]{1,3}) (?![A-Za-z0-9_(])     # as names of programs, slip_x, are not
+    | (?P<digits>[₀-₉]+) )
+| (?P<alone>
+    [Α-ω] (?! [ms]\b | [a-z]{2} )                        # μ; not μm, nor a word
+  | (?<![A-Za-z_.'’]) (?<!\d\ ) (?<![A-Z]\.\ )           # jm, gR; not 2 cm, nor A. R. Champneys,
+    (?! RR | cm | (?<=\()R\) | m(?![gRrcjΑ-ω·]|\ =) )    # nor cases, nor metres
+    [mgRrcj]+ (?![A-Za-z'’_])
+  | (?<![\w.'’]) (?<!\d\ ) (?<!&\#39;)                   # not the t of don't, nor 2 h
+    (?: [yht](?![\w'’.]) | [A-Za-z](?=\ [=&≤≥])          # y; z = 0, with < and > as &lt; and &gt;
+      | [A-Ca-ce-z](?=[Α-ω]) | K(?=\ [Α-ω]) ) )           # iω₀, K ρ
+| \^\(?(?P<power>[\d/]+)\)?                              # ρ^(2/3)
+| (?P<minus> (?<=\ )-(?=\ ) | (?<![\w).])-(?=\d) )
+"""
+"""What is a symbol in a text of a page, which is escaped, and not a word, a unit, or a name of
+programs. The texts have no marks of their own: terminals, JSON, CSV and the sources of the pages
+show them as they are."""
 
 
 def typeset(text: str) -> str:
@@ -97,13 +104,17 @@ def typeset(text: str) -> str:
     import markupsafe  # comes with jinja2
 
     def symbol(found: re.Match[str]) -> str:
-        letter, name, digits, alone, power, minus = found.groups("")
-        if power or minus:
-            return f"<sup>{power}</sup>" if power else "−"
-        index = f"<sub>{name or digits.translate(_DIGITS)}</sub>" if letter else ""
-        return f"<i>{letter or alone}</i>{index}"
+        of = found.groupdict("")
+        if of["letter"]:
+            index = of["index"] or unicodedata.normalize("NFKC", of["digits"])
+            return f"<i>{of['letter']}</i><sub>{index}</sub>"
+        if of["power"]:
+            return f"<sup>{of['power']}</sup>"
+        return f"<i>{of['alone']}</i>" if of["alone"] else "−"
 
-    return markupsafe.Markup(re.sub(_SYMBOL, symbol, str(markupsafe.escape(text))))
+    return markupsafe.Markup(
+        re.sub(_SYMBOL, symbol, str(markupsafe.escape(text)), flags=re.VERBOSE)
+    )
 
 
 def render(package: str, template: str, **values: Any) -> str:
