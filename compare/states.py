@@ -30,7 +30,7 @@ def case_of(m: Measurement) -> Case:
 
     SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall.
     """
-    case = physical_case(Case[str(m.conditions["case"])])
+    case = physical_case(m.case())
     return Case.RS if case is Case.RN else case
 
 
@@ -75,4 +75,4 @@ def lifts_first(m: Measurement) -> bool:
 
 def from_floor(m: Measurement) -> bool:
     """Whether the ball started on the floor."""
-    return m.conditions["start"] in ("rest", "with the fluid")
+    return m.text("start") in ("rest", "with the fluid")

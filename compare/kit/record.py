@@ -26,7 +26,7 @@ from compare.kit.quantities import quantity
 from compare.kit.runner import Runner
 from compare.kit.statistics import Estimate
 from compare.kit.tasks import Task
-from model import Parameters, StorageError
+from model import Case, Parameters, StorageError
 from model.arrays import Array
 from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
@@ -71,6 +71,14 @@ class Measurement:
     def at(self, name: str) -> float:
         """The number that a condition has, by its name."""
         return float(self.conditions[name])
+
+    def text(self, name: str) -> str:
+        """The text that a condition is, by its name."""
+        return str(self.conditions[name])
+
+    def case(self, name: str = "case") -> Case:
+        """The case that a condition names."""
+        return Case[self.text(name)]
 
     @property
     def unit(self) -> str:

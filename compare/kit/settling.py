@@ -295,7 +295,5 @@ def physical_case(case: Case) -> Case:
 def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
     """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest
     first."""
-    found = records.select(
-        "settled", "case", lambda m: m.set == set and m.conditions["start"] == how
-    )
+    found = records.select("settled", "case", lambda m: m.set == set and m.text("start") == how)
     return dict(sorted((m.parameters.omega_0, physical_case(Case(int(m.value)))) for m in found))

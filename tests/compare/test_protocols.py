@@ -287,7 +287,7 @@ def test_a_state_that_depends_on_the_step_is_missing(runner, monkeypatch):
 def test_what_quadratic_drag_does_not_settle_has_no_values(runner, monkeypatch):
     """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
     found = measure_settled(runner, monkeypatch, QUICK["blunt"], 0.6, 2.0)
-    cases = {m.conditions["case"] for m in found.measurements if m.quantity == "omega_c"}
+    cases = {m.text("case") for m in found.measurements if m.quantity == "omega_c"}
     assert cases == {"SS", "NS"}
     assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 

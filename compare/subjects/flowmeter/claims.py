@@ -57,7 +57,7 @@ def _only_rolling(m: Measurement) -> float:
         return float(Case.RR)
     # The start that shows that the range has ended: the ball slips on the floor, or stays on the
     # wall.
-    ended = m.conditions["start"] == ("rest" if slips_first(m) else "on the wall")
+    ended = m.text("start") == ("rest" if slips_first(m) else "on the wall")
     if case_of(m) not in lasting_cases(m.parameters) - ({Case.RR} if ended else set()):
         raise LookupError("beyond the range, rolling is not the only motion that lasts")
     return m.value
@@ -77,7 +77,7 @@ def _loop_case(m: Measurement) -> Case:
     """Case at a level of the hysteresis loop: that of the branch it comes from while it attracts,
     else of the other."""
     states = lasting_cases(m.parameters) - {Case.NS}
-    lifted = m.conditions["before"] == Case.NR.name
+    lifted = m.text("before") == Case.NR.name
     here = {case for case in states if (case is Case.NR) == lifted}
     if len(here or states) != 1:
         raise LookupError(f"no single state lasts at omega_0 = {m.parameters.omega_0:g}")
@@ -87,7 +87,7 @@ def _loop_case(m: Measurement) -> Case:
 def _jumps(way: int) -> When:
     """A filter of levels of the hysteresis loop: the ball was lifted off the floor (1), came down
     (-1), or neither."""
-    return lambda m: (case_of(m) is Case.NR) - (m.conditions["before"] == Case.NR.name) == way
+    return lambda m: (case_of(m) is Case.NR) - (m.text("before") == Case.NR.name) == way
 
 
 def _loop_reading(m: Measurement) -> float:
@@ -113,7 +113,7 @@ def _end_case(m: Measurement) -> Case:
 
 def _at_event(m: Measurement) -> Estimate:
     """A number at an event of theory's motion; LookupError if there is no such event."""
-    run, events, event, unsure = _simulated(m), _simulated(m).events, m.conditions["event"], 0.0
+    run, events, event, unsure = _simulated(m), _simulated(m).events, m.text("event"), 0.0
     changes = list(zip(map(Case, events.from_case), map(Case, events.to_case), strict=True))
     if m.quantity == "lift":
         top = Estimate(float(run.y[-1]), 0.0) if event == "end" else first_top(run)
@@ -200,7 +200,7 @@ def _by_sensitivity(m: Measurement) -> float:
 def _loop_reading_of_design(m: Measurement) -> float:
     """The reading of a rising or falling flow, from the design's characteristic curve."""
     low, high = design.readings(m.parameters, m.parameters.omega_0)
-    return float(low if m.conditions["side"] == "up" else high)
+    return float(low if m.text("side") == "up" else high)
 
 
 _ENDS_OF_RANGES, _DESIGN = (

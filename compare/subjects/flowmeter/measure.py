@@ -100,9 +100,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
     states: dict[Case, dict[float, dict[str, Measurement]]] = {case: {} for case in Case}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity != "case"):
         if m.parameters.omega_0:
-            at = states[settling.physical_case(Case[str(m.conditions["case"])])].setdefault(
-                m.parameters.omega_0, {}
-            )
+            at = states[settling.physical_case(m.case())].setdefault(m.parameters.omega_0, {})
             at[m.quantity] = m
     for case in (Case.RR, Case.SS, Case.NR):
         alike = sorted(states[case].items())
@@ -441,7 +439,7 @@ PROTOCOLS = (
         "unloading",
         unloading,
         ("thresholds",),
-        drawn=lambda m: m.conditions["start"] == UNLOADED,
+        drawn=lambda m: m.text("start") == UNLOADED,
     ),
     Protocol("slope", slope, ("settled", "thresholds")),
 )

@@ -57,7 +57,7 @@ def _end_states(*starts: str) -> tuple[Criterion, ...]:
     """Criteria on the state at the end of motions from starts whose names begin so."""
 
     def starts_so(m: Measurement) -> bool:
-        return str(m.conditions["start"]).startswith(starts)
+        return m.text("start").startswith(starts)
 
     return criteria(
         "runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN
@@ -105,7 +105,7 @@ def _motion_either(m: Measurement) -> Trajectory:
 
     Where both agree with theory the internal force between floor and wall decides, which the state
     doesn't contain (docs/theory.md, 7)."""
-    case, leaves = Case[str(m.conditions["case"])], _motion(m)
+    case, leaves = m.case(), _motion(m)
     if leaves.case[-1] == case:
         return leaves
     stays = _motion(m, "infeasible")
@@ -164,7 +164,7 @@ LAW_CLAIMS = (
             "runs",
             "end_y",
             _fallen,
-            when=lambda m: m.conditions["start"] == "thrown" and m.parameters.drag == STOKES,
+            when=lambda m: m.text("start") == "thrown" and m.parameters.drag == STOKES,
             by="analytic.mechanics.drag.fall_time",
         ),
         reason=_OWN,

@@ -33,7 +33,7 @@ def _state(m: Measurement) -> Array:
 
 def _arrow(m: Measurement) -> tuple[Case, Case]:
     """The case out of which, and into which, a ball slips or lifts off."""
-    return Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
+    return m.case("inner"), m.case("outer")
 
 
 def _along(arrow: tuple[Case, Case], *by: str) -> When:

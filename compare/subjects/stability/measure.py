@@ -223,9 +223,7 @@ def chosen_states(
     yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, physical_case(Case[str(m.conditions["case"])])), {})[
-            m.quantity
-        ] = m.value
+        values.setdefault((m.parameters, physical_case(m.case())), {})[m.quantity] = m.value
     states = []
     for (
         q,

@@ -27,7 +27,7 @@ its own."""
 
 def _threshold(
     quantity: str,
-    when: When = lambda m: m.conditions["by"] != SLIPPING,
+    when: When = lambda m: m.text("by") != SLIPPING,
     protocol: str = "thresholds",
 ) -> Criterion:
     """A criterion on a threshold, which `analytic.thresholds` predicts."""

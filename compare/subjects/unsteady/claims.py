@@ -171,7 +171,7 @@ CLAIMS = (
             "pulsation",
             "mean_error",
             lambda m: 0.0,
-            when=lambda m: m.conditions["slips"] == _ONE and m.parameters.drag == STOKES,
+            when=lambda m: m.text("slips") == _ONE and m.parameters.drag == STOKES,
             size=_flow,
             by="the balance of spin, docs/theory.md, 11",
         ),

@@ -4,6 +4,7 @@ wall."""
 from __future__ import annotations
 
 import math
+from enum import StrEnum
 
 import numpy as np
 
@@ -22,6 +23,17 @@ LAGS = 1e-3
 CREEPS = 100.0
 """Slip, in units of that, at which a ball may creep while it comes to rest jammed between floor and
 wall."""
+
+
+class Passage(StrEnum):
+    """A flow up to which, or from which on, a ball moves in some case."""
+
+    RR_ENDS = "rolling"
+    NS_ENDS = "sinking"
+    SS_ENDS = "slipping"
+    NR_BEGINS = "riding"
+    RR_RETURNS = "leaning"
+    FOLD = "fold"
 
 
 def lifts(end: Bracket) -> bool:
@@ -105,13 +117,13 @@ def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
     return False if slowing > 1 else True if slowing < slowed else None
 
 
-ASKED: dict[str, tuple[float, Answer]] = {
-    "rolling": (5, stays_rolling),
-    "sinking": (20, lambda run: physical_case(settled_case(run)) is not Case.NR),
-    "slipping": (10, may_settle),
-    "riding": (5, lambda run: slip(sliding_speeds(run)[1], run) > 1),
-    "leaning": (20, lambda run: presses(run) and settled_case(run) is Case.RR),
-    "fold": (1.4, settles),
+ASKED: dict[Passage, tuple[float, Answer]] = {
+    Passage.RR_ENDS: (5, stays_rolling),
+    Passage.NS_ENDS: (20, lambda run: physical_case(settled_case(run)) is not Case.NR),
+    Passage.SS_ENDS: (10, may_settle),
+    Passage.NR_BEGINS: (5, lambda run: slip(sliding_speeds(run)[1], run) > 1),
+    Passage.RR_RETURNS: (20, lambda run: presses(run) and settled_case(run) is Case.RR),
+    Passage.FOLD: (1.4, settles),
 }
 """How long a run takes, in units of 1/c, and what is asked of it: yes below a threshold, no above.
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum, auto
 from functools import partial
 from itertools import pairwise
 
@@ -34,7 +35,7 @@ from compare.kit.statistics import (
     extrapolated_zero,
 )
 from compare.kit.tasks import Task
-from compare.subjects.thresholds.measure.answers import ASKED, lifts, slip
+from compare.subjects.thresholds.measure.answers import ASKED, Passage, lifts, slip
 from model import Case, Parameters, State
 from model.arrays import Array
 
@@ -48,16 +49,42 @@ DISTANCES = (0.005, 0.01, 0.02, 0.03, 0.05)
 DISTANCES_BELOW_FOLD = (0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15)
 """The same below a fold, where slip goes like the root of the distance, in parts of the range of
 slipping."""
-DISTANCES_RIDING = (0.002, 0.008, 0.02, 0.035, 0.05)
+DISTANCES_OF_NR = (0.002, 0.008, 0.02, 0.035, 0.05)
 """The same from where a ball rides the wall as slowly as it can."""
 
 
-FOUND = {"rolling": ("omega_01", "omega_03"), "sinking": ("omega_02",), "slipping": ("omega_04",)}
-"""The thresholds at which each ends or begins."""
-STARTS = {"rolling": "with the fluid", "sinking": "on the wall", "slipping": "rest"}
+FOUND = {
+    Passage.RR_ENDS: ("omega_01", "omega_03"),
+    Passage.NS_ENDS: ("omega_02",),
+    Passage.SS_ENDS: ("omega_04",),
+}
+"""The thresholds that each limit may be."""
+STARTS = {
+    Passage.RR_ENDS: "with the fluid",
+    Passage.NS_ENDS: "on the wall",
+    Passage.SS_ENDS: "rest",
+}
 """How balls start of which is asked when that ends."""
 From = Callable[[Parameters], Array]
 """The state in which a ball starts, by its parameters."""
+
+
+class Beside(Enum):
+    """Settled states beside a limit, from which it is extrapolated or searched for."""
+
+    NR = auto()
+    NS = auto()
+    LIFTED = auto()
+    """NR beyond the end of RR."""
+    SS = auto()
+    """SS next to the end of RR."""
+    SS_LAST = auto()
+    """SS next to its own end."""
+
+    @property
+    def case(self) -> Case:
+        """The case in which they settle."""
+        return {Beside.NS: Case.NS, Beside.SS: Case.SS, Beside.SS_LAST: Case.SS}.get(self, Case.NR)
 
 
 def measure(
@@ -70,11 +97,11 @@ def measure(
     _narrow(runner, found, _end_of_rolling, careful=sure)
     _narrow(runner, found, _sinking_and_slipping)
     _settle_beside(runner, found)
-    _narrow(runner, found, _riding_and_leaning, careful=sure)
+    _narrow(runner, found, _on_the_wall_and_back, careful=sure)
     _narrow(runner, found, _fold)
     for each in found:
         for kind, bracket in each.brackets.items():
-            if bracket.failure and kind != "sinking":  # which is looked for roughly
+            if bracket.failure and kind is not Passage.NS_ENDS:  # which is looked for roughly
                 yield each.missing(
                     f"{kind}: its limit is known less well, as a run {bracket.failure}", 0
                 )
@@ -84,26 +111,27 @@ def measure(
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What was found on one set so far, by kind of change of the motion.
-
-    Kinds: the end of "rolling", "sinking", "slipping", "leaning", the "fold", or where slip of a
-    "riding" ball ends."""
+    """What was found on one set so far."""
 
     runner: Runner
     set: str
     p: Parameters
-    cases: Mapping[
-        str, Mapping[float, Case]
-    ]  # in which cases balls were seen to settle, by flow, the slowest first
-    changes: Mapping[str, Bracket]  # flows between which it is looked for
-    brackets: dict[str, Bracket] = field(default_factory=dict)
-    states: dict[str, list[SteadyState]] = field(default_factory=dict)
-    """Settled states beside a change, the nearest first, by kind: of "riding", "sinking", "lifted"
-    balls; of "slipping" ones near its beginning, and "turning" ones near its end."""
+    cases: Mapping[Passage, Mapping[float, Case]]
+    """In which cases balls that start so were seen to settle, by flow, the slowest first."""
+    changes: Mapping[Passage, Bracket]
+    """Flows between which a limit is looked for."""
+    brackets: dict[Passage, Bracket] = field(default_factory=dict)
+    states: dict[Beside, list[SteadyState]] = field(default_factory=dict)
+    """The nearest first."""
 
     def search(
-        self, kind: str, around: Bracket, width: float, start: From | None = None, time: float = 1.0
-    ) -> tuple[str, Search]:
+        self,
+        kind: Passage,
+        around: Bracket,
+        width: float,
+        start: From | None = None,
+        time: float = 1.0,
+    ) -> tuple[Passage, Search]:
         """A search that narrows a bracket by runs at held flows, `time` times as long as a question
         of `ASKED` takes.
 
@@ -112,23 +140,17 @@ class Findings:
         units, answer = ASKED[kind]
 
         def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
-            q, last = (
-                self.p.replace(omega_0=float(omega)),
-                bracket.runs[0] if kind == "slipping" else None,
-            )
-            x0 = (
-                last.x[-1]
-                if last
-                else start(q)
-                if start
-                else settling.initial_condition("", q, STARTS[kind]).x0
-            )
+            q = self.p.replace(omega_0=float(omega))
+            if kind is Passage.SS_ENDS and (last := bracket.runs[0]):
+                x0 = last.x[-1]
+            else:
+                x0 = start(q) if start else settling.initial_condition("", q, STARTS[kind]).x0
             t_end = settling.rounded_duration(q, units * time * attempt.time)
             return self.runner.task(q, x0, t_end, coarse_step(q) / attempt.refine)
 
         return kind, Search(around, task, answer, width)
 
-    def bracket_seen(self, kind: str) -> Bracket | None:
+    def bracket_seen(self, kind: Passage) -> Bracket | None:
         """A bracket both of whose ends were seen in runs."""
         bracket = self.brackets.get(kind)
         return bracket if bracket and None not in bracket.runs else None
@@ -161,7 +183,7 @@ class Findings:
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
     def rows_of_zero(
-        self, kind: str, what: str, quantity: str, side: str, by: str
+        self, kind: Beside, what: str, quantity: str, side: str, by: str
     ) -> Iterator[Measurement | Missing]:
         """The measurement of a threshold at which something is zero, extrapolated from settled
         states beside it."""
@@ -180,12 +202,12 @@ def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Recor
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one
     on trial looks where that one found something."""
-    starts = STARTS | {"slipping": runner.effort.settled_starts[0][0]}
+    starts = STARTS | {Passage.SS_ENDS: runner.effort.settled_starts[0][0]}
     cases = {kind: settling.settled_cases(records, name, how) for kind, how in starts.items()}
     changes = {}
     for kind, seen in cases.items():
         if flows := list(seen):
-            ended = {Case.NR} if kind != "rolling" else set(Case) - {Case.RR}
+            ended = {Case.NR} if kind is not Passage.RR_ENDS else set(Case) - {Case.RR}
             low = max((flow for flow in flows if seen[flow] not in ended), default=flows[0] / 2)
             changes[kind] = Bracket(
                 low, next((flow for flow in flows if flow > low), 2 * flows[-1])
@@ -196,7 +218,7 @@ def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Recor
             for known in filter(
                 None, (records.threshold(name, quantity) for quantity in quantities)
             ):
-                away = AWAY if kind == "rolling" else COARSE / 3
+                away = AWAY if kind is Passage.RR_ENDS else COARSE / 3
                 changes[kind] = Bracket(known.value * (1 - away), known.value * (1 + away))
     return Findings(runner, name, p, cases, changes)
 
@@ -204,7 +226,7 @@ def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Recor
 def _narrow(
     runner: Runner,
     found: Sequence[Findings],
-    searches: Callable[[Findings], Iterator[tuple[str, Search]]],
+    searches: Callable[[Findings], Iterator[tuple[Passage, Search]]],
     careful: bool = False,
 ) -> None:
     """Narrow down what is searched for on a set, on all sets together."""
@@ -214,22 +236,22 @@ def _narrow(
         each.brackets[kind] = bracket
 
 
-def _end_of_rolling(each: Findings) -> Iterator[tuple[str, Search]]:
+def _end_of_rolling(each: Findings) -> Iterator[tuple[Passage, Search]]:
     """A search for the largest flow at which a ball that rolls at both points goes on so."""
-    if change := each.changes.get("rolling"):
+    if change := each.changes.get(Passage.RR_ENDS):
         width = each.runner.effort.thresholds_width * change.high
-        yield each.search("rolling", change, width)
+        yield each.search(Passage.RR_ENDS, change, width)
 
 
-def _sinking_and_slipping(each: Findings) -> Iterator[tuple[str, Search]]:
+def _sinking_and_slipping(each: Findings) -> Iterator[tuple[Passage, Search]]:
     """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles
     on the floor."""
-    if change := each.changes.get("sinking"):
-        yield each.search("sinking", change, COARSE * change.low)
-    change, end = each.changes.get("slipping"), each.brackets.get("rolling")
+    if change := each.changes.get(Passage.NS_ENDS):
+        yield each.search(Passage.NS_ENDS, change, COARSE * change.low)
+    change, end = each.changes.get(Passage.SS_ENDS), each.brackets.get(Passage.RR_ENDS)
     if change and end and not lifts(end) and end.high < change.high:
         change = replace(change, low=max(change.low, end.high))
-        yield each.search("slipping", change, COARSE * change.low)
+        yield each.search(Passage.SS_ENDS, change, COARSE * change.low)
 
 
 def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
@@ -238,9 +260,7 @@ def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
 
     A bracket is taken for a change only if something was seen beyond it, or that may be taken for
     granted."""
-    beside: list[
-        tuple[Findings, str, str, Array]
-    ] = []  # findings, kind of state, how it starts, flows in rad s-1
+    beside: list[tuple[Findings, Beside, str, Array]] = []  # how they start, flows in rad s-1
     for each in found:
         unseen = [
             kind
@@ -249,20 +269,20 @@ def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
         ]
         for kind in unseen if not runner.effort.granted else ():
             del each.brackets[kind]
-        settled, turning, riding = (
-            np.array(row) for row in (DISTANCES, DISTANCES_BELOW_FOLD, DISTANCES_RIDING)
+        near, below_fold, above = (
+            np.array(row) for row in (DISTANCES, DISTANCES_BELOW_FOLD, DISTANCES_OF_NR)
         )
-        if carried := each.brackets.get("sinking"):
-            beside.append((each, "riding", "on the wall", carried.high * (1 + riding)))
+        if carried := each.brackets.get(Passage.NS_ENDS):
+            beside.append((each, Beside.NR, "on the wall", carried.high * (1 + above)))
             if runner.effort.slow:  # a ball that sinks swings for long
-                beside.append((each, "sinking", "on the wall", carried.low * (1 - settled / 2)))
-        end, last = each.brackets.get("rolling"), each.brackets.get("slipping")
+                beside.append((each, Beside.NS, "on the wall", carried.low * (1 - near / 2)))
+        end, last = each.brackets.get(Passage.RR_ENDS), each.brackets.get(Passage.SS_ENDS)
         if end and lifts(end):
-            beside.append((each, "lifted", "on the wall", end.high * (1 + riding)))
+            beside.append((each, Beside.LIFTED, "on the wall", end.high * (1 + above)))
         elif end and last:
             span = last.low - end.high
-            beside.append((each, "slipping", "rest", end.high + settled * min(span, end.high)))
-            beside.append((each, "turning", "rest", last.low - turning * span))
+            beside.append((each, Beside.SS, "rest", end.high + near * min(span, end.high)))
+            beside.append((each, Beside.SS_LAST, "rest", last.low - below_fold * span))
     starts = [
         [
             settling.initial_condition(each.set, each.p.replace(omega_0=flow), how)
@@ -273,36 +293,34 @@ def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
     criteria = SettlingCriteria(
         loose=runner.effort.thresholds_loose, rounds=runner.effort.thresholds_rounds
     )
-    belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
-    for (each, kind, *_), states in zip(
+    for (each, which, *_), states in zip(
         beside, settling.settle_groups(runner, starts, criteria), strict=True
     ):
-        case = belongs.get(kind, Case.NR)
-        each.states[kind] = [
-            s for s in states if not s.failure and settling.physical_case(s.case) is case
+        each.states[which] = [
+            s for s in states if not s.failure and settling.physical_case(s.case) is which.case
         ]
 
 
-def _riding_and_leaning(each: Findings) -> Iterator[tuple[str, Search]]:
+def _on_the_wall_and_back(each: Findings) -> Iterator[tuple[Passage, Search]]:
     """Searches for where a ball on the wall begins to slip, and up to where one pressed to the
     floor rolls again.
 
     They begin from settled states continued to each flow; the pressed one has a thousandth less
     spin on the wall."""
     width = each.runner.effort.thresholds_width
-    begins, riding = each.brackets.get("sinking"), each.states.get("riding", [])
-    if begins and len(riding) == len(DISTANCES_RIDING):
-        ride = riding_start(riding, height=settling.safe_height(each.p))
-        yield each.search("riding", begins, width * begins.high, ride)
-    end, lifted = each.brackets.get("rolling"), each.states.get("lifted", [])
-    if end and len(lifted) == len(DISTANCES_RIDING):
+    begins, carried = each.brackets.get(Passage.NS_ENDS), each.states.get(Beside.NR, [])
+    if begins and len(carried) == len(DISTANCES_OF_NR):
+        start = continued(carried, height=settling.safe_height(each.p))
+        yield each.search(Passage.NR_BEGINS, begins, width * begins.high, start)
+    end, lifted = each.brackets.get(Passage.RR_ENDS), each.states.get(Beside.LIFTED, [])
+    if end and len(lifted) == len(DISTANCES_OF_NR):
         change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
         yield each.search(
-            "leaning", change, width * end.high, riding_start(lifted, height=0.0, less=1e-3)
+            Passage.RR_RETURNS, change, width * end.high, continued(lifted, height=0.0, less=1e-3)
         )
 
 
-def riding_start(states: Sequence[SteadyState], height: float, less: float = 0.0) -> From:
+def continued(states: Sequence[SteadyState], height: float, less: float = 0.0) -> From:
     """A state that rides the wall at a height, continued in omega_0 from settled states, with less
     spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
@@ -310,12 +328,12 @@ def riding_start(states: Sequence[SteadyState], height: float, less: float = 0.0
         omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1
     )
 
-    def ride(p: Parameters) -> Array:
+    def start(p: Parameters) -> Array:
         slip_x = float(fit(p.omega_0))
         wall_spin = slip_x + p.R / p.r * p.omega_0
         return State(y=height, omega_c=p.omega_0, slip_x=slip_x - less * wall_spin).stacked()
 
-    return ride
+    return start
 
 
 def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
@@ -324,18 +342,18 @@ def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
 
     There is no fold where the floor would have to pull at that maximum, or there is none and the
     floor's force vanishes just where the wall begins to carry the ball."""
-    turned, held = each.states.get("turning", []), each.brackets.get("riding")
-    top = extrapolated(turned, "slip_x", extrapolated_maximum)
-    unloaded = extrapolated(turned, "force_Ay", extrapolated_zero)
+    last, held = each.states.get(Beside.SS_LAST, []), each.brackets.get(Passage.NR_BEGINS)
+    top = extrapolated(last, "slip_x", extrapolated_maximum)
+    unloaded = extrapolated(last, "force_Ay", extrapolated_zero)
     off = (
         max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty)
         if held and unloaded
         else math.inf
     )
     forces = partial(
-        extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in turned])
+        extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in last])
     )
-    if pressing := extrapolated(turned, "slip_x", forces):
+    if pressing := extrapolated(last, "slip_x", forces):
         sure = COVERAGE * pressing.uncertainty
         return top if pressing.value > sure else None, pressing.value < -sure
     return None, bool(held and off < each.runner.effort.thresholds_fold * held.high)
@@ -361,7 +379,7 @@ def extrapolated(
     return place if math.isfinite(place.uncertainty) else None
 
 
-def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
+def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
     """A search for the largest flow at which a ball on the floor settles, about the maximum of
     omega_0 on the branch.
 
@@ -371,27 +389,23 @@ def _fold(each: Findings) -> Iterator[tuple[str, Search]]:
     if top and each.runner.effort.slow:
         narrowest = each.runner.effort.thresholds_fold
         half = max(narrowest, 5.0 * top.uncertainty / top.value)
-        change, nearest = (
-            Bracket(top.value * (1 - half), top.value * (1 + half)),
-            each.states["turning"][0],
-        )
-        yield each.search(
-            "fold", change, narrowest * top.value, lambda _: nearest.mean, 1 / math.sqrt(narrowest)
-        )
+        change = Bracket(top.value * (1 - half), top.value * (1 + half))
+        nearest, time = each.states[Beside.SS_LAST][0].mean, 1 / math.sqrt(narrowest)
+        yield each.search(Passage.FOLD, change, narrowest * top.value, lambda _: nearest, time)
 
 
 def _rows(each: Findings) -> Iterator[Measurement | Missing]:
     """Measurements of the end of rolling (omega_01 or omega_03), and of omega_02, the least that
     holds a ball up."""
     none = "no flow that was tried, up to twice the fastest of the settled states,"
-    if not (rolling := each.bracket_seen("rolling")):
+    if not (rolling := each.bracket_seen(Passage.RR_ENDS)):
         yield each.missing(f"{none} ends two-point rolling")
     elif lifts(rolling):
         yield each.row("lifts", 1.0, rolling.tasks)
         yield each.row_of_bracket("omega_03", rolling, "from below", "loss of the floor")
-        if leaning := each.bracket_seen("leaning"):
+        if returns := each.bracket_seen(Passage.RR_RETURNS):
             yield each.row_of_bracket(
-                "omega_03", leaning, "from above", "return to rolling when pressed"
+                "omega_03", returns, "from above", "return to rolling when pressed"
             )
         else:
             why = "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
@@ -400,30 +414,31 @@ def _rows(each: Findings) -> Iterator[Measurement | Missing]:
         yield each.row("lifts", 0.0, rolling.tasks)
         yield each.row_of_bracket("omega_01", rolling, "from below", "onset of slip")
         yield from each.rows_of_zero(
-            "slipping", "lag", "omega_01", "from above", "lag of settled slipping"
+            Beside.SS, "lag", "omega_01", "from above", "lag of settled slipping"
         )
-    if riding := each.bracket_seen("riding"):
-        yield each.row_of_bracket("omega_02", riding, "from above", "onset of sliding on the wall")
+    if begins := each.bracket_seen(Passage.NR_BEGINS):
+        yield each.row_of_bracket("omega_02", begins, "from above", "onset of sliding on the wall")
     else:
         yield each.missing(f"{none} is the least to hold a ball on the wall")
     yield from each.rows_of_zero(
-        "sinking", "v_y", "omega_02", "from below", "speed of settled sinking"
+        Beside.NS, "v_y", "omega_02", "from below", "speed of settled sinking"
     )
 
 
 def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
     """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the
     number of folds."""
-    if "turning" not in each.states:
-        if (rolling := each.bracket_seen("rolling")) and not lifts(rolling):
+    if Beside.SS_LAST not in each.states:
+        if (rolling := each.bracket_seen(Passage.RR_ENDS)) and not lifts(rolling):
             yield each.missing("no end of slipping at both points was found", 3)
         return
-    (top, smooth), tasks = _end_of_slipping(each), [state.task for state in each.states["turning"]]
+    top, smooth = _end_of_slipping(each)
+    tasks = [state.task for state in each.states[Beside.SS_LAST]]
     # At how many of the rising flows that were tried a ball from rest ceases to settle in SS.
     said: dict[float, bool | None] = {
-        flow: case is Case.SS for flow, case in each.cases["slipping"].items()
+        flow: case is Case.SS for flow, case in each.cases[Passage.SS_ENDS].items()
     }
-    if tried := each.brackets.get("slipping"):
+    if tried := each.brackets.get(Passage.SS_ENDS):
         said |= dict(tried.said)
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
     settles = len(tasks) >= POINTS
@@ -432,7 +447,7 @@ def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
         yield from each.rows_of_zero(
-            "turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping"
+            Beside.SS_LAST, "force_Ay", "omega_02", "from below", "floor force of settled slipping"
         )
     elif top is None:
         yield each.missing(
@@ -442,7 +457,7 @@ def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
         yield each.row(
             "omega_04", top, tasks, side="from below", by="maximum of omega_0 along the branch"
         )
-        if fold := each.bracket_seen("fold"):
+        if fold := each.bracket_seen(Passage.FOLD):
             yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
         else:
             slow = "costs more than an engine beside the one on trial may"
