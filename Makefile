@@ -28,7 +28,7 @@ help:
 mutants: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet
 	$(BIN)/dualball validate --quiet -o results/default
-	$(BIN)/python -m tests.mutants results results/default --whole --engines --witness mujoco-plain --least 0.95 --page docs/mutants.md
+	$(BIN)/python -m tests.mutants results results/default --whole --engines --alone mujoco-plain --least 0.95 --page docs/mutants.md
 
 blind: $(VENV)/installed
 	$(BIN)/python -m tests.mutants.blind $(SEED)

@@ -37,7 +37,7 @@ from analytic.stationary.solutions import (
 )
 
 if TYPE_CHECKING:
-    from analytic.orbits.fates import attractors
+    from analytic.orbits.attractors import attractors
 
 __all__ = [
     "Ensemble",
@@ -72,7 +72,7 @@ def __getattr__(name: str) -> Any:
     """`attractors` when it is asked for: the formulas don't wait for its integrators and statistics
     to load."""
     if name == "attractors":
-        from analytic.orbits.fates import attractors
+        from analytic.orbits.attractors import attractors
 
         return attractors
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

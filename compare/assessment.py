@@ -1,4 +1,4 @@
-"""What each engine says of a claim: by its own time step, in the limit of no step, or as it comes.
+"""What each engine says of a claim: by its own time step, in the zero-step limit, or as it comes.
 
 The engine on trial is judged by the tolerances of its measurements. An engine in the limit measures
 the same with several time steps, and is judged by what `convergence` extrapolates, with a looser
@@ -152,7 +152,7 @@ def _loosened(checks: Sequence[Check], share: float) -> tuple[Check, ...]:
     """Checks whose numbers may be off by a share of their scales, since their errors have no
     limit."""
     return tuple(
-        replace(c, tolerance=share * c.scale, ceiling=2 * share)
+        replace(c, tolerance=share * c.scale, required=2 * share)
         if quantity(c.measurement.quantity).resolution
         else c
         for c in checks

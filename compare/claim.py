@@ -167,13 +167,13 @@ class Judged:
         for check in self.checks:
             name = check.measurement.quantity
             if name not in ("case", "cases") and (check.conclusive or name not in fine):
-                power[name] = max(power.get(name, 0.0), check.resolves)
+                power[name] = max(power.get(name, 0.0), check.resolution)
         return power
 
 
 @dataclass(frozen=True, kw_only=True)
 class EngineVerdict(Judged):
-    """What one engine says of a claim: by checks in the limit of no time step, where it is judged
+    """What one engine says of a claim: by checks in the zero-step limit, where it is judged
     so."""
 
     engine: str

@@ -64,7 +64,7 @@ LEAST_STEPS = 3
 Ends = Set[tuple[str, float]]
 """Measured thresholds, each with the name of its set."""
 Limit = tuple[Check, float]
-"""A check in the limit of no step, and the observed order, nan where the step shows nothing."""
+"""A check in the zero-step limit, and the observed order, nan where the step shows nothing."""
 
 
 @dataclass(frozen=True)
@@ -129,12 +129,12 @@ def zero_step_limit(series: StepSeries, ends: Ends = frozenset()) -> Limit | Non
     safety = 1.0 if m.quantity == WORST else GCI_SAFETY if n == LEAST_STEPS else 0.0
     taken = safety * (limit.value - errors[-1])
     hidden = _hidden_by_brackets(series) if is_threshold else 0.0
-    ceiling = max(required, min(LOOSER * required, COARSEST))
-    doubt = max(math.hypot(limit.uncertainty, taken, hidden), SAME * ceiling / COVERAGE)
+    looser = max(required, min(LOOSER * required, COARSEST))
+    doubt = max(math.hypot(limit.uncertainty, taken, hidden), SAME * looser / COVERAGE)
     value = series.last.predicted + limit.value * scale
     measured = replace(m, value=value, uncertainty=doubt * scale)
     tolerance = COVERAGE * measured.uncertainty
-    return replace(series.last, measurement=measured, tolerance=tolerance, ceiling=ceiling), order
+    return replace(series.last, measurement=measured, tolerance=tolerance, required=looser), order
 
 
 def _next_to_threshold(m: Measurement, ends: Ends) -> bool:

@@ -108,25 +108,25 @@ class Study:
         runners = [
             Runner(campaign, each, self.level, divisor)
             for each in self.engines
-            for divisor in each.refine
+            for divisor in each.divisors
         ]
         return [
             Job(protocol, runner, self.output, self.sets)
             for runner in runners
             for protocol in protocols or self.protocols
-            if planned(protocol.name, runner.engine, runner.refine, runner.level)
+            if planned(protocol.name, runner.engine, runner.divisor, runner.level)
         ]
 
     def files(self, campaign: Campaign) -> results.Files:
         """The files of all that is measured by this plan, for these claims or for others
         before."""
         files: dict[str, dict[int, list[str]]] = {
-            each.name: {n: [] for n in each.refine} for each in self.engines
+            each.name: {n: [] for n in each.divisors} for each in self.engines
         }
         for job in self.jobs(campaign, PROTOCOLS):
             if job.file.exists():
                 name = job.file.relative_to(self.output).as_posix()
-                files[job.runner.engine.name][job.runner.refine].append(name)
+                files[job.runner.engine.name][job.runner.divisor].append(name)
         return files
 
 
@@ -170,14 +170,14 @@ class SoFar:
         name, engine = job.protocol.name, job.runner.engine.name
         self.waiting[name] -= 1
         if not isinstance(found, Exception):
-            self.records[engine][job.runner.refine] += found
+            self.records[engine][job.runner.divisor] += found
             return
         why = f"{type(found).__name__}: {found}"
         if engine == next(iter(self.records)):
             self.broken[name] = f"{name}: {why}"
         else:
             rows = (Missing(name, each, f"{job.name}: {why}") for each in job.sets)
-            self.records[engine][job.runner.refine] += Records(missing=tuple(rows))
+            self.records[engine][job.runner.divisor] += Records(missing=tuple(rows))
 
     def verdict(self, claim: Claim) -> Verdict:
         """The verdict on a claim, an error if one of its protocols broke down."""
@@ -190,7 +190,7 @@ def measure(study: Study, campaign: Campaign, far: ValidationProgress) -> Iterat
     """Carry out what is planned; yield all that is measured, at first and after each protocol."""
     jobs = study.jobs(campaign)
     far.costs = {job.name: 0.0 if job.file.exists() else job.cost for job in jobs}
-    records = {each.name: dict.fromkeys(each.refine, Records()) for each in study.engines}
+    records = {each.name: dict.fromkeys(each.divisors, Records()) for each in study.engines}
     measured = SoFar(records, Counter(job.protocol.name for job in jobs))
     yield measured
     for job, found in programme.run(jobs):
@@ -231,7 +231,7 @@ def judge_stored(
     summary = results.load(directory)
     stored.cache_clear()
     forget()
-    testimony = stored(directory)  # what can't be read is said before anything is judged
+    records = stored(directory)  # what can't be read is said before anything is judged
     with processes(workers) as work:  # the last claims first: they take longest
         found = work.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
         verdicts = {
@@ -239,7 +239,7 @@ def judge_stored(
             for claim, each in zip(CLAIMS[::-1], found, strict=True)
         }
         written = write(
-            directory, Level[summary.level], summary.measurements, testimony, verdicts, work.map
+            directory, Level[summary.level], summary.measurements, records, verdicts, work.map
         )
     return [v for v in written if v.claim.id in chosen]
 
@@ -251,11 +251,11 @@ def _judged(directory: Path, number: int) -> dict[str, Any]:
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
 
-def _in_time(claim: Claim, testimony: RecordsByEngine) -> Verdict:
+def _in_time(claim: Claim, records: RecordsByEngine) -> Verdict:
     """The verdict on a claim; if judging it takes too long, one that says so."""
     try:
         with at_most(JUDGING):
-            return full_verdict(claim, testimony)
+            return full_verdict(claim, records)
     except LateError as error:
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=str(error))
 
@@ -267,15 +267,13 @@ def stored(directory: Path) -> RecordsByEngine:
     return results.load_measurements(directory, summary.level, summary.measurements)
 
 
-def evidence(directory: Path, verdicts: Sequence[Verdict], testimony: RecordsByEngine) -> Evidence:
+def evidence(directory: Path, verdicts: Sequence[Verdict], records: RecordsByEngine) -> Evidence:
     """Collect what figures draw: checks by claim, and each engine's measurements, at half the usual
     step if there."""
     checks = {
         v.claim.id: (*v.checks, *(c for w in v.engines[1:] for c in w.checks)) for v in verdicts
     }
-    first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [
-        Records()
-    ]
+    first, *others = [steps.get(2, steps[min(steps)]) for steps in records.values()] or [Records()]
     return Evidence(checks, first, directory, sum(others, Records()))
 
 
@@ -293,15 +291,15 @@ def stored_evidence(directory: Path) -> Evidence:
     none."""
     if not (directory / results.SUMMARY).exists():
         return Evidence()
-    testimony = stored(directory)
-    return evidence(directory, [_in_time(claim, testimony) for claim in CLAIMS], testimony)
+    records = stored(directory)
+    return evidence(directory, [_in_time(claim, records) for claim in CLAIMS], records)
 
 
 def write(
     directory: Path,
     level: Level,
     files: results.Files,
-    testimony: RecordsByEngine,
+    records: RecordsByEngine,
     known: Mapping[str, Verdict],
     over: Spread | None,
 ) -> list[Verdict]:
@@ -310,12 +308,12 @@ def write(
 
     Return the verdicts on all claims.
     """
-    verdicts = [known.get(claim.id) or full_verdict(claim, testimony) for claim in CLAIMS]
+    verdicts = [known.get(claim.id) or full_verdict(claim, records) for claim in CLAIMS]
     summary = Summary.of(verdicts, level, files)
     if over:
         from compare.report import report as page  # here, because drawing takes a second to load
 
-        page.write(evidence(directory, verdicts, testimony), verdicts, summary, over)
+        page.write(evidence(directory, verdicts, records), verdicts, summary, over)
     else:
         results.save(summary, directory)
     return verdicts

@@ -52,32 +52,32 @@ def without_criterion(claim: Claim, records: Records) -> Records:
     return replace(records, measurements=left)
 
 
-def outcomes(claim: Claim, testimony: RecordsByEngine) -> dict[str, Outcome]:
+def outcomes(claim: Claim, records: RecordsByEngine) -> dict[str, Outcome]:
     """What each engine says of a claim."""
-    return {each.engine: each.outcome for each in full_verdict(claim, testimony).engines}
+    return {each.engine: each.outcome for each in full_verdict(claim, records).engines}
 
 
-def changed(testimony: RecordsByEngine, change: Callable[[Records], Records]) -> RecordsByEngine:
+def changed(records: RecordsByEngine, change: Callable[[Records], Records]) -> RecordsByEngine:
     """What every engine measured, changed."""
-    return {name: {n: change(own) for n, own in steps.items()} for name, steps in testimony.items()}
+    return {name: {n: change(own) for n, own in steps.items()} for name, steps in records.items()}
 
 
 def main(directory: str) -> None:
     """Print the confirmations that are left by each way of thinning."""
-    testimony = validation.stored(Path(directory))
+    records = validation.stored(Path(directory))
     confirmed = {
         (claim.id, name)
         for claim in CLAIMS
-        for name, outcome in outcomes(claim, testimony).items()
+        for name, outcome in outcomes(claim, records).items()
         if outcome is Outcome.CONFIRMED
     }
     asked = [claim for claim in CLAIMS if any(claim.id == of for of, _ in confirmed)]
     print("as measured:", dict(Counter(name for _, name in confirmed)))
     for way, thin in WAYS.items():
-        left = changed(testimony, lambda records, thin=thin: thinned(records, thin))
+        left = changed(records, lambda records, thin=thin: thinned(records, thin))
         report(way, confirmed, {claim.id: outcomes(claim, left) for claim in asked})
     criterion = {
-        claim.id: outcomes(claim, changed(testimony, lambda r, of=claim: without_criterion(of, r)))
+        claim.id: outcomes(claim, changed(records, lambda r, of=claim: without_criterion(of, r)))
         for claim in asked
     }
     report("the last criterion of each claim gone", confirmed, criterion)

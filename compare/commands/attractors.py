@@ -12,7 +12,7 @@ import numpy as np
 
 import analytic
 from analytic.orbits import orbit_branch
-from analytic.orbits.fates import Attractor
+from analytic.orbits.attractors import Attractor
 from analytic.orbits.periodic import Orbit
 from analytic.simulation.ensemble import interval
 from compare.commands import options, running
@@ -21,7 +21,7 @@ from compare.kit.engines import EVENT
 from compare.kit.statistics import plain
 from compare.kit.sweep import Axis, grid
 from compare.kit.tasks import carry_out
-from compare.subjects.attractors.basins import FATES, basins
+from compare.subjects.attractors.basins import ATTRACTORS, basins
 from model import InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         attractors = analytic.attractors(
             p, starts, seed=args.seed, lasting=args.time, progress=tell, **own
         )
-        orbits = [each.fate.orbit for each in attractors if each.fate.orbit]
+        orbits = [each.limit.orbit for each in attractors if each.limit.orbit]
         branches = [
             orbit_branch.follow(orbit, name, *ends)
             for orbit in orbits
@@ -88,28 +88,28 @@ def run(args: argparse.Namespace) -> int:
 
 def attractor_data(of: Attractor) -> dict[str, Any]:
     """An attractor as JSON-able data, SI."""
-    fate, run, orbit = of.fate, of.run, of.fate.orbit
+    limit, run, orbit = of.limit, of.run, of.limit.orbit
     states = {
         "mean": orbit.mean if orbit else run.x.mean(axis=0),
         "low": run.x.min(axis=0),
         "high": run.x.max(axis=0),
     }
     # Those of a period, or those of the last window in the order in which they first come up.
-    cases = orbit.cases if orbit else dict.fromkeys(fate.last.cases)
+    cases = orbit.cases if orbit else dict.fromkeys(limit.last.cases)
     return {
-        "kind": fate.kind.value,
+        "kind": limit.kind.value,
         "cases": list(cases),
         "count": of.count,
         "starts": of.starts,
         "share": of.share,
         "share_95": of.interval,
-        "period": orbit.period if orbit else fate.period,
-        "period_in_the_run": fate.period,
+        "period": orbit.period if orbit else limit.period,
+        "period_in_the_run": limit.period,
         "multipliers": orbit.multipliers if orbit else [],
-        "lyapunov": fate.exponent,
-        "theory": fate.solution.case if fate.solution else "orbit" if orbit else None,
+        "lyapunov": limit.exponent,
+        "theory": limit.solution.case if limit.solution else "orbit" if orbit else None,
         **{name: dict(zip(VARIABLES, x, strict=True)) for name, x in states.items()},
-        "failure": fate.failure,
+        "failure": limit.failure,
     }
 
 
@@ -245,13 +245,15 @@ def run_basins(args: argparse.Namespace) -> int:
         drawing.save(figures.draw_basins(mapped), args.map)
     elif args.map:
         mapped.save(args.map)
-    shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
+    shares = {
+        attractor: mapped.share(attractor) for attractor in ATTRACTORS if mapped.share(attractor)[0]
+    }
     differ = mapped.differences().tolist() if args.mujoco else []
     said = []
-    for fate, (hits, of) in shares.items():
+    for attractor, (hits, of) in shares.items():
         low, high = interval(hits, of)
         said.append(
-            f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to "
+            f"{attractor:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to "
             f"{100 * high:.1f} %)"
         )
     where = f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"

@@ -67,7 +67,7 @@ def validate(parser: Parser) -> None:
             help=takes,
         )
     options.add_own_set(parser)
-    options.add_engine_name(parser, None, "only this one is heard; default: the first three")
+    options.add_engine_name(parser, None, "only this one is asked; default: the first three")
     parser.add_argument("--list", action="store_true", help="list the claims and stop")
     options.add_workers(parser)
     options.add_directory(parser, "results")

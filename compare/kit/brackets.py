@@ -19,13 +19,13 @@ Answer = Callable[[Trajectory], bool | None]
 @dataclass(frozen=True)
 class Attempt:
     """How the run of a question is done: `time` times as long, with the time step divided by
-    `refine`."""
+    `divisor`."""
 
     time: int = 1
-    refine: int = 1
+    divisor: int = 1
 
 
-USUAL, LONGER, FINER = Attempt(), Attempt(time=4), Attempt(refine=2)
+USUAL, LONGER, FINER = Attempt(), Attempt(time=4), Attempt(divisor=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> 
 
     With `careful` the ends of the brackets are asked once more with half the time step: one that
     doesn't hold is as uncertain as the bracket before it was wide, see `Bracket.shift`."""
-    failures, sections = dict[Search, str](), runner.effort.sections
+    failures, sections = dict[Search, str](), runner.sampling.sections
     brackets = [search.bracket for search in searches]
     before, todo = list(brackets), list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].width > searches[k].width]:
@@ -120,7 +120,7 @@ def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> 
         (k, end)
         for k, b in enumerate(brackets)
         for end in (0, 1)
-        if not (b.runs[end] or runner.effort.granted)
+        if not (b.runs[end] or runner.sampling.granted)
     ]
     replies = _answers(
         runner, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures

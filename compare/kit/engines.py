@@ -28,7 +28,7 @@ from model.versions import version
 
 
 class Role(Enum):
-    """How an engine is heard of a claim, and which sets it measures, see `compare.kit.plan`."""
+    """How an engine is asked of a claim, and which sets it measures, see `compare.kit.plan`."""
 
     ON_TRIAL = auto()
     IN_THE_LIMIT = auto()
@@ -79,7 +79,7 @@ class Engine:
     about: str = ""
     """What makes it so, as the report's first screen says it."""
     role: Role = Role.ON_TRIAL
-    refine: tuple[int, ...] = (1,)
+    divisors: tuple[int, ...] = (1,)
     """Time steps in one that a protocol asks for; with several, claims are judged in the limit of
     no step."""
     relative_tolerance: float = 0.0
@@ -134,7 +134,7 @@ def plain(step: float) -> ContactSettings:
     return ContactSettings.for_problem(rough, step, STUDY_SLIP, integrator="implicit")
 
 
-def newcomer(step: float) -> ContactSettings:
+def default_settings(step: float) -> ContactSettings:
     """MuJoCo's own contact parameters on the joints of this study."""
     return ContactSettings(
         timestep=step,
@@ -180,7 +180,7 @@ def _adapted(library: Library, marks: str) -> list[Engine]:
         sources=("model", "mjsim", "compare.adapters"),
         stands_on=("numpy",),
         needs=library,
-        refine=(1, 2, 4),  # a free body's errors are of first or second order in the step
+        divisors=(1, 2, 4),  # a free body's errors are of first or second order in the step
         mark=marks[0],
     )
     theirs = partial(vessel.simulate, library, "defaults")
@@ -212,10 +212,10 @@ PLAIN = replace(
     configure=lambda given, p: plain(given.get("timestep", ContactSettings.timestep)).suited(p),
     stream=_unwarned,
     lands_within=1.0,
-    title="MuJoCo without that law, in the limit of no time step",
+    title="MuJoCo without that law, in the zero-step limit",
     about="the same ball, on MuJoCo's own contacts",
     role=Role.IN_THE_LIMIT,
-    refine=(1, 2, 3, 4),
+    divisors=(1, 2, 3, 4),
     mark="P",
 )
 EVENT = Engine(
@@ -248,14 +248,14 @@ FREE = replace(
     about="a free body in the place of joints along the paper's coordinates, rigid contacts by "
     "mjsim.Coulomb",
 )
-NEWCOMER = replace(
+DEFAULTS = replace(
     _AS_IT_COMES,
     name="mujoco-defaults",
     title="MuJoCo as it comes",
     about="a free ball in flat facets, MuJoCo's own parameters, 2 ms; confirmed is what is off by "
     "no more than 5 %",
     role=Role.AS_IT_COMES,
-    refine=(2,),
+    divisors=(2,),
     relative_tolerance=0.05,
     configure=lambda given, p: vessel.Settings(**{"timestep": 2e-3, **given}),
 )
@@ -267,8 +267,8 @@ _OTHERS = (
     *_adapted(_PACKAGES["rapier"], ">4"),
     *_adapted(_PACKAGES["sapien"], "hH"),
 )
-USUAL_ENGINES = (MUJOCO, PLAIN, NEWCOMER)
-"""Who is heard of a claim where no engine is named: the one on trial, and two beside it."""
+USUAL_ENGINES = (MUJOCO, PLAIN, DEFAULTS)
+"""Who is asked of a claim where no engine is named: the one on trial, and two beside it."""
 ENGINES: dict[str, Engine] = {
     each.name: each for each in (*USUAL_ENGINES, FREE, EVENT, MOREAU, *_OTHERS)
 }

@@ -42,7 +42,7 @@ Flows = tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effort:
+class Sampling:
     """How much is measured: a number a line, with its value at the quick level, by protocol."""
 
     halves: tuple[int, int] = (1, 2)  # what the time step of a pair of runs is divided by
@@ -65,7 +65,7 @@ class Effort:
     settled_starts: tuple[tuple[str, Flows], ...] = tuple((how, _FEW) for how in _STARTS)
     settled_sharp: float = 1.0  # share of the drift limit down to which a state goes on
     settled_loose: float = 1.0  # and the multiple of it up to which it counts
-    settled_refine: int = (
+    settled_divisor: int = (
         2  # parts of the time step with which a state is measured once more; 1: it isn't
     )
 
@@ -85,7 +85,7 @@ class Effort:
     slope_slipping: int = 2  # slipping states of a set at which it is measured, at most
 
     unsteady_lasts: float = 48.0  # time after a jump in units of 1/c
-    unsteady_refine: tuple[int, int] = (2, 4)  # its time steps in a coarse one
+    unsteady_divisors: tuple[int, int] = (2, 4)  # its time steps in a coarse one
     unsteady_ramps: tuple[int, int] = (1, 2)  # those of ramps
     unsteady_rates: tuple[float, ...] = (
         1e-2,
@@ -93,35 +93,35 @@ class Effort:
     pulsation_octaves: tuple[int, ...] = (3, 6)  # of the frequencies, above c/(4 pi)
     pulsation_steps: int = 512  # least number of time steps in a period
     pulsation_samples: int = 256  # in a period
-    pulsation_refine: int = 2  # parts of the time step in the last of successive runs
+    pulsation_divisor: int = 2  # parts of the time step in the last of successive runs
     pulsation_reach: float = (
         1.1  # largest amplitude tried, in units of what would end rolling in a slow pulsation
     )
     pulsation_width: float = 1e-3  # relative width to which the onset of slip is bracketed
-    unloading_refine: tuple[int, int] = (16, 32)  # time steps in a coarse one where the ball lands
+    unloading_divisors: tuple[int, int] = (16, 32)  # of the coarse step, where the ball lands
 
     recurrent_flows: Flows = (1.0,)  # of the staircase in units of that of the set
     choice_sets: int = 1  # the contacts of the second hover for long
 
     # Parts of a step of `step_pairs.STEP_RATIO`. Contacts with much friction answer more slowly:
     # with whole steps the slope of gamma was too coarse on 11 of the 24 sets of the default level.
-    bounds_refined: int = 2
+    bounds_divisor: int = 2
     growth_more: int = 1  # multiples of the numbers of directions in growth.PUSHES
     steepest_states: int = 1  # random states of every set out of which slip is pushed all round
     field_starts: int = 4  # random starts for every case and set
     field_kept: int = 4  # most states measured for every case and set
-    rates_refined: tuple[int, int] = (8, 16)  # the two time steps, in parts of the coarse step
+    rates_divisors: tuple[int, int] = (8, 16)  # the two time steps, in parts of the coarse step
     rates_leaning: tuple[int, int] = (
         8,
         16,
     )  # in SR: with shorter ones an almost unloaded floor carries more or none
     rates_more: float = 1  # multiples of the numbers of states in rates.STATES
-    laws_refined: tuple[int, int] = (4, 8)  # the two time steps, in parts of the coarse step
+    laws_divisors: tuple[int, int] = (4, 8)  # the two time steps, in parts of the coarse step
     motions_pieces: int = 6  # of a motion
 
 
 # fmt: off
-AT_QUICK = Effort()  # what others change stands below, a line a protocol
+AT_QUICK = Sampling()  # what others change stands below, a line a protocol
 AT_DEFAULT = replace(
     AT_QUICK, sections=7,
     settled_starts=tuple((how, _FLOWS) for how in _STARTS), settled_sharp=0.1,
@@ -132,15 +132,15 @@ AT_DEFAULT = replace(
     slope_slipping=20,
     unsteady_rates=(2.5e-3, 5e-3, 1e-2),
     pulsation_octaves=(0, 1, 3, 4, 6, 7), pulsation_steps=1024, pulsation_width=2.5e-4,
-    unloading_refine=(32, 64),
+    unloading_divisors=(32, 64),
     recurrent_flows=(1.0, 0.95, 0.91, 0.87, 0.83, 0.80),
     choice_sets=2,
-    bounds_refined=4,
+    bounds_divisor=4,
     growth_more=2,
     steepest_states=3,
     field_kept=6,
-    rates_refined=(16, 32), rates_more=2,
-    laws_refined=(8, 16),
+    rates_divisors=(16, 32), rates_more=2,
+    laws_divisors=(8, 16),
     motions_pieces=20,
 )
 AT_FULL = replace(
@@ -151,13 +151,13 @@ AT_FULL = replace(
     hysteresis_hold=100.0, hysteresis_parts=8,
     unsteady_rates=(1.25e-3, 2.5e-3, 5e-3, 1e-2),
     pulsation_octaves=tuple(range(8)), pulsation_steps=2048, pulsation_width=1.2e-4,
-    unloading_refine=(64, 128),
+    unloading_divisors=(64, 128),
     recurrent_flows=(1.0, 0.97, 0.94, 0.91, 0.88, 0.85, 0.82, 0.80),
     growth_more=6,
     steepest_states=12,
     field_starts=12, field_kept=24,
-    rates_refined=(32, 64), rates_more=5,
-    laws_refined=(16, 32),
+    rates_divisors=(32, 64), rates_more=5,
+    laws_divisors=(16, 32),
     motions_pieces=32,
 )
 OWN_STEPS = replace(
@@ -165,17 +165,17 @@ OWN_STEPS = replace(
     AT_QUICK, halves=(2, 2), granted=True, slow=False,
     settling_rounds=(0.45, 1.0, 1.0), settling_steps=512,
     settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))), settled_loose=100.0,
-    settled_refine=1,
+    settled_divisor=1,
     thresholds_width=5e-4, thresholds_loose=1e4, thresholds_rounds=(0.4, 1.0),
     plane_rounds=(1.0, 2.0),
     hysteresis_hold=15.0, hysteresis_parts=1,
-    unsteady_lasts=24.0, unsteady_refine=(2, 2), unsteady_ramps=(1, 1), unsteady_rates=(4e-2,),
+    unsteady_lasts=24.0, unsteady_divisors=(2, 2), unsteady_ramps=(1, 1), unsteady_rates=(4e-2,),
     # where friction creeps, slip counts as such later
-    pulsation_octaves=(3,), pulsation_steps=256, pulsation_samples=512, pulsation_refine=1, pulsation_reach=1.5,
+    pulsation_octaves=(3,), pulsation_steps=256, pulsation_samples=512, pulsation_divisor=1, pulsation_reach=1.5,
     pulsation_width=2e-3,
-    rates_refined=(16, 16), rates_leaning=(16, 16), rates_more=0.5,
-    bounds_refined=1,
-    laws_refined=(4, 4),
+    rates_divisors=(16, 16), rates_leaning=(16, 16), rates_more=0.5,
+    bounds_divisor=1,
+    laws_divisors=(4, 4),
     field_starts=2, field_kept=2,
 )
 # fmt: on

@@ -26,7 +26,7 @@ the wall at one flow; drag so strong that nothing folds; two other laws of drag;
 wall above that of the floor and the inertia. On them all wrong theories are noticed that are
 noticed on all nine sets chosen by hand."""
 MOST_LIMIT_SETS = 12
-"""Sets, at most, that engines in the limit of no time step measure above the quick level."""
+"""Sets, at most, that engines in the zero-step limit measure above the quick level."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Entry:
     trial: Names = VARIED
     """Sets that the engine on trial measures at the quick level; at the others all of them."""
     limit: Names = ()
-    """Sets that an engine in the limit of no time step measures at the quick level. At the others
+    """Sets that an engine in the zero-step limit measures at the quick level. At the others
     these are the first `MOST_LIMIT_SETS`, and `reference` alone where none is named here."""
     steps: tuple[int, int] = (3, 3)
     """With how many of its time steps it does, the coarsest first: at the quick level, and
@@ -114,8 +114,8 @@ def planned(protocol: str, engine: Engine, divisor: int, level: Level) -> dict[s
         names = entry.free if above else ()
     elif engine.role is Role.IN_THE_LIMIT:
         names = tuple(known)[: MOST_LIMIT_SETS if entry.limit else 1] if above else entry.limit
-        if divisor not in engine.refine[: entry.steps[above]]:
+        if divisor not in engine.divisors[: entry.steps[above]]:
             names = ()
-    if level < entry.level or (entry.by and engine.refine != (1,)):
+    if level < entry.level or (entry.by and engine.divisors != (1,)):
         names = ()
     return {name: p for name, p in known.items() if name in names}

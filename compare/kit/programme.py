@@ -68,7 +68,7 @@ class Job:
 
     def beside(self, protocol: str) -> str:
         """The name of another protocol by the same engine with the same step."""
-        return f"{protocol} by {self.runner.engine.name}, step/{self.runner.refine}"
+        return f"{protocol} by {self.runner.engine.name}, step/{self.runner.divisor}"
 
     @property
     def sets(self) -> Mapping[str, Parameters]:
@@ -76,7 +76,7 @@ class Job:
         if self.chosen is not None:
             return self.chosen
         return planned(
-            self.protocol.name, self.runner.engine, self.runner.refine, self.runner.level
+            self.protocol.name, self.runner.engine, self.runner.divisor, self.runner.level
         )
 
     @property
@@ -87,7 +87,7 @@ class Job:
     @property
     def cost(self) -> float:
         """About its processor time at the quick level, relative to others."""
-        name, engine, divisor = self.protocol.name, self.runner.engine, self.runner.refine
+        name, engine, divisor = self.protocol.name, self.runner.engine, self.runner.divisor
         if not self.runner.has_own_steps:
             return PLAN[name].seconds
         share = len(planned(name, engine, divisor, Level.QUICK)) / len(PLAN[name].trial)
@@ -99,7 +99,7 @@ class Job:
         subject, measure, _ = self.protocol.measure.__module__.partition(".measure")
         plan = [
             self.by.name,
-            self.runner.refine,
+            self.runner.divisor,
             self.runner.level.name,
             {name: asdict(p) for name, p in self.sets.items()},
             sources(*self.by.sources, "compare.kit", *([subject + measure] if measure else [])),
@@ -108,7 +108,7 @@ class Job:
             protocol=self.protocol.name,
             engine=self.runner.engine.name,
             by=self.by.name,
-            step=self.runner.refine,
+            step=self.runner.divisor,
             level=self.runner.level.name,
             plan=hashlib.sha256(json.dumps(plan).encode()).hexdigest()[:16],
         )

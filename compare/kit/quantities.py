@@ -1,9 +1,9 @@
-"""What is measured: every quantity with its symbol, unit, and the resolving power that a check of
-it must have.
+"""What is measured: every quantity with its symbol, unit, and the resolution that is
+required of a check of it.
 
-A check resolves r if it would notice a prediction that is off by r times the quantity's scale, see
-`compare.claim`. A check that resolves less than `Quantity.resolution` is inconclusive, however well
-the numbers agree. These ceilings follow from the errors of each protocol at its quick level:
+A check has the resolution r if it would notice a prediction that is off by r times the quantity's
+scale, see `compare.claim`. A check with less than `Quantity.resolution` is inconclusive, however
+well the numbers agree. Required resolutions follow from the errors of each protocol at its quick level:
 
 * settled states don't depend on the time step: what is left is their drift, which is waited for
   down to 1e-8. A slip is a difference of spins ten times its size, a force one of accelerations;

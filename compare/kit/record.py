@@ -152,8 +152,8 @@ class Check:
     """Largest deviation that still agrees."""
     scale: float
     relation: Relation = Relation.EQUAL
-    ceiling: float | None = None
-    """What it may overlook, where that isn't what its quantity says."""
+    required: float | None = None
+    """Its required resolution, where that isn't what its quantity says."""
     criterion: int = 0
     """Number of the criterion of its claim that chose it."""
 
@@ -175,9 +175,8 @@ class Check:
         return math.inf if math.isnan(share) else share
 
     @property
-    def resolves(self) -> float:
-        """The smallest relative error of the prediction that this check would notice: its resolving
-        power."""
+    def resolution(self) -> float:
+        """The smallest relative error of the prediction that this check would notice."""
         return self.tolerance / self.scale if self.scale else math.inf
 
     @property
@@ -187,11 +186,17 @@ class Check:
 
     @property
     def conclusive(self) -> bool:
-        """Whether the check resolves as much as its quantity asks for."""
-        ceiling = (
-            quantity(self.measurement.quantity).resolution if self.ceiling is None else self.ceiling
+        """Whether the check resolves as much as is required."""
+        return self.resolution <= self.required_resolution
+
+    @property
+    def required_resolution(self) -> float:
+        """The largest relative error of a prediction that it may overlook."""
+        return (
+            quantity(self.measurement.quantity).resolution
+            if self.required is None
+            else self.required
         )
-        return self.resolves <= ceiling
 
 
 @dataclass(frozen=True)

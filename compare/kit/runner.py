@@ -13,7 +13,7 @@ import numpy.typing as npt
 from compare.kit import levels
 from compare.kit.campaign import Campaign
 from compare.kit.engines import Engine
-from compare.kit.levels import Effort, Level
+from compare.kit.levels import Level, Sampling
 from compare.kit.scales import time_unit
 from compare.kit.tasks import Task
 from model import Flow, Parameters, Trajectory
@@ -27,11 +27,11 @@ class Runner:
     campaign: Campaign
     engine: Engine
     level: Level
-    refine: int = 1
-    """Time steps in one that a protocol asks for, see `Engine.refine`."""
+    divisor: int = 1
+    """Time steps in one that a protocol asks for, see `Engine.divisors`."""
 
     @property
-    def effort(self) -> Effort:
+    def sampling(self) -> Sampling:
         """How much is measured at this level by this engine."""
         if self.has_own_steps:
             return levels.OWN_STEPS if self.level is Level.QUICK else levels.OWN_STEPS_ABOVE_QUICK
@@ -39,9 +39,9 @@ class Runner:
 
     @property
     def has_own_steps(self) -> bool:
-        """Whether the engine is heard beside the one on trial, or in its place, with time steps of
+        """Whether the engine is asked beside the one on trial, or in its place, with time steps of
         its own."""
-        return self.engine.refine != (1,)
+        return self.engine.divisors != (1,)
 
     def task(
         self,
@@ -67,7 +67,7 @@ class Runner:
             x0=x,
             t_end=t_end,
             flow=flow,
-            settings=self.engine.at(step / self.refine, p),
+            settings=self.engine.at(step / self.divisor, p),
             sample_interval=max(step, t_end / samples),
         )
 

@@ -75,7 +75,7 @@ class SteadyState:
 class SettlingCriteria:
     """For how long a state is waited for, and how well it must be settled."""
 
-    refine: float = 1
+    divisor: float = 1
     """Time steps in one of `coarse_step`."""
     span: float = SPAN
     """Length of a round in units of 1/c."""
@@ -97,7 +97,10 @@ def settle(
     goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land."""
     span, loose = criteria.span, math.inf if runner.engine.relative_tolerance else criteria.loose
-    rounds, steps = criteria.rounds or runner.effort.settling_rounds, runner.effort.settling_steps
+    rounds, steps = (
+        criteria.rounds or runner.sampling.settling_rounds,
+        runner.sampling.settling_steps,
+    )
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
     states: dict[int, SteadyState] = {}
     todo = dict(enumerate(starts))
@@ -107,7 +110,7 @@ def settle(
             step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0), steps)
             samples = round(t_end / (STEPS_A_SAMPLE * step))
             tasks.append(
-                runner.task(start.p, start.x0, t_end, step / criteria.refine, samples=samples)
+                runner.task(start.p, start.x0, t_end, step / criteria.divisor, samples=samples)
             )
         under_way, todo = list(todo), {}
         for n, task, run in zip(under_way, tasks, runner.each(tasks), strict=True):
@@ -192,20 +195,20 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
 def settle_finer(
     runner: Runner, states: Sequence[SteadyState], criteria: SettlingCriteria = SettlingCriteria()
 ) -> list[SteadyState]:
-    """The same states with the time step divided by `Effort.settled_refine`, each from its mean and
+    """The same states with the time step divided by `Sampling.settled_divisor`, each from its mean and
     the height from which it started; as they are where that is one."""
-    refine = runner.effort.settled_refine
-    if refine == 1:
+    divisor = runner.sampling.settled_divisor
+    if divisor == 1:
         return list(states)
     starts = []
     for state in states:
         x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
         starts.append(replace(state.start, x0=x0.stacked()))
-    return settle(runner, starts, replace(criteria, refine=refine * criteria.refine))
+    return settle(runner, starts, replace(criteria, divisor=divisor * criteria.divisor))
 
 
 def with_changes(
-    value: Estimate, change: float, p: Parameters, size: float, refine: float
+    value: Estimate, change: float, p: Parameters, size: float, divisor: float
 ) -> Estimate:
     """A value of a settled state, of which half the step and other starts change so much; `size` is its
     natural size, and it has so many time steps in a coarse one.
@@ -214,13 +217,13 @@ def with_changes(
     is twice as much with half the step, so that it is about twice the change; what adds up at random
     the change may not show. Both take the place of what `judge_run` allows for them. (The second was
     added after a round played blind, where two claims were refuted without it.)"""
-    if refine == 1:
+    if divisor == 1:
         return value.also(start=change)
     return estimate(
         value.value,
         drift=value.budget["drift"],
         solver_or_start=2 * change,
-        solver_at_random=SOLVED * math.sqrt(refine / (p.c * coarse_step(p))) * size,
+        solver_at_random=SOLVED * math.sqrt(divisor / (p.c * coarse_step(p))) * size,
     )
 
 
@@ -229,8 +232,8 @@ def settled_readings(
 ) -> Iterator[Measurement | Missing]:
     """Case and omega_c to which the ball settles from each start, uncertain by what half the step
     changes, too."""
-    parts = runner.effort.settled_refine
-    criteria = SettlingCriteria(sharp=runner.effort.settled_sharp, refine=parts)
+    parts = runner.sampling.settled_divisor
+    criteria = SettlingCriteria(sharp=runner.sampling.settled_sharp, divisor=parts)
     states = settle(runner, starts, criteria)
     yield from (Missing(protocol, each.start.set, each.failure) for each in states if each.failure)
     states = [each for each in states if not each.failure]

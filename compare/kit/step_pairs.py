@@ -40,7 +40,7 @@ class StepPair(Start):
 
     t_end: float
     """s"""
-    refine: tuple[int, int]
+    divisors: tuple[int, int]
     """Time steps in one of `coarse_step`, fewer first."""
     samples: int | None = None
     """None for every step."""
@@ -83,7 +83,7 @@ def carry_out(
     tasks: list[tuple[StepPair, list[Task]]] = []
     for pair in pairs:
         tasks.append((pair, []))
-        for step in (coarse_step(pair.p) / refine for refine in pair.refine):
+        for step in (coarse_step(pair.p) / divisor for divisor in pair.divisors):
             samples = pair.samples or round(pair.t_end / step)
             for p in pair.variants or (pair.p,):
                 task = runner.task(p, pair.x0, pair.t_end, step, flow=pair.flow, samples=samples)
@@ -139,13 +139,13 @@ HALF_WINDOW, WINDOW_DEGREES = 8, (5, 3)
 polynomials through it, of which the lower one shows what the degree changes."""
 
 
-def lag_error(p: Parameters, refine: int = 1) -> float:
+def lag_error(p: Parameters, divisor: int = 1) -> float:
     """Standard uncertainty of a force divided by the weight, where halving the step may by chance
     change nothing.
 
     The error is at most half the square of the lag `LAG` in units of `time_unit`: the second order,
-    once the first is extrapolated. The steps of `STEP_RATIO` may be divided by `refine`."""
-    return uniform((LAG * coarse_step(p) / (STEP_RATIO * refine) / time_unit(p)) ** 2 / 2)
+    once the first is extrapolated. The steps of `STEP_RATIO` may be divided by `divisor`."""
+    return uniform((LAG * coarse_step(p) / (STEP_RATIO * divisor) / time_unit(p)) ** 2 / 2)
 
 
 def polynomials(

@@ -105,13 +105,19 @@ def numbers(checks: list[Check]) -> Rows:
     head = ["set", "ω₀ (rad/s)", "measured", "± u", "predicted", "off/tolerance", "resolution"]
     rows = [[*head, "required", "", "with"]]
     for check in wording.ranked(checks)[:LISTED]:
-        m, known = check.measurement, quantity(check.measurement.quantity)
-        required = known.resolution if check.ceiling is None else check.ceiling
+        m = check.measurement
         unit = readable(m.unit)
         sizes = wording.size(m.uncertainty), wording.value(m, check.predicted)
-        powers = f"{check.share:.2g}", wording.size(check.resolves), wording.size(required)
+        powers = [wording.size(each) for each in (check.resolution, check.required_resolution)]
         measured = f"{wording.value(m, m.value)} {unit}".rstrip()
-        found = [measured, *sizes, *powers, wording.mark(check), wording.conditions(m.conditions)]
+        found = [
+            measured,
+            *sizes,
+            f"{check.share:.2g}",
+            *powers,
+            wording.mark(check),
+            wording.conditions(m.conditions),
+        ]
         rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found])
     return rows
 

@@ -112,7 +112,7 @@ def described(verdict: Verdict) -> dict[str, Any]:
         "deviation",
         "tolerance",
         "scale",
-        "resolves",
+        "resolution",
         "agrees",
         "conclusive",
     )

@@ -1,4 +1,4 @@
-"""How often the limit of no time step is off by more than three of its standard uncertainties: rows
+"""How often the zero-step limit is off by more than three of its standard uncertainties: rows
 of a table."""
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from compare.kit import pages, style
-from compare.subjects.attractors.basins import FATES, Basins
+from compare.subjects.attractors.basins import ATTRACTORS, Basins
 from docs.studies.search import LOGARITHMIC, Searched, share, summary, table
 from model.kinematics import UNITS, VARIABLES
 
@@ -105,12 +105,14 @@ def caption_plane(basins: Basins) -> str:
         f"{n} = {v:.3g} {unit}" for n, v, unit in rest if n not in (basins.across, basins.up)
     )
     shares = "; ".join(
-        f"{fate} {_share(*basins.share(fate))}" for fate in FATES if basins.share(fate)[0]
+        f"{attractor} {_share(*basins.share(attractor))}"
+        for attractor in ATTRACTORS
+        if basins.share(attractor)[0]
     )
     text = (
         f"What becomes of a ball that starts on a plane of states ({fixed}; all others zero). "
         f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}. "
-        f"Ground: the event-driven simulation, {basins.fates.size} starts: {shares}."
+        f"Ground: the event-driven simulation, {basins.attractors.size} starts: {shares}."
     )
     if not basins.coarse:
         return text

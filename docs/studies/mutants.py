@@ -41,7 +41,7 @@ def write(
     path: Path, levels: Sequence[Judged], engines: Sequence[Trial], alone: Sequence[Judged] = ()
 ) -> None:
     """Write the page, and the whole list as CSV beside it: what was noticed at each level, by the
-    witnesses `alone`, and of wrong engines."""
+    engines `alone`, and of wrong engines."""
     tried = {each.name: each.trials for each in (*levels, *alone)}
     write_text(path, page(tried, engines))
     with path.with_suffix(".csv").open("w", encoding="utf-8", newline="") as file:

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import simulate, simulate_many
-from analytic.orbits.fates import periodic_fate
+from analytic.orbits.attractors import periodic_limit
 from analytic.orbits.periodic import landings
 from analytic.simulation.ensemble import interval
 from compare.kit import pages, progress
@@ -191,9 +191,9 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
     if not any(landings(zip(seen.events.from_case, seen.events.to_case, strict=True))):
         return None
-    fate = periodic_fate(seen)
-    if fate and fate.orbit and (count := sum(landings(fate.orbit.changes))):
-        orbit = fate.orbit
+    limit = periodic_limit(seen)
+    if limit and limit.orbit and (count := sum(landings(limit.orbit.changes))):
+        orbit = limit.orbit
         omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
         return Hopping(
             int(count), orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max())

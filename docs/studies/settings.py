@@ -22,13 +22,13 @@ from matplotlib.figure import Figure
 from compare.kit import drawing, progress, style
 from compare.kit.campaign import Campaign
 from compare.kit.engines import (
+    DEFAULTS,
     ENGINES,
     EVENT,
     MOREAU,
-    NEWCOMER,
     PLAIN,
     AnySettings,
-    newcomer,
+    default_settings,
     plain,
 )
 from compare.kit.pages import Rows
@@ -74,11 +74,11 @@ def main() -> None:
 
 
 def rungs(step: float) -> Ways:
-    """From what a newcomer writes to the law, each with one thing more than the one before."""
+    """From default settings to the law, each with one thing more than the one before."""
     return {
-        FACETS: NEWCOMER.at(step, states.SLIPPING.p),
-        f"{LONE}, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
-        LONE: newcomer(step),
+        FACETS: DEFAULTS.at(step, states.SLIPPING.p),
+        f"{LONE}, cone pyramidal": replace(default_settings(step), cone="pyramidal"),
+        LONE: default_settings(step),
         OURS: ContactSettings.at(step),
         LAW: RigidContacts(timestep=step),
     }
@@ -112,8 +112,8 @@ def landings(step: float) -> Rows:
         "mujoco-plain, step divided by 10": plain(step / 10),
         "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
         "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
-        LONE: newcomer(step),
-        f"{FACETS} (mujoco-defaults)": NEWCOMER.at(step, states.LANDING.p),
+        LONE: default_settings(step),
+        f"{FACETS} (mujoco-defaults)": DEFAULTS.at(step, states.LANDING.p),
     }
     rows = [
         [
@@ -174,7 +174,7 @@ def _contestants(ways: Ways) -> list[Contestant]:
     """They run without a warning where contacts chatter: what poor settings do is the question
     here."""
     engines = {
-        name: PLAIN if isinstance(each, ContactModel) else NEWCOMER for name, each in ways.items()
+        name: PLAIN if isinstance(each, ContactModel) else DEFAULTS for name, each in ways.items()
     }
     return [Contestant(name, engines[name], each.timestep, each) for name, each in ways.items()]
 

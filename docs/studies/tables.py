@@ -22,16 +22,16 @@ from compare.bench import league
 from compare.bench.runner import Result
 from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
-from compare.kit.engines import newcomer
+from compare.kit.engines import default_settings
 from compare.kit.pages import Rows
 from docs.studies import (
     accuracy,
     confirmation,
+    engines,
     extrapolation,
     settings,
     statements,
     states,
-    witnesses,
 )
 from docs.studies.states import Entry
 from mjsim import ContactSettings
@@ -80,7 +80,7 @@ def variants(step: float) -> settings.Ways:
         return ContactSettings.at(step, **changes)
 
     return {
-        "MuJoCo's defaults, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
+        "MuJoCo's defaults, cone pyramidal": replace(default_settings(step), cone="pyramidal"),
         f"{firmly}, cone pyramidal": soft(**firm, cone="pyramidal"),
         f"{settings.OURS}, integrator implicit": soft(integrator="implicit"),
         f"{settings.OURS}, integrator implicitfast": soft(integrator="implicitfast"),
@@ -92,10 +92,10 @@ def variants(step: float) -> settings.Ways:
 
 
 TABLES: dict[str, Callable[[Campaign], Rows]] = {
-    "witnesses": lambda campaign: witnesses.counted(campaign.directory.parent),
-    "limits": lambda campaign: witnesses.limits(campaign.directory.parent),
-    "not-confirmed": lambda campaign: witnesses.not_confirmed(campaign.directory.parent),
-    "chosen": lambda campaign: witnesses.chosen(campaign.directory.parent),
+    "engines": lambda campaign: engines.counted(campaign.directory.parent),
+    "limits": lambda campaign: engines.limits(campaign.directory.parent),
+    "not-confirmed": lambda campaign: engines.not_confirmed(campaign.directory.parent),
+    "chosen": lambda campaign: engines.chosen(campaign.directory.parent),
     "misses": lambda campaign: extrapolation.misses(),
     "landings": lambda campaign: settings.landings(settings.STEP),
     "formulas": lambda campaign: confirmation.table(),
@@ -152,7 +152,7 @@ LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
     "league-about": lambda campaign: league.declarations(_league(campaign.directory)),
 }
 VERDICTS: dict[str, Callable[[Campaign], Rows]] = {
-    "verdict": lambda campaign: witnesses.verdict(campaign.directory.parent)
+    "verdict": lambda campaign: engines.verdict(campaign.directory.parent)
 }
 STATEMENTS: dict[str, Callable[[Campaign], Rows]] = {
     "statements": lambda campaign: statements.table()

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from analytic import attractors, simulate, stable_solutions
-from analytic.orbits import fates, orbit_branch
+from analytic.orbits import attractors as limits
+from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
-from analytic.orbits.fates import Kind
+from analytic.orbits.attractors import Kind
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import NoOrbitError
 from analytic.simulation.ensemble import random_starts
@@ -130,15 +131,15 @@ def test_three_attractors_at_once():
     """The hopping set: hopping, slipping at both points, and riding the wall."""
     groups = attractors(HOPPING, (TOP, SLIPS, RIDES))
     assert [each.count for each in groups] == [1, 1, 1]
-    assert {each.fate.kind for each in groups} == {Kind.PERIODIC, Kind.STATIONARY}
-    hop = groups[0].fate
+    assert {each.limit.kind for each in groups} == {Kind.PERIODIC, Kind.STATIONARY}
+    hop = groups[0].limit
     assert hop.orbit
     assert hop.orbit.stable
     # The period as seen in the run is resolved to a sample, that of the orbit to round-off.
     sample = hop.last.time[1] - hop.last.time[0]
     assert hop.period == pytest.approx(hop.orbit.period, abs=2 * sample)
     known = {s.case for s in stable_solutions(HOPPING)}
-    assert {each.fate.solution.case for each in groups[1:] if each.fate.solution} <= known
+    assert {each.limit.solution.case for each in groups[1:] if each.limit.solution} <= known
     low, high = groups[0].interval
     assert 0 < low < groups[0].share < high < 1
 
@@ -160,7 +161,7 @@ def test_lyapunov_exponent_of_a_known_growth():
             SimpleNamespace(x=np.array([x, x * growth]), case=[Case.NN], header=whole) for x in x0s
         ]
 
-    assert fates.lyapunov(HOPPING, np.zeros(8), Case.NN, 20.0, 0.5, run) == pytest.approx(
+    assert limits.lyapunov(HOPPING, np.zeros(8), Case.NN, 20.0, 0.5, run) == pytest.approx(
         (0.3, 0.0), abs=1e-6
     )
 
@@ -170,7 +171,7 @@ def test_lyapunov_exponent_of_a_known_growth():
 def test_recurrent_motions_that_do_not_close(exponent, kind, monkeypatch):
     """omega_c and the slips go round at two rates whose ratio is the golden one: neighbours decide,
     in three errors."""
-    monkeypatch.setattr(fates, "lyapunov", lambda *motion, run: (exponent, 0.1))
+    monkeypatch.setattr(limits, "lyapunov", lambda *motion, run: (exponent, 0.1))
     size, rates = (
         state_units(HOPPING)[2:6],
         np.array([3.0, 1.5 * (1 + 5**0.5)]) / (HOPPING.R / HOPPING.g) ** 0.5,
@@ -188,7 +189,7 @@ def test_recurrent_motions_that_do_not_close(exponent, kind, monkeypatch):
 
     start = np.append([0.0, 0.0], [0.5, 0.0, 2.0, 0.0] * size)
     (only,) = attractors(
-        HOPPING, start, lasting=3 * fates.WINDOW * (HOPPING.R / HOPPING.g) ** 0.5, run=run
+        HOPPING, start, lasting=3 * limits.WINDOW * (HOPPING.R / HOPPING.g) ** 0.5, run=run
     )
-    assert only.fate.kind is kind
-    assert only.fate.exponent == exponent
+    assert only.limit.kind is kind
+    assert only.limit.exponent == exponent

@@ -114,8 +114,8 @@ def test_a_claim_is_judged_in_the_limit_of_no_step(left, least, steps, near, out
     for check in plain.checks:
         assert (plain.left_out, plain.order) == (0, pytest.approx(1.0, abs=1e-6))
         assert plain.typical == plain.farthest == pytest.approx(left + least / 2)
-        resolves = quantity("omega_c").resolution
-        assert check.ceiling == max(resolves, min(LOOSER * resolves, COARSEST))
+        required = quantity("omega_c").resolution
+        assert check.required == max(required, min(LOOSER * required, COARSEST))
 
 
 @pytest.mark.parametrize(

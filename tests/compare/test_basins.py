@@ -7,7 +7,7 @@ from analytic import stable_solutions
 from analytic.simulation.ensemble import interval
 from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
-from compare.subjects.attractors.basins import FATES, Basins, basins
+from compare.subjects.attractors.basins import ATTRACTORS, Basins, basins
 from docs.studies.figures import SEARCHES
 from docs.studies.search import BOX, Searched, confirm, parameters, random_starts, screen
 from model import Parameters, StorageError, storage
@@ -44,7 +44,7 @@ def test_intervals_of_shares():
     assert interval(0, 0) == (0.0, 1.0)
 
 
-def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(
+def test_attractors_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(
     tmp_path,
 ):
     """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both
@@ -66,8 +66,8 @@ def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_
             path.unlink()  # as if it had been killed before MuJoCo's batch was whole
     assert (seen[0], seen[-1], seen.count(0)) == (0, 2, 2)
     for basin in maps:
-        assert {FATES[k] for k in basin.fates.ravel()} == {"SS", "off the floor"}
-        np.testing.assert_array_equal(basin.mujoco, basin.fates[::2, ::2])
+        assert {ATTRACTORS[k] for k in basin.attractors.ravel()} == {"SS", "off the floor"}
+        np.testing.assert_array_equal(basin.mujoco, basin.attractors[::2, ::2])
         assert len(basin.differences()) == 0
 
 
@@ -77,24 +77,24 @@ def test_a_ball_that_hops_on(tmp_path):
     with Campaign(tmp_path, workers=0) as campaign:
         axes = Axis("y", (6.36e-3, 6.4e-3)), Axis("v_y", (0.0, 1e-3))
         basin = basins(campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, axes)
-    assert {FATES[k] for k in basin.fates.ravel()} == {"hops"}
+    assert {ATTRACTORS[k] for k in basin.attractors.ravel()} == {"hops"}
 
 
 def test_basins_count_measure_and_keep_their_points(tmp_path):
-    """Two columns of each fate: columns 1 and 2 lie at the boundary, 0 and 3 a cell farther
+    """Two columns of each attractor: columns 1 and 2 lie at the boundary, 0 and 3 a cell farther
     away."""
-    axes, fates = (
+    axes, attractors = (
         ("omega_c", "slip_x", np.arange(4.0), np.arange(4.0)),
         np.array([[0, 0, 2, 2]] * 4),
     )
-    b = Basins(BISTABLE, (0.0,) * 8, *axes, fates, 2, np.array([[2, 2], [0, 0]]), 1e-3)
+    b = Basins(BISTABLE, (0.0,) * 8, *axes, attractors, 2, np.array([[2, 2], [0, 0]]), 1e-3)
     assert b.differences().tolist() == [2.0, 1.0]
-    b.fates[3] = 2
+    b.attractors[3] = 2
     assert (b.share("hops"), b.share("RR")) == ((6, 16), (0, 16))
     b.save(tmp_path / "b.json")
     again = Basins.load(tmp_path / "b.json")
     assert (again.parameters, again.start) == (b.parameters, b.start)
-    np.testing.assert_array_equal(again.fates, b.fates)
+    np.testing.assert_array_equal(again.attractors, b.attractors)
 
 
 def test_the_command_draws_the_map_or_keeps_its_data(tmp_path, capsys):

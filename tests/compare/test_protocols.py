@@ -242,9 +242,9 @@ def test_first_top_lies_between_samples():
     )
 
 
-def make(patch, **effort):
-    """Another effort at the quick level."""
-    patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, **effort))
+def make(patch, **sampling):
+    """Another sampling at the quick level."""
+    patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, **sampling))
 
 
 def measure_settled(runner, patch, p, *flows):
@@ -273,7 +273,7 @@ def test_a_state_that_depends_on_the_step_is_missing(runner, monkeypatch):
 
     def other_case(runner, starts, criteria):
         states = right(runner, starts, criteria)
-        return [replace(each, case=Case.SN) for each in states] if criteria.refine == 2 else states
+        return [replace(each, case=Case.SN) for each in states] if criteria.divisor == 2 else states
 
     monkeypatch.setattr(settling, "settle", other_case)
     found = measure_settled(runner, monkeypatch, THICK, 0.6)
@@ -361,7 +361,7 @@ def test_numbers_that_no_quick_set_has_are_judged_too():
 def narrowed(answer, width, task=lambda v, b, attempt: (v, attempt), careful=True):
     """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a runner whose tasks
     are their runs."""
-    runner = SimpleNamespace(each=list, effort=SimpleNamespace(sections=7, granted=False))
+    runner = SimpleNamespace(each=list, sampling=SimpleNamespace(sections=7, granted=False))
     (bracket,) = narrow(runner, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
     return bracket
 

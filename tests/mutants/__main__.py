@@ -20,8 +20,8 @@ def main() -> int:
     parser.add_argument(
         "--engines", action="store_true", help="also measure with every wrong engine"
     )
-    one = "also judge by what this witness alone says, as mujoco-plain, stored in DIR or the first of all; repeatable"
-    parser.add_argument("--witness", action="append", default=[], metavar="NAME[=DIR]", help=one)
+    one = "also judge by what this engine alone says, as mujoco-plain, stored in DIR or the first of all; repeatable"
+    parser.add_argument("--alone", action="append", default=[], metavar="NAME[=DIR]", help=one)
     parser.add_argument(
         "--whole",
         action="store_true",
@@ -44,7 +44,7 @@ def main() -> int:
             *(trial.judged(each, args.workers) for each in others),
         ]
         measured = trial.wrong_engines(first, args.workers) if args.engines else []
-        named = [name.partition("=") for name in args.witness]
+        named = [name.partition("=") for name in args.alone]
         alone = [
             trial.judged(Path(where or first), args.workers, by=name) for name, _, where in named
         ]

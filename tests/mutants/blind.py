@@ -126,7 +126,7 @@ def formulas_called(said: Sequence[Said]) -> list[Callable[..., Any]]:
 
 
 @dataclass
-class Fate:
+class Detection:
     """What became of a fault."""
 
     by: dict[str, str] = field(default_factory=dict)
@@ -136,7 +136,7 @@ class Fate:
     broke: bool = False
     """Whether some prediction broke down, or was given up: that alone finds nothing."""
 
-    def hear(self, said: Said, now: Verdict) -> None:
+    def add(self, said: Said, now: Verdict) -> None:
         """Take in a verdict under the fault."""
         for each in now.engines:
             before = said.engines[each.engine]
@@ -148,31 +148,33 @@ class Fate:
                 self.by.setdefault(each.engine, now.claim.id)
 
 
-def tried(wrong: WrongTheory, said: Sequence[Said], records: RecordsByEngine) -> Fate:
+def tried(wrong: WrongTheory, said: Sequence[Said], records: RecordsByEngine) -> Detection:
     """Judge the claims that call a wrong function, until every engine has found the fault."""
-    fate, code = Fate(), getattr(importlib.import_module(wrong.module), wrong.function).__code__
+    detection = Detection()
+    code = getattr(importlib.import_module(wrong.module), wrong.function).__code__
     forget()
     with believed(wrong):
         for each in (each for each in said if code in each.calls):
-            if each.engines.keys() <= fate.by.keys():
+            if each.engines.keys() <= detection.by.keys():
                 continue
             try:
                 with at_most(PATIENCE):
-                    fate.hear(each, full_verdict(each.verdict.claim, records))
+                    detection.add(each, full_verdict(each.verdict.claim, records))
             except LateError:
-                fate.broke = fate.changes = True
-    return fate
+                detection.broke = detection.changes = True
+    return detection
 
 
-def tried_engine(wrong: Engine, said: Sequence[Said], directory: Path, sets: Sets) -> Fate:
+def tried_engine(wrong: Engine, said: Sequence[Said], directory: Path, sets: Sets) -> Detection:
     """Measure with a wrong engine, and judge by the right theory."""
     ENGINES[wrong.name] = wrong  # tasks name it
-    records, fate = measured(directory, [wrong], sets, sorted(PROVING)), Fate(changes=True)
+    detection = Detection(changes=True)
+    records = measured(directory, [wrong], sets, sorted(PROVING))
     own = {MUJOCO.name: records[wrong.name]}
     forget()
     for each in (each for each in said if each.verdict.claim.protocols <= PROVING):
-        fate.hear(each, full_verdict(each.verdict.claim, own))
-    return fate
+        detection.add(each, full_verdict(each.verdict.claim, own))
+    return detection
 
 
 def play(seed: int, directory: Path, plan: Plan = Plan()) -> str:
@@ -191,15 +193,15 @@ def play(seed: int, directory: Path, plan: Plan = Plan()) -> str:
     balls = [formulas.of_ball(rng) for _ in range(plan.engines)]
     key = [*(each.what for each in wrongs), *(what for what, _ in balls)]
     write_text(directory / KEY, json.dumps(key, ensure_ascii=False, indent=1))
-    fates, first = [tried(wrong, said, records) for wrong in wrongs], dict([*sets.items()][:1])
+    detections, first = [tried(wrong, said, records) for wrong in wrongs], dict([*sets.items()][:1])
     for n, (_, ball) in enumerate(balls):
         wrong = wrong_engine(f"blind-engine-{n}", ball)
-        fates.append(tried_engine(wrong, said, directory / wrong.name, first))
-    return section(seed, json.loads((directory / KEY).read_text("utf-8")), sets, said, fates)
+        detections.append(tried_engine(wrong, said, directory / wrong.name, first))
+    return section(seed, json.loads((directory / KEY).read_text("utf-8")), sets, said, detections)
 
 
 def section(
-    seed: int, key: Sequence[str], sets: Sets, said: Sequence[Said], fates: Sequence[Fate]
+    seed: int, key: Sequence[str], sets: Sets, said: Sequence[Said], detections: Sequence[Detection]
 ) -> str:
     """What came out, once the key is opened."""
     off = {row.engine: row for row in distribution([e.verdict for e in said]) if not row.quantity}
@@ -210,15 +212,21 @@ def section(
         own = [(e.verdict.claim, e.engines[name].outcome) for e in said if name in e.engines]
         alarms = [c.id for c, o in own if o is Outcome.REFUTED is not c.expected]
         confirmed = sum(outcome is Outcome.CONFIRMED for _, outcome in own)
-        row = [name, str(sum(name in fate.by for fate in fates)), f"{confirmed} of {len(own)}"]
+        row = [
+            name,
+            str(sum(name in each.by for each in detections)),
+            f"{confirmed} of {len(own)}",
+        ]
         beyond = [f"{off[name].beyond(n):.1%}" if name in off else "–" for n in (1, 2, 3)]
         numbers = str(len(off[name].sizes)) if name in off else "0"
         counts.append([*row, ", ".join(alarms) or "none", numbers, *beyond])
-    for what, fate in zip(key, fates, strict=True):
-        notes = ["changes no prediction"] * (not fate.changes) + ["breaks down"] * fate.broke
+    for what, detection in zip(key, detections, strict=True):
+        notes = ["changes no prediction"] * (not detection.changes)
+        notes += ["breaks down"] * detection.broke
         shown = "`" + what.replace("|", "\\|") + "`"
-        faults.append([shown, *(fate.by.get(name, "–") for name in names), ", ".join(notes)])
-    live, found = sum(fate.changes for fate in fates), sum(bool(fate.by) for fate in fates)
+        faults.append([shown, *(detection.by.get(name, "–") for name in names), ", ".join(notes)])
+    live = sum(each.changes for each in detections)
+    found = sum(bool(each.by) for each in detections)
     where = "; ".join(
         ", ".join(f"{n} = {getattr(p, n):.4g}" for n in ("mu", "eta", "j", "r", "R", "m", "g", "c"))
         for p in sets.values()
@@ -226,7 +234,7 @@ def section(
     return f"""
 ## Seed {seed}
 
-Found: **{found} of the {live} faults that change a prediction or a measurement**, of {len(fates)}
+Found: **{found} of the {live} faults that change a prediction or a measurement**, of {len(key)}
 that were planted. Rules as
 of the commit {current_commit()[:12] or "unknown"}. Sets, SI: {where}.
 

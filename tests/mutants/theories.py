@@ -666,7 +666,7 @@ _FAULTS_FOR_TESTS: dict[str, dict[str, Fault]] = {
         "fast pulsations make it slip 0.1 % late": scaled(1.001),
         "a fast pulsation never fills both cones": _one_cone,
     },
-    "orbits.fates.lyapunov": {"exponents to the base of ten": scaled(1 / np.log(10), 0, 1)},
+    "orbits.attractors.lyapunov": {"exponents to the base of ten": scaled(1 / np.log(10), 0, 1)},
     "flowmeter.real_fluid.torque_rate": {
         "the fluid's torque as in creeping flow": lambda right, spin, p, layer=True: right(
             spin, p, False
@@ -697,7 +697,7 @@ _SEEN_BY = {
     "test_a_slow_ramp_passes_the_fold_as_its_normal_form_does",
     "flowmeter.pulsation.fast_onset": "other_ways::"
     "test_onsets_of_slip_in_very_slow_and_very_fast_pulsations",
-    "orbits.fates.lyapunov": "orbits::test_lyapunov_exponent_of_a_known_growth",
+    "orbits.attractors.lyapunov": "orbits::test_lyapunov_exponent_of_a_known_growth",
     "flowmeter.real_fluid.torque_rate": "real_fluid::test_the_torque_is_of_the_order_of_the_drag_for_every_ball",
 }
 """The tests of `analytic` that see them."""

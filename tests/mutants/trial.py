@@ -73,7 +73,7 @@ class Judged:
     """What the measurements of a results directory notice."""
 
     name: str
-    """Of the level, and of the witness that judges alone if it isn't the engine on trial."""
+    """Of the level, and of the engine that judges alone if it isn't the engine on trial."""
     trials: Sequence[Trial]
     """Of all wrong theories."""
     directory: Path
@@ -89,7 +89,7 @@ def measured(directory: Path) -> Records:
 
 def judged(directory: Path, workers: int = 2, whole: bool = False, by: str = "") -> Judged:
     """Every wrong theory judged on the measurements stored in a results directory, or on what a
-    witness alone says.
+    engine alone says.
 
     By the claims that call its function, the quickest first and only until one notices it; if
     `whole`, by all of them."""
@@ -147,7 +147,7 @@ def name_of(wrong: WrongTheory) -> str:
 
 
 def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
-    """The verdict on a claim by a witness; by the engine on trial if it has no name."""
+    """The verdict on a claim by an engine; by the engine on trial if it has no name."""
     if not by:
         return verdict(claim, measured(directory)).outcome
     said = full_verdict(claim, validation.stored(directory)).engines

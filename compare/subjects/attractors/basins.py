@@ -31,16 +31,16 @@ from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
 from model.parameters import check_names
 
-FATES = ("hops", "RR", "SS", "off the floor", "undecided")
+ATTRACTORS = ("hops", "RR", "SS", "off the floor", "undecided")
 """Where a ball may end. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
-UNDECIDED = FATES.index("undecided")
+UNDECIDED = ATTRACTORS.index("undecided")
 INSTANTS = 500
 """Of a run, after the first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Basins:
-    """Fates over a plane of starts."""
+    """Attractors over a plane of starts."""
 
     parameters: Parameters
     start: tuple[float, ...]  # state (8,) whose other variables all starts share
@@ -48,30 +48,31 @@ class Basins:
     up: str
     x: Array  # their values, shapes (n,) and (m,)
     y: Array
-    fates: npt.NDArray[np.int64]  # indices of `FATES`, by the event-driven simulation, shape (m, n)
+    attractors: npt.NDArray[np.int64]
+    """Indices of `ATTRACTORS`, by the event-driven simulation, shape (m, n)."""
     coarse: int  # MuJoCo has computed every `coarse`-th point along both axes; 0 for none
     mujoco: npt.NDArray[
         np.int64
-    ]  # its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s
+    ]  # its attractors, shape (m / coarse, n / coarse) rounded up, and its time step in s
     timestep: float
 
-    def share(self, fate: str) -> tuple[int, int]:
-        """How many points of the plane come to a fate, by theory, and how many there are."""
-        return int(np.sum(self.fates == FATES.index(fate))), self.fates.size
+    def share(self, attractor: str) -> tuple[int, int]:
+        """How many points of the plane come to an attractor, by theory, and how many there are."""
+        return int(np.sum(self.attractors == ATTRACTORS.index(attractor))), self.attractors.size
 
     def differences(self) -> Array:
         """Distances from a boundary of the points at which MuJoCo and theory differ, in cells of
         the fine map."""
         from scipy.ndimage import distance_transform_cdt  # slow to import
 
-        distance = np.zeros(self.fates.shape)
-        for fate in np.unique(self.fates):
-            own = np.pad(self.fates == fate, 1, mode="edge")
+        distance = np.zeros(self.attractors.shape)
+        for attractor in np.unique(self.attractors):
+            own = np.pad(self.attractors == attractor, 1, mode="edge")
             distance += distance_transform_cdt(own, metric="chessboard")[
                 1:-1, 1:-1
             ]  # 0 outside its basin
         coarse = np.s_[:: self.coarse, :: self.coarse]
-        return np.asarray(distance[coarse][self.fates[coarse] != self.mujoco])
+        return np.asarray(distance[coarse][self.attractors[coarse] != self.mujoco])
 
     def save(self, path: Path) -> None:
         """Write it as JSON."""
@@ -82,8 +83,10 @@ class Basins:
         """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of
         these."""
         with reading_json(Path(path), "basins") as data:
+            if "fates" in data:  # what files of before call them
+                data["attractors"] = data.pop("fates")
             arrays: dict[str, Any] = {
-                name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")
+                name: np.array(data.pop(name)) for name in ("x", "y", "attractors", "mujoco")
             }
             p, start = Parameters.from_mapping(data.pop("parameters")), tuple(data.pop("start"))
             return cls(parameters=p, start=start, **data, **arrays)
@@ -97,8 +100,8 @@ def basins(
     coarse: int = 0,
     timestep: float = 2.5e-4,
 ) -> Basins:
-    """Fates after 10/c of starts on a plane of two state variables, across and up; all others as in
-    `start`, or zero.
+    """Attractors after 10/c of starts on a plane of two state variables, across and up; all others
+    as in `start`, or zero.
 
     Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball
     can't start."""
@@ -128,19 +131,22 @@ def basins(
             p, row, lasts, sample_interval=lasts / INSTANTS, threads=threads
         )
         ends = zip(runs.x[..., 0], runs.case[:, -1], runs.failure, strict=True)
-        fine.append([UNDECIDED if failure else fate(y, Case(last), p) for y, last, failure in ends])
+        fine.append(
+            [UNDECIDED if failure else attractor(y, Case(last), p) for y, last, failure in ends]
+        )
     broken = {failure.task.key for failure in campaign.complete(tasks)}
     for key in (task.key for task in tasks):
         run = None if key in broken else campaign.load(key)
-        other.append(fate(run.y, run.cases[-1], p) if run else UNDECIDED)
+        other.append(attractor(run.y, run.cases[-1], p) if run else UNDECIDED)
     maps = np.array(fine), coarse, np.array(other, dtype=int).reshape(few.shape[:2])
     return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, *maps, timestep)
 
 
-def fate(y: Array, last: Case, p: Parameters) -> int:
-    """What becomes of the ball in a run, by its heights and last case: an index of `FATES`."""
+def attractor(y: Array, last: Case, p: Parameters) -> int:
+    """What becomes of the ball in a run, by its heights and last case: an index of `ATTRACTORS`."""
     if hops_on(y[int(0.7 * len(y)) :], p.R):
-        return FATES.index("hops")
+        return ATTRACTORS.index("hops")
     if last in (Case.RR, Case.SS):
-        return FATES.index(last.name)
-    return FATES.index("off the floor") if last is Case.SR or last.A is Contact.N else UNDECIDED
+        return ATTRACTORS.index(last.name)
+    off = last is Case.SR or last.A is Contact.N
+    return ATTRACTORS.index("off the floor") if off else UNDECIDED

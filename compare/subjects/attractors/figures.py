@@ -21,7 +21,7 @@ from analytic.orbits.orbit_branch import Bifurcation
 from compare.branches import Drawn, check_thresholds, round_with_fluid, slipping, spin, spin_of
 from compare.kit import style
 from compare.kit.drawing import Diagram, GapError, diagram
-from compare.subjects.attractors.basins import FATES, Basins
+from compare.subjects.attractors.basins import ATTRACTORS, Basins
 from model import Case, Contact, Parameters, State
 
 SET = Parameters.named("hopping")
@@ -40,7 +40,7 @@ def _hopping_orbit(p: Parameters) -> orbits.Orbit | None:
     start, if any hops."""
     if p == SET:
         return orbits.refine(p, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
-    found = (each.fate.orbit for each in analytic.attractors(p, STARTS, seed=0))
+    found = (each.limit.orbit for each in analytic.attractors(p, STARTS, seed=0))
     return next(
         (o for o in found if o and {case.A is Contact.N for case in o.cases} == {True, False}), None
     )
@@ -251,7 +251,7 @@ def draw_walls(of: Diagram) -> tuple[Figure, str]:
 
 
 _SHADES = (style.HOPPING, *(style.COLOURS[case] for case in (Case.RR, Case.SS, Case.NR, Case.NN)))
-"""Of `FATES`."""
+"""Of `ATTRACTORS`."""
 _VARIABLES = {
     "omega_c": style.OMEGA_C,
     **{f"slip_{axis}": f"$\\tilde\\omega_{axis}$ (rad/s)" for axis in "xyz"},
@@ -271,20 +271,22 @@ def fill_basins(axes: Axes, basins: Basins) -> None:
     look: dict[str, Any] = {
         "cmap": ListedColormap(_SHADES),
         "vmin": -0.5,
-        "vmax": len(FATES) - 0.5,
+        "vmax": len(ATTRACTORS) - 0.5,
         "alpha": 0.55,
     }
-    axes.pcolormesh(basins.x, basins.y, basins.fates, shading="nearest", rasterized=True, **look)
-    present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
+    axes.pcolormesh(
+        basins.x, basins.y, basins.attractors, shading="nearest", rasterized=True, **look
+    )
+    present = set(np.unique(basins.attractors)) | set(np.unique(basins.mujoco))
     handles: list[object] = [
-        Patch(color=_SHADES[k], alpha=0.55, label=FATES[k]) for k in sorted(present)
+        Patch(color=_SHADES[k], alpha=0.55, label=ATTRACTORS[k]) for k in sorted(present)
     ]
     if basins.coarse:
         x, y = np.meshgrid(basins.x[:: basins.coarse], basins.y[:: basins.coarse])
         for k in sorted(set(basins.mujoco.ravel().tolist())):
             own = basins.mujoco == k
             axes.plot(x[own], y[own], "o", ms=4, color=_SHADES[k], mec="k", mew=0.4)
-        differ = basins.mujoco != basins.fates[:: basins.coarse, :: basins.coarse]
+        differ = basins.mujoco != basins.attractors[:: basins.coarse, :: basins.coarse]
         if np.any(differ):
             handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
         handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")

@@ -49,7 +49,7 @@ MEASURED = 3.0
 """The last part of a held flow that is measured, s."""
 DISTURBED = 2.0
 """The first part of it, in which disturbances are not yet linear, s."""
-REFINED_HOPS = (16, 32)
+HOPS_DIVISORS = (16, 32)
 """Time steps in a coarse one."""
 SAMPLE = 1e-3
 """Time between samples, s: a parabola through three samples then gives a top to 1e-6 of the height."""
@@ -68,7 +68,7 @@ def hopping(
     sets: Mapping[str, Parameters],
     records: Records,
     protocol: str = "recurrent",
-    refine: tuple[int, int] = REFINED_HOPS,
+    divisors: tuple[int, int] = HOPS_DIVISORS,
 ) -> Iterator[Measurement | Missing]:
     """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would
     begin.
@@ -78,10 +78,12 @@ def hopping(
     p = Parameters.named(SET)
     flows = [
         share * p.omega_0
-        for share in (runner.effort.recurrent_flows if protocol == "recurrent" else (1.0,))
+        for share in (runner.sampling.recurrent_flows if protocol == "recurrent" else (1.0,))
     ]
     lasts, flow = HOLD * len(flows), Flow.staircase(flows, HOLD)
-    pair = StepPair(SET, p, "hops", TOP.stacked(), lasts, refine, round(lasts / SAMPLE), flow=flow)
+    pair = StepPair(
+        SET, p, "hops", TOP.stacked(), lasts, divisors, round(lasts / SAMPLE), flow=flow
+    )
     (result,) = carry_out(runner, protocol, [pair])
     if isinstance(result, Missing):
         yield result
@@ -218,8 +220,8 @@ def followed(
     walls = [p.replace(eta=share * p.eta) for share in WALLS]
     etas = [q.eta for q in walls]
 
-    def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
-        return runner.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / SAMPLE))
+    def task(q: Parameters, x: Array, lasts: float, divisor: int) -> Task:
+        return runner.task(q, x, lasts, coarse_step(q) / divisor, samples=round(lasts / SAMPLE))
 
     steady = [
         np.array([TOP.stacked()] * 2)
@@ -231,8 +233,8 @@ def followed(
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (
                 steady[-1] - steady[-2]
             )
-        both = zip(ahead, REFINED_HOPS, strict=True)
-        tasks.append([task(q, x, FOLLOWED, refined) for x, refined in both])
+        both = zip(ahead, HOPS_DIVISORS, strict=True)
+        tasks.append([task(q, x, FOLLOWED, divisor) for x, divisor in both])
         (runs,) = runner.groups(tasks[-1:])
         parts = [] if isinstance(runs, str) else [tops(run, DISTURBED, FOLLOWED) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
@@ -247,7 +249,7 @@ def followed(
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
     yield measurement(runner, "followed", SET, walls[-4], "orbit_death", place, used, **near)
     again = [
-        task(walls[k], np.array(tasks[k][1].x0), LEFT_ALONE, REFINED_HOPS[0]) for k in (-4, -1)
+        task(walls[k], np.array(tasks[k][1].x0), LEFT_ALONE, HOPS_DIVISORS[0]) for k in (-4, -1)
     ]
     yield from _hops_at_end(runner, "followed", SET, again)
 
@@ -270,8 +272,8 @@ def rebounding(
     step."""
     p, x = Parameters.named(SET), TOP.stacked()
 
-    def task(x: Array, lasts: float, restitution: float, refine: int = 40) -> Task:
-        step = coarse_step(p) / refine
+    def task(x: Array, lasts: float, restitution: float, divisor: int = 40) -> Task:
+        step = coarse_step(p) / divisor
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
         return replace(
             runner.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings
@@ -288,7 +290,7 @@ def rebounding(
             yield Missing("rebounding", SET, "the ball does not hop")
             return
         if not hops(run) or e in REBOUNDING:
-            alone = [task(x, REBOUNDS_ALONE, e, refine) for refine in (80, 160)]
+            alone = [task(x, REBOUNDS_ALONE, e, divisor) for divisor in (80, 160)]
             runs = runner.campaign.run(alone)
             at = last.conditions(p) | {"restitution": e, "duration": REBOUNDS_ALONE}
             yield measurement(runner, "rebounding", SET, p, "hops", hops(runs[0]), alone[:1], **at)
@@ -419,12 +421,12 @@ def choice(
         ),
     }
     starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
-    yield from settled_readings(runner, "choice", starts[: runner.effort.choice_sets])
+    yield from settled_readings(runner, "choice", starts[: runner.sampling.choice_sets])
 
 
 PROTOCOLS = (
     Protocol("recurrent", hopping),
-    Protocol("stepped", partial(hopping, protocol="stepped", refine=(40, 80))),
+    Protocol("stepped", partial(hopping, protocol="stepped", divisors=(40, 80))),
     Protocol("choice", choice),
     Protocol("followed", followed),
     Protocol("rebounding", rebounding),

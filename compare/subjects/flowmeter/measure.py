@@ -55,7 +55,7 @@ def slope(
 ) -> Iterator[Measurement | Missing]:
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there
     to unloading."""
-    most = runner.effort.slope_slipping
+    most = runner.sampling.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
     # With a factor on the drift limit of settled states: for the jump they lie close together.
     for by, sharp in ("neighbours", 0.3), ("jump", 0.1), ("mean", 1.0):
@@ -170,7 +170,7 @@ def hysteresis(
     """Case and omega_c at every level of the loop, and the case at the level before."""
     loops: dict[str, list[Start]] = {}  # starts at all levels of a set, up and down
     for name, p in sets.items():
-        if rise := _levels(name, records, runner.effort.hysteresis_parts):
+        if rise := _levels(name, records, runner.sampling.hysteresis_parts):
             sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
             loops[name] = [
                 Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides
@@ -184,7 +184,7 @@ def hysteresis(
     tasks = []
     for loop in loops.values():  # a run through all levels, each held for a time
         p, flows = loop[0].p, [level.p.omega_0 for level in loop]
-        step, hold = coarse_step(p), settling.duration(p, runner.effort.hysteresis_hold)
+        step, hold = coarse_step(p), settling.duration(p, runner.sampling.hysteresis_hold)
         samples, flow = (
             round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows),
             Flow.staircase(flows, hold),
@@ -213,7 +213,7 @@ def hysteresis(
                 run, **{column: getattr(run, column)[held] for column in columns(Trajectory)}
             )
             ended = settling.judge_run(
-                replace(level, x0=part.x[0]), task, part, runner.effort.settled_loose
+                replace(level, x0=part.x[0]), task, part, runner.sampling.settled_loose
             )
             if ended.failure:
                 where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
@@ -300,7 +300,7 @@ def unloading(
             ]
         )
     for states in settling.settle_groups(
-        runner, starts, SettlingCriteria(loose=runner.effort.thresholds_loose)
+        runner, starts, SettlingCriteria(loose=runner.sampling.thresholds_loose)
     ):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
@@ -352,7 +352,7 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
     else:
         x0 = x0._replace(slip_x=x.slip_x + WALL_PUSH * (x.slip_x + p.R / p.r * x.omega_c))
     coarse, fine = (
-        times if name == LANDING else times // 4 for times in runner.effort.unloading_refine
+        times if name == LANDING else times // 4 for times in runner.sampling.unloading_divisors
     )
     # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of
     # many kinds.

@@ -81,7 +81,7 @@ def measure(
     found = [
         each
         for name, p in sets.items()
-        for each in chosen_states(records, name, p, runner.effort.rates_more)
+        for each in chosen_states(records, name, p, runner.sampling.rates_more)
     ]
     yield from (each for each in found if isinstance(each, Missing))
     pushed = [each for each in found if isinstance(each, Pushed)]
@@ -156,7 +156,9 @@ class Pushed:
     def steps(self, runner: Runner) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
         coarse, fine = (
-            runner.effort.rates_leaning if self.case is Case.SR else runner.effort.rates_refined
+            runner.sampling.rates_leaning
+            if self.case is Case.SR
+            else runner.sampling.rates_divisors
         )
         return coarse_step(self.start.p) / coarse, coarse_step(self.start.p) / fine
 

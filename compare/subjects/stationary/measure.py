@@ -31,12 +31,12 @@ def measure(
     runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """The case that every start ends in, and once for every distinct state its values."""
-    sharp = runner.effort.settled_sharp
+    sharp = runner.sampling.settled_sharp
     alike: dict[Attractor, list[SteadyState]] = {}
     without: dict[Attractor, Missing] = {}
     starts = []
     for name, p in sets.items():
-        for how, flows in runner.effort.settled_starts:
+        for how, flows in runner.sampling.settled_starts:
             starts += [
                 settling.initial_condition(name, p.replace(omega_0=flow / time_unit(p)), how)
                 for flow in flows
@@ -44,7 +44,7 @@ def measure(
         spinning = State(slip_y=settling.SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
     for state in settling.settle(
-        runner, starts, SettlingCriteria(sharp=sharp, loose=runner.effort.settled_loose)
+        runner, starts, SettlingCriteria(sharp=sharp, loose=runner.sampling.settled_loose)
     ):
         if state.failure:
             yield _unsettled(state, 1)
@@ -124,10 +124,10 @@ def _values(
                 for s in same
                 for n in sizes
             ]
-            refine = runner.effort.settled_refine
+            divisor = runner.sampling.settled_divisor
             for n, size in sizes.items():
                 change = max(changes) * size
-                sure = settling.with_changes(fine.values[n], change, p, size, refine)
+                sure = settling.with_changes(fine.values[n], change, p, size, divisor)
                 yield _row(runner, fine, n, sure)
 
 

@@ -90,7 +90,7 @@ def pulsation(
             continue
         q = p.replace(omega_0=ROLLS_AT * end)
         room, lowest = end - q.omega_0, _lowest(p)
-        octaves, reach = runner.effort.pulsation_octaves, runner.effort.pulsation_reach * room
+        octaves, reach = runner.sampling.pulsation_octaves, runner.sampling.pulsation_reach * room
         small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
     followed = _as_followed(runner, small)
     for each in followed:
@@ -150,7 +150,7 @@ class Timing(NamedTuple):
 
     periods: float
     samples: int  # in a period
-    refine: int  # by what the longest time step is divided
+    divisor: int  # by what the longest time step is divided
     phase: float = 0.0  # of the flow at the beginning, rad
 
 
@@ -186,9 +186,9 @@ class Pulsation:
         amplitude needs."""
         fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
         least = max(
-            runner.effort.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest
+            runner.sampling.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest
         )
-        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * timing.refine)
+        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * timing.divisor)
         flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, timing.phase)
         samples = round(timing.samples * timing.periods)
         return runner.task(
@@ -217,7 +217,7 @@ def _onset(runner: Runner, each: Pulsation, bracket: Bracket) -> Measurement | M
             f"in {at} one contact slips before both do, too little to tell when",
         )
     # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-    unseen = (math.pi * LASTING / runner.effort.pulsation_samples) ** 2 / 2 * place.value
+    unseen = (math.pi * LASTING / runner.sampling.pulsation_samples) ** 2 / 2 * place.value
     return each.row(
         runner,
         "slip_amplitude",
@@ -238,7 +238,7 @@ class Round(NamedTuple):
 def _settled_rounds(
     runner: Runner,
     driven: Sequence[tuple[Pulsation, float]],
-    refine: int,
+    divisor: int,
     samples: int,
     slips: bool,
 ) -> list[list[Round] | str]:
@@ -250,7 +250,9 @@ def _settled_rounds(
     )
     for n in range(ROUNDS):
         last = n == ROUNDS - 1
-        timing = Timing(PERIODS, samples, refine * (runner.effort.pulsation_refine if last else 1))
+        timing = Timing(
+            PERIODS, samples, divisor * (runner.sampling.pulsation_divisor if last else 1)
+        )
         todo = [
             (k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)
         ]
@@ -272,7 +274,7 @@ def _settled_rounds(
 
 def _as_followed(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """Pulsations with omega_c at the beginning of a period as runs show it."""
-    followed, samples = [], runner.effort.pulsation_samples
+    followed, samples = [], runner.sampling.pulsation_samples
     last = slice(-2 * samples, None)
     rounds = _settled_rounds(
         runner, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False
@@ -335,7 +337,7 @@ def _search(runner: Runner, each: Pulsation) -> Search:
     first sixth."""
 
     def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
-        timing = Timing(1.5 * attempt.time, runner.effort.pulsation_samples, 2 * attempt.refine)
+        timing = Timing(1.5 * attempt.time, runner.sampling.pulsation_samples, 2 * attempt.divisor)
         return each.task(runner, amplitude, each.start(amplitude), timing, largest=first.high)
 
     if each.p.drag == STOKES:
@@ -348,7 +350,7 @@ def _search(runner: Runner, each: Pulsation) -> Search:
             Bracket(0.99 * each.amplitude, RAISED * each.amplitude),
             each.amplitude,
         )
-    return Search(first, task, rolls_on, runner.effort.pulsation_width * size)
+    return Search(first, task, rolls_on, runner.sampling.pulsation_width * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
@@ -496,19 +498,19 @@ def jumps(
 def _jump(runner: Runner, start: Start, size: float) -> StepPair:
     """The pair of jumps of the flow up and down, rad s-1, from a state in the case that the start
     is named by."""
-    p, t_end = start.p, rounded_duration(start.p, runner.effort.unsteady_lasts)
+    p, t_end = start.p, rounded_duration(start.p, runner.sampling.unsteady_lasts)
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     samples = max(
         4000, round(t_end / (4 * coarse_step(p)))
     )  # drag may be weak, and peaks come soon
-    refine, at = runner.effort.unsteady_refine, {"case": start.name}
+    divisors, at = runner.sampling.unsteady_divisors, {"case": start.name}
     return StepPair(
         start.set,
         p,
         start.name,
         start.x0,
         t_end,
-        refine,
+        divisors,
         samples,
         _jump_quantities,
         None,
@@ -522,12 +524,12 @@ def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator
     flows."""
     p, span = start.p, ends - begins
     last = begins + RAMP[1] * span
-    for rate in runner.effort.unsteady_rates:
+    for rate in runner.sampling.unsteady_rates:
         rise = rate * p.c * span
         t_end, at = (last - p.omega_0) / rise, {"rate": rise, **state_of(start.x0[:6])}
-        flow, refine = Flow.ramp(p.omega_0, last, t_end), runner.effort.unsteady_ramps
+        flow, divisors = Flow.ramp(p.omega_0, last, t_end), runner.sampling.unsteady_ramps
         yield StepPair(
-            start.set, p, "ramp", start.x0, t_end, refine, 16000, caught_up, flow, (), at
+            start.set, p, "ramp", start.x0, t_end, divisors, 16000, caught_up, flow, (), at
         )
 
 

@@ -76,7 +76,7 @@ def measure(
         )
         finer = [
             (coarse_step(p) / parts, *start)
-            for parts in runner.effort.laws_refined
+            for parts in runner.sampling.laws_divisors
             for start in starts
         ]
         tasks.append(
@@ -103,14 +103,14 @@ def measure(
         name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2)
         for name, fluid in FLUIDS.items()
     }
-    falls, refined = [], runner.effort.laws_refined
+    falls, divisors = [], runner.sampling.laws_divisors
     for p in balls.values():
         step, rest = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
         begun = rest, rest._replace(v_y=-math.sqrt(p.g * p.R))
         falls.append(
             [
                 runner.task(p, x, 64 * step, step / parts, samples=64)
-                for parts in refined
+                for parts in divisors
                 for x in begun
             ]
         )

@@ -76,10 +76,13 @@ def field(
     runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
-    refine, pairs = (STEP_RATIO * runner.effort.halves[0], STEP_RATIO * runner.effort.halves[1]), []
+    divisors, pairs = (
+        (STEP_RATIO * runner.sampling.halves[0], STEP_RATIO * runner.sampling.halves[1]),
+        [],
+    )
     for name, p in sets.items():
         rng = np.random.default_rng([STATES_SEED, *name.encode()])
-        for case, k in product(Case, range(runner.effort.field_starts)):
+        for case, k in product(Case, range(runner.sampling.field_starts)):
             x, unit = random_state(case, p, rng), time_unit(p)
             # Friction at two rolling contacts can balance only a slight lag.
             rolls = case is Case.RR
@@ -90,7 +93,7 @@ def field(
             )
             q = p.replace(omega_0=omega_0)
             t_end = (WINDOW_CENTRES[-1] + HALF_WINDOW + AROUND_WINDOW) * coarse_step(q) / STEP_RATIO
-            pairs.append(StepPair(name, q, f"from {case.name}", x, t_end, refine, rows=0))
+            pairs.append(StepPair(name, q, f"from {case.name}", x, t_end, divisors, rows=0))
             if (
                 p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2
             ):  # Reynolds numbers as in water
@@ -109,16 +112,16 @@ def field(
         set, p, case = (
             result.pair.set,
             result.pair.p,
-            Case(int(result.coarse.case[centre * runner.effort.halves[0]])),
+            Case(int(result.coarse.case[centre * runner.sampling.halves[0]])),
         )
-        enough = kept[set, p.nu_f, case] >= runner.effort.field_kept
+        enough = kept[set, p.nu_f, case] >= runner.sampling.field_kept
         if not enough and (found := _values(runner, case, result, centre)):
             kept[set, p.nu_f, case] += 1
             x, values = found
             for what, value in values.items():
                 yield result.row(runner, what, value, case=case.name, **state_of(x))
     for name, case in product(sets, Case):
-        if lacking := runner.effort.field_kept - kept[name, sets[name].nu_f, case]:
+        if lacking := runner.sampling.field_kept - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
             rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
             yield Missing("field", name, why, lacking * rows)
@@ -133,7 +136,7 @@ def _values(
     They are extrapolated to a vanishing step, and uncertain by what this and the degree of the
     polynomials change, see `pairs.unlike`."""
     p, read = result.pair.p, []
-    for run, times in zip((result.coarse, result.fine), runner.effort.halves, strict=True):
+    for run, times in zip((result.coarse, result.fine), runner.sampling.halves, strict=True):
         near, half, middle = (
             (HALF_WINDOW + AROUND_WINDOW) * times,
             HALF_WINDOW * times,
@@ -146,7 +149,7 @@ def _values(
             return None
         time, at = run.time[window], float(run.time[middle])
         # The forces of a sample act from then on for a step: they belong to the middle of it.
-        acting = time + (time[1] - time[0]) / runner.refine / 2
+        acting = time + (time[1] - time[0]) / runner.divisor / 2
         forces = polynomials(
             acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at
         )[0]
@@ -249,7 +252,7 @@ def motions(
         steps = round(6.0 * time_unit(start.p) / step)
         tasks.append(runner.task(start.p, start.x0, steps * step, step, samples=steps))
     seen: dict[str, set[Case]] = {name: set() for name in sets}
-    count, again = runner.effort.motions_pieces, list[StepPair]()
+    count, again = runner.sampling.motions_pieces, list[StepPair]()
     for start, task, run in zip(starts, tasks, runner.each(tasks), strict=True):
         name, p = start.set, start.p
         if isinstance(run, str):
@@ -266,8 +269,8 @@ def motions(
             time = float(run.time[last] - run.time[first])
             at: dict[str, Condition] = {"case": case.name, "time": time, **state_of(x)}
             yield measurement(runner, "motions", name, p, "case", case, [task], **at)
-            refine, rows = (STEP_RATIO, 2 * STEP_RATIO), len(VARIABLES[TURNING])
-            piece = StepPair(name, p, case.name, x, time, refine, conditions=at, rows=rows)
+            divisors, rows = (STEP_RATIO, 2 * STEP_RATIO), len(VARIABLES[TURNING])
+            piece = StepPair(name, p, case.name, x, time, divisors, conditions=at, rows=rows)
             again.append(piece)
     for result in carry_out(runner, "motions", again):
         yield from [result] if isinstance(result, Missing) else _turns_at_end(runner, result)
@@ -362,12 +365,12 @@ def impacts(
             start = _start(name, p, 0.8, state, how)
             step = coarse_step(start.p) / STEP_RATIO
             conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
-            t_end, refine = round(0.4 * time_unit(p) / step) * step, (STEP_RATIO, 2 * STEP_RATIO)
+            t_end, divisors = round(0.4 * time_unit(p) / step) * step, (STEP_RATIO, 2 * STEP_RATIO)
             pairs.append(
                 StepPair(
                     **vars(start),
                     t_end=t_end,
-                    refine=refine,
+                    divisors=divisors,
                     conditions=conditions,
                     rows=len(LANDED),
                 )
@@ -396,7 +399,7 @@ def impacts(
         units = state_units(p)
         # The contact closes at a whole step, or part of one, up to one late, and until then weight
         # and friction differ.
-        step = coarse_step(p) / STEP_RATIO / runner.refine * runner.engine.lands_within
+        step = coarse_step(p) / STEP_RATIO / runner.divisor * runner.engine.lands_within
         late = uniform(step / time_unit(p) / 2)
         for name in LANDED:
             k = VARIABLES.index(name)

@@ -78,7 +78,7 @@ def measure(
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
     yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
     sides = [
-        push for name, p in rough.items() for push in _pushes(name, p, runner.effort.growth_more)
+        push for name, p in rough.items() for push in _pushes(name, p, runner.sampling.growth_more)
     ]
     tasks = [push.tasks(runner) for pushes in sides for push in pushes]
     runs = zip(tasks, runner.groups(tasks), strict=True)
@@ -148,22 +148,22 @@ class Push:
             return SLIPS_BESIDE
         return SMALL_SLIPS if self.outer in (Case.RS, Case.SR) else LARGE_SLIPS
 
-    def pair(self, runner: Runner, size: float, refine: int = 1) -> list[Task]:
+    def pair(self, runner: Runner, size: float, divisor: int = 1) -> list[Task]:
         """Tasks with one size of slip, in units of `start_unit`, with both time steps, divided by
-        `refine`."""
+        `divisor`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        steps, step = RECORD_STEPS * refine, coarse_step(p) / (step_pairs.STEP_RATIO * refine)
+        steps, step = RECORD_STEPS * divisor, coarse_step(p) / (step_pairs.STEP_RATIO * divisor)
         return [
             runner.task(p, x, steps * step, step / n, samples=steps * n)
-            for n in runner.effort.halves
+            for n in runner.sampling.halves
         ]
 
     def tasks(self, runner: Runner) -> list[Task]:
         """Tasks with every size of slip and both time steps; of the engine on trial these are half as
         long, since the first ones of a run are seen in it for a while."""
-        refine = 1 if runner.has_own_steps else 2
-        return [task for size in self.sizes for task in self.pair(runner, size, refine)]
+        divisor = 1 if runner.has_own_steps else 2
+        return [task for size in self.sizes for task in self.pair(runner, size, divisor)]
 
     def rates(self, run: Trajectory) -> Array:
         """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in
@@ -314,7 +314,7 @@ def steepest(
     fans = []  # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
     for name, p in rough.items():
         rng = np.random.default_rng([58, *name.encode()])
-        for _ in range(runner.effort.steepest_states):
+        for _ in range(runner.sampling.steepest_states):
             x = step_pairs.random_state(Case.NR, p, rng)
             # The fluid pulls along the orbit, by half the weight to three times it: that turns the
             # direction.

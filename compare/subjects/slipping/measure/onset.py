@@ -185,10 +185,10 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
 
     It is uncertain by what the step and the degree of the polynomials change.
     """
-    tasks, refine = [], runner.effort.bounds_refined
+    tasks, divisor = [], runner.sampling.bounds_divisor
     for push in (push for pushes in rows for push in pushes):
         large, small = push.sizes if push.inner is not Case.NR else FAST_SLIPS
-        tasks.append([*push.pair(runner, large, refine), push.pair(runner, small, refine)[1]])
+        tasks.append([*push.pair(runner, large, divisor), push.pair(runner, small, divisor)[1]])
     results, found = zip(tasks, runner.groups(tasks), strict=True), []
     for pushes in rows:
         points, used, strays = [], list[Task](), list[Measurement | Missing]()
@@ -207,7 +207,7 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
             coarse, fine, half = (push.rates(run) for run in runs)
             best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
             noise = math.hypot(
-                change * DOUBT, uniform(best[1] - best[0]), lag_error(p, refine) * slip_unit(p)
+                change * DOUBT, uniform(best[1] - best[0]), lag_error(p, divisor) * slip_unit(p)
             )
             points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
         found.append(Growths(np.reshape(points, (-1, 3)).T, used, strays))
@@ -353,13 +353,15 @@ class Arrow:
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
         if kept and len(pressed) == len(kept):
             fastest = float(kept[-1].omega_c[0])
-            return [self.task(fastest, times) for times in self.runner.effort.halves]
+            return [self.task(fastest, times) for times in self.runner.sampling.halves]
         if not 2 <= len(pressed) < len(kept):
             return []
         (a, high), (b, low) = pressed[-2:]
         where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
         orbits = [where * (1 - part) for part in LATER_ORBITS if where]
-        return [self.task(orbit, times) for orbit in orbits for times in self.runner.effort.halves]
+        return [
+            self.task(orbit, times) for orbit in orbits for times in self.runner.sampling.halves
+        ]
 
     def row(
         self, quantity: str, omega_c: float, value: Estimate | float, tasks: Sequence[Task]

@@ -67,11 +67,11 @@ def planes(
     # the wall can carry.
     p = sets["reference"].replace(c=1.25)
     spread = [
-        list(qmc.Halton(2, seed=7 + k).random(runner.effort.plane_spread))
+        list(qmc.Halton(2, seed=7 + k).random(runner.sampling.plane_spread))
         for k in range(len(FIGURES))
     ]
     both = [Plane(figure, points) for figure, points in zip(FIGURES, spread, strict=True)]
-    for count in (*runner.effort.plane_added, 0):
+    for count in (*runner.sampling.plane_added, 0):
         chosen = [(plane, u) for plane in both for u in plane.points]
         starts = []
         for plane, u in chosen:
@@ -82,7 +82,7 @@ def planes(
             starts.append([initial_condition(plane.figure, q, how) for how in WAYS])
         # Only the case matters: states may drift a thousand times as far as those whose values are
         # compared.
-        criteria = SettlingCriteria(span=20.0, loose=1000.0, rounds=runner.effort.plane_rounds)
+        criteria = SettlingCriteria(span=20.0, loose=1000.0, rounds=runner.sampling.plane_rounds)
         for (plane, u), states in zip(chosen, settle_groups(runner, starts, criteria), strict=True):
             if not any(each.failure for each in states):
                 mask = sum(1 << case for case in {physical_case(each.case) for each in states})
@@ -162,7 +162,7 @@ def borders(
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
-        for part in (CLOSING if name == soonest else runner.effort.edge_flows)
+        for part in (CLOSING if name == soonest else runner.sampling.edge_flows)
     ]
     starts = [
         [initial_condition(name, p, "rest"), initial_condition(name, p, "on the wall")]
@@ -186,7 +186,7 @@ def borders(
         else:
             a, b = _on_floor_and_wall(slipping.mean), _on_floor_and_wall(lifted.mean)
             edges.append(Edge(name, p, a, b, a, b - a))
-    for _ in range(runner.effort.edge_lines):
+    for _ in range(runner.sampling.edge_lines):
         lines = [_next_line(edge) for edge in edges]
         brackets = narrow(runner, [_search(runner, line) for line in lines], careful=False)
         edges = [
@@ -264,7 +264,7 @@ def _search(runner: Runner, edge: Edge) -> Search:
 
     Later lines are a hundredth as long, and four times as long after each that missed the border.
     """
-    t_end, step = rounded_duration(edge.p, runner.effort.edge_time), coarse_step(edge.p)
+    t_end, step = rounded_duration(edge.p, runner.sampling.edge_time), coarse_step(edge.p)
     reach = 5e-3 * 4.0**edge.missed
     around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 1e-5)
 

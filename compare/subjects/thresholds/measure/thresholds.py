@@ -92,7 +92,7 @@ def measure(
 ) -> Iterator[Measurement | Missing]:
     """The thresholds of each set: bisected between flows whose settled cases differ, and
     extrapolated from states."""
-    sure = not runner.effort.granted
+    sure = not runner.sampling.granted
     found = [_where_cases_change(runner, name, p, records) for name, p in sets.items()]
     _narrow(runner, found, _end_of_rolling, careful=sure)
     _narrow(runner, found, _sinking_and_slipping)
@@ -146,7 +146,7 @@ class Findings:
             else:
                 x0 = start(q) if start else settling.initial_condition("", q, STARTS[kind]).x0
             t_end = settling.rounded_duration(q, units * time * attempt.time)
-            return self.runner.task(q, x0, t_end, coarse_step(q) / attempt.refine)
+            return self.runner.task(q, x0, t_end, coarse_step(q) / attempt.divisor)
 
         return kind, Search(around, task, answer, width)
 
@@ -202,7 +202,7 @@ def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Recor
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one
     on trial looks where that one found something."""
-    starts = STARTS | {Passage.SS_ENDS: runner.effort.settled_starts[0][0]}
+    starts = STARTS | {Passage.SS_ENDS: runner.sampling.settled_starts[0][0]}
     cases = {kind: settling.settled_cases(records, name, how) for kind, how in starts.items()}
     changes = {}
     for kind, seen in cases.items():
@@ -239,7 +239,7 @@ def _narrow(
 def _end_of_rolling(each: Findings) -> Iterator[tuple[Passage, Search]]:
     """A search for the largest flow at which a ball that rolls at both points goes on so."""
     if change := each.changes.get(Passage.RR_ENDS):
-        width = each.runner.effort.thresholds_width * change.high
+        width = each.runner.sampling.thresholds_width * change.high
         yield each.search(Passage.RR_ENDS, change, width)
 
 
@@ -267,14 +267,14 @@ def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
             for kind, b in each.brackets.items()
             if not (b.runs[1] or b.high in each.cases[kind])
         ]
-        for kind in unseen if not runner.effort.granted else ():
+        for kind in unseen if not runner.sampling.granted else ():
             del each.brackets[kind]
         near, below_fold, above = (
             np.array(row) for row in (DISTANCES, DISTANCES_BELOW_FOLD, DISTANCES_OF_NR)
         )
         if carried := each.brackets.get(Passage.NS_ENDS):
             beside.append((each, Beside.NR, "on the wall", carried.high * (1 + above)))
-            if runner.effort.slow:  # a ball that sinks swings for long
+            if runner.sampling.slow:  # a ball that sinks swings for long
                 beside.append((each, Beside.NS, "on the wall", carried.low * (1 - near / 2)))
         end, last = each.brackets.get(Passage.RR_ENDS), each.brackets.get(Passage.SS_ENDS)
         if end and lifts(end):
@@ -291,7 +291,7 @@ def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
         for each, _, how, flows in beside
     ]
     criteria = SettlingCriteria(
-        loose=runner.effort.thresholds_loose, rounds=runner.effort.thresholds_rounds
+        loose=runner.sampling.thresholds_loose, rounds=runner.sampling.thresholds_rounds
     )
     for (each, which, *_), states in zip(
         beside, settling.settle_groups(runner, starts, criteria), strict=True
@@ -307,7 +307,7 @@ def _on_the_wall_and_back(each: Findings) -> Iterator[tuple[Passage, Search]]:
 
     They begin from settled states continued to each flow; the pressed one has a thousandth less
     spin on the wall."""
-    width = each.runner.effort.thresholds_width
+    width = each.runner.sampling.thresholds_width
     begins, carried = each.brackets.get(Passage.NS_ENDS), each.states.get(Beside.NR, [])
     if begins and len(carried) == len(DISTANCES_OF_NR):
         start = continued(carried, height=settling.safe_height(each.p))
@@ -356,7 +356,7 @@ def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
     if pressing := extrapolated(last, "slip_x", forces):
         sure = COVERAGE * pressing.uncertainty
         return top if pressing.value > sure else None, pressing.value < -sure
-    return None, bool(held and off < each.runner.effort.thresholds_fold * held.high)
+    return None, bool(held and off < each.runner.sampling.thresholds_fold * held.high)
 
 
 def extrapolated(
@@ -386,8 +386,8 @@ def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
     At a fold all slows down, like the root of the distance.
     """
     top, _ = _end_of_slipping(each)
-    if top and each.runner.effort.slow:
-        narrowest = each.runner.effort.thresholds_fold
+    if top and each.runner.sampling.slow:
+        narrowest = each.runner.sampling.thresholds_fold
         half = max(narrowest, 5.0 * top.uncertainty / top.value)
         change = Bracket(top.value * (1 - half), top.value * (1 + half))
         nearest, time = each.states[Beside.SS_LAST][0].mean, 1 / math.sqrt(narrowest)
@@ -443,7 +443,7 @@ def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
     settles = len(tasks) >= POINTS
     # Beside known flows only a ball may have settled at none beyond the last.
-    if settles and (ends or not each.runner.effort.granted):
+    if settles and (ends or not each.runner.sampling.granted):
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
         yield from each.rows_of_zero(
@@ -461,7 +461,7 @@ def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
             yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
         else:
             slow = "costs more than an engine beside the one on trial may"
-            why = "could not be done" if each.runner.effort.slow else slow
+            why = "could not be done" if each.runner.sampling.slow else slow
             yield each.missing(
                 f"the end of slipping at both points is extrapolated; to bracket it {why}"
             )

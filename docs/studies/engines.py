@@ -1,4 +1,4 @@
-"""What three witnesses say in a validation that was kept: rows for the page on MuJoCo's
+"""What three engines say in a validation that was kept: rows for the page on MuJoCo's
 settings."""
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ def verdicts(results: Path) -> list[Verdict]:
 
 
 def counted(results: Path) -> Rows:
-    """How many claims each witness was asked, and how they came out, with its deviations at a step
+    """How many claims each engine was asked, and how they came out, with its deviations at a step
     of 2 ms."""
     said = verdicts(results)
     told = wording.engines(said)
     head = [
-        "witness",
+        "engine",
         "asked",
         "confirmed",
         "to",
@@ -82,11 +82,11 @@ def verdict(results: Path) -> Rows:
 
 
 def limits(results: Path) -> Rows:
-    """How far plain MuJoCo is from theory in the limit of no step, and how sure that is, by
+    """How far plain MuJoCo is from theory in the zero-step limit, and how sure that is, by
     quantity."""
     rows = [
         [
-            "in the limit of no step",
+            "in the zero-step limit",
             "numbers",
             "median deviation",
             "worst deviation",
@@ -104,7 +104,7 @@ def limits(results: Path) -> Rows:
         equal = [c for c in checks.values() if c.relation is Relation.EQUAL]
         found = [c for c in equal if c.measurement.quantity.startswith(names)]
         off = [
-            (abs(c.deviation) / c.scale, c.resolves) for c in found if math.isfinite(c.predicted)
+            (abs(c.deviation) / c.scale, c.resolution) for c in found if math.isfinite(c.predicted)
         ]
         worst, tolerance = max(off)
         rows.append(
@@ -137,8 +137,8 @@ def not_confirmed(results: Path) -> Rows:
 
 
 @contextmanager
-def _ceilings(times: float) -> Iterator[None]:
-    """All ceilings of quantities multiplied."""
+def _required(times: float) -> Iterator[None]:
+    """All required resolutions multiplied."""
     known = quantities.QUANTITIES
     with mock.patch.dict(
         known, {name: replace(q, resolution=times * q.resolution) for name, q in known.items()}
@@ -154,12 +154,12 @@ def _constant(name: str) -> Callable[[float], AbstractContextManager[None]]:
 CHOSEN = {
     name: _constant(name)
     for name in ("GCI_SAFETY", "SAME", "LOOSER", "COARSEST", "MARGIN", "FAR_OFF", "LOWEST_ORDER")
-} | {"all ceilings of quantities": _ceilings}
+} | {"all required resolutions": _required}
 """What was chosen after a first measurement and can be changed without measuring anew."""
 
 
 def chosen(results: Path) -> Rows:
-    """The verdicts, by any witness, that change where a constant is half or twice as large."""
+    """The verdicts, by any engine, that change where a constant is half or twice as large."""
 
     def said() -> dict[str, Outcome]:
         return {

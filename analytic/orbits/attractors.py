@@ -65,8 +65,8 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Fate:
-    """The attractor that one run came to, and the last part of the run."""
+class LimitSet:
+    """The limit set of one run, and the last part of the run."""
 
     kind: Kind
     last: Trajectory
@@ -82,7 +82,7 @@ class Fate:
     failure: str = ""
     """Why the run broke down, if it did."""
 
-    def same(self, other: Fate) -> bool:
+    def same(self, other: LimitSet) -> bool:
         """Whether two runs came to one attractor; all that are undecided count as one."""
         if self.kind is not other.kind or (self.solution is None) is not (other.solution is None):
             return False
@@ -95,7 +95,7 @@ class Fate:
 class Attractor:
     """An attractor, and how many of the starts came to it."""
 
-    fate: Fate
+    limit: LimitSet
     """Of the one that settled first."""
     count: int
     starts: int
@@ -115,7 +115,7 @@ class Attractor:
     def run(self) -> Trajectory:
         """The motion on it: a period by theory where there is an orbit, else the last window of a
         run."""
-        return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
+        return self.limit.orbit.cycle if self.limit.orbit else self.limit.last
 
 
 def event_driven(
@@ -164,7 +164,7 @@ def attractors(
     if lasting is None and p.c == 0:
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
-    groups, window = list[list[Fate]](), WINDOW * math.sqrt(p.R / p.g)
+    groups, window = list[list[LimitSet]](), WINDOW * math.sqrt(p.R / p.g)
     todo = (_follow_to_attractor(p, x, duration, run, groups) for x in states)
     following = [(each, next(each)) for each in islice(todo, SIDE_BY_SIDE)]
     while following:
@@ -174,11 +174,11 @@ def attractors(
             try:
                 goes_on.append((each, each.send(seen)))
             except StopIteration as settled:
-                fate: Fate = settled.value
-                group = next((group for group in groups if group[0].same(fate)), None)
+                limit: LimitSet = settled.value
+                group = next((group for group in groups if group[0].same(limit)), None)
                 if group is None:
                     groups.append(group := [])
-                group.append(fate)
+                group.append(limit)
         progress(sum(map(len, groups)) / len(states))
         following = goes_on + [
             (each, next(each)) for each in islice(todo, SIDE_BY_SIDE - len(goes_on))
@@ -188,43 +188,43 @@ def attractors(
 
 
 def _follow_to_attractor(
-    p: Parameters, x: Array, lasting: float, run: Runs, known: Sequence[Sequence[Fate]]
-) -> Generator[Array, Trajectory, Fate]:
+    p: Parameters, x: Array, lasting: float, run: Runs, known: Sequence[Sequence[LimitSet]]
+) -> Generator[Array, Trajectory, LimitSet]:
     """Decide which attractor the motion from x approaches within `lasting` seconds.
 
     A generator: it yields the state from which it needs the next window of the run, is sent that,
-    and returns the fate.
+    and returns the limit set.
 
     Stationary is what hardly moves, and less than before. Where two windows are alike the motion is
-    recurrent: it has the fate of one of the `known` groups, or closes; if it does neither, its
+    recurrent: it has the limit set of one of the `known` groups, or closes; if it does neither, its
     largest Lyapunov exponent decides."""
     solutions, unit = stable_solutions(p), math.sqrt(p.R / p.g)
     seen, recurrent = list[Trajectory](), False
     for _ in range(math.ceil(lasting / (WINDOW * unit))):
         now = yield x
         if now.header.failure:
-            return Fate(Kind.UNDECIDED, now, failure=now.header.failure)
+            return LimitSet(Kind.UNDECIDED, now, failure=now.header.failure)
         x, seen = now.x[-1], [*seen[-1:], now]
         if len(seen) < 2:
             continue
         before = seen[0]
         if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
-            return Fate(Kind.STATIONARY, now, solution=_nearest_solution(now, solutions))
+            return LimitSet(Kind.STATIONARY, now, solution=_nearest_solution(now, solutions))
         if recurrent := _windows_agree(before, now):
             same = (
-                fate
-                for fate, *_ in known
-                if fate.kind is not Kind.UNDECIDED and _windows_agree(fate.last, now)
+                limit
+                for limit, *_ in known
+                if limit.kind is not Kind.UNDECIDED and _windows_agree(limit.last, now)
             )
-            if fate := next(same, None) or periodic_fate(now):
-                return fate
+            if limit := next(same, None) or periodic_limit(now):
+                return limit
     if not recurrent:
-        return Fate(Kind.UNDECIDED, seen[-1])
+        return LimitSet(Kind.UNDECIDED, seen[-1])
     try:
         exponent, deviation = lyapunov(p, *_highest_state(seen[-1]), GROWING * unit, unit, run)
     except (SimulationError, InputError) as reason:
-        return Fate(Kind.UNDECIDED, seen[-1], failure=str(reason))
-    return Fate(
+        return LimitSet(Kind.UNDECIDED, seen[-1], failure=str(reason))
+    return LimitSet(
         Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC,
         seen[-1],
         exponent=exponent,
@@ -256,7 +256,7 @@ def _nearest_solution(
     return min(near, key=lambda each: (each.case is not case, distance(each)), default=None)
 
 
-def periodic_fate(last: Trajectory) -> Fate | None:
+def periodic_limit(last: Trajectory) -> LimitSet | None:
     """The periodic motion that a window of a run shows, with the stable orbit that theory has near
     it.
 
@@ -281,9 +281,9 @@ def periodic_fate(last: Trajectory) -> Fate | None:
         except NoOrbitError:
             continue
         if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
-            return Fate(Kind.PERIODIC, last, period, orbit=orbit)
+            return LimitSet(Kind.PERIODIC, last, period, orbit=orbit)
     exact = [period for period, defect in seen if defect < STATIONARY_RANGE * size]
-    return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
+    return LimitSet(Kind.PERIODIC, last, exact[0]) if exact else None
 
 
 def _highest_state(last: Trajectory) -> tuple[Array, Case]:
