@@ -12,6 +12,7 @@ For example:
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analytic.flowmeter import real_fluid
 from compare import gallery
 from compare.kit import pages, style
+from compare.kit.doubt import model_warning
 from compare.kit.drawing import GapError
 from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
@@ -41,11 +44,13 @@ def characteristic(
     """The stationary solutions of a set, omega_c over omega_0 up to the fastest, rad/s: dashed
     where unstable.
 
-    Dotted: the thresholds (84) to (88). Raises `InputError` where a set has none, as without drag.
+    Dotted: the thresholds (84) to (88). The title warns of a fluid for which the model doesn't hold.
+    Raises `InputError` where a set has none, as without drag.
     """
-    axes = _given_or_new(axes)
-    flowmeter.theory(axes, p, fastest or flowmeter.top_flow(p))
+    axes, top = _given_or_new(axes), fastest or flowmeter.top_flow(p)
+    flowmeter.theory(axes, p, top)
     axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    _warn(axes, p, p.replace(omega_0=top))
     flowmeter.names_within(axes)
     return axes
 
@@ -54,11 +59,13 @@ def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> 
     """A map of which cases have a stationary solution, over the friction of the wall, or of both,
     and the flow.
 
-    As Figs. 7 and 8 of the paper, with the other parameters of the set.
+    As Figs. 7 and 8 of the paper, with the other parameters of the set. The title warns as that of
+    `characteristic`.
     """
     axes = _given_or_new(axes)
     thresholds.regions(axes, p, equal)
     style.legend(axes, loc="upper right")
+    _warn(axes, p)
     return axes
 
 
@@ -124,3 +131,10 @@ def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
 def _given_or_new(axes: Axes | None) -> Axes:
     """The given axes, or those of a new figure."""
     return axes if axes is not None else style.figure(6.2, 4.4).add_subplot()
+
+
+def _warn(axes: Axes, *sets: Parameters) -> None:
+    """Write above axes what the model leaves out, if it is too much for one of the sets."""
+    width = axes.get_window_extent().width / axes.figure.dpi  # inch
+    for doubt in model_warning(max(map(real_fluid.model_error, sets))):
+        axes.set_title("\n".join(textwrap.wrap(doubt, round(13 * width))), fontsize=9)

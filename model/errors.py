@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from types import NoneType, UnionType
 from typing import Any, get_args
 
+MOST_NAMES = 20
+"""Of what there is, in a line that refuses what there isn't."""
+
 
 class InputError(ValueError):
     """A user's mistake: the message is one line naming the field, the value, its unit and the
@@ -30,6 +33,13 @@ def check_type(name: str, value: object, kind: type | UnionType) -> None:
     if not isinstance(value, kind):
         kinds = [each.__name__ for each in get_args(kind) or (kind,) if each is not NoneType]
         raise InputError(f"{name} must be {' or '.join(kinds)}, not {type(value).__name__}")
+
+
+def few(names: Iterable[str], most: int = 3) -> str:
+    """The first of some names, and how many more there are."""
+    every = list(names)
+    more = f" and {len(every) - most} more" if len(every) > most else ""
+    return ", ".join(every[:most]) + more
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

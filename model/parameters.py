@@ -16,7 +16,7 @@ from typing import Any, Self
 import tomli_w
 
 from model import drag as laws
-from model.errors import InputError, StorageError, suggestion
+from model.errors import MOST_NAMES, InputError, StorageError, few, suggestion
 from model.files import write_text
 
 LARGEST = 1_000_000
@@ -108,10 +108,10 @@ def check_names(
     for name in given:
         if name not in known:
             raise InputError(
-                f"unknown {kind} {name!r}{suggestion(name, known)}; known: {', '.join(known)}"
+                f"unknown {kind} {name!r}{suggestion(name, known)}; known: {few(known, MOST_NAMES)}"
             )
     if missing := [name for name in needed if name not in given]:
-        raise InputError(f"missing {kind} {', '.join(repr(name) for name in missing)}")
+        raise InputError(f"missing {kind} {few(map(repr, missing), MOST_NAMES)}")
 
 
 def _exact_text(number: float) -> str:

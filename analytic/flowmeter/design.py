@@ -177,13 +177,15 @@ def best(
     fastest: float,
     slowest_response: float = math.inf,
     seed: int = 0,
+    tell: Callable[[float], object] = float,
 ) -> Choice:
     """The meter within the bounds whose operating range exceeds the fastest flow by the largest
     factor.
 
     Among all that answer within `slowest_response`, s, the one with the largest margin at the worst
     corner of the tolerances; among equals the quickest. Differential evolution (scipy), as the
-    margin has a ridge at eta = j; the seed determines the result.
+    margin has a ridge at eta = j; the seed determines the result. `tell` is called with the fraction
+    done: of the decades by which the meters that compete are still to come together.
 
     Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one
     can."""
@@ -211,10 +213,19 @@ def best(
         late = c.response > slowest_response
         return 100 + delay if late else _TIE * delay - c.margin
 
+    first = 0.0
+
+    def come_together(x: Any, convergence: Any) -> None:  # as scipy calls it
+        nonlocal first
+        first = first or min(convergence, 1 / math.e)
+        if convergence > 0:
+            tell(min(1.0, max(0.0, 1 - math.log(convergence) / math.log(first))))
+
     if open_names:
         each = 4 + 12 // len(ends)  # times the number of values: how many meters compete
         cube = Bounds(np.zeros(len(ends)), np.ones(len(ends)))
-        result = differential_evolution(cost, cube, rng=seed, popsize=each, tol=1e-5, polish=False)
+        how: dict[str, Any] = {"rng": seed, "popsize": each, "tol": 1e-5, "polish": False}
+        result = differential_evolution(cost, cube, callback=come_together, **how)
         at_bounds = np.where(np.abs(result.x - 0.5) > 0.49, np.round(result.x), result.x)
         chosen = meter_at(min(at_bounds, result.x, key=cost))
     else:
@@ -289,15 +300,19 @@ class Design:
         return self.choices[self.material]
 
 
-def design(request: Request, seed: int = 0) -> Design:
-    """Choose the material and the meter with the largest margin; raises `InputError` if no material
-    can be used."""
+def design(request: Request, seed: int = 0, tell: Callable[[float], object] = float) -> Design:
+    """Choose the material and the meter with the largest margin; `tell` is called with the fraction
+    done. Raises `InputError` if no material can be used."""
     choices, refused, wanted = {}, {}, (request.tolerances, request.fastest, request.response, seed)
-    for material, bounds in request.bounds.items():
+    for k, (material, bounds) in enumerate(request.bounds.items()):
+
+        def told(done: float, k: int = k) -> None:
+            tell((k + done) / len(request.bounds))
+
         try:
             for ends in zip(*bounds.values(), strict=True):
                 request.make(**dict(zip(bounds, ends, strict=True)))  # does the lightest ball sink?
-            choices[material] = best(request.make, bounds, *wanted)
+            choices[material] = best(request.make, bounds, *wanted, told)
         except InputError as reason:
             refused[material] = str(reason)
     if not choices:

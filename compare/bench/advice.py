@@ -156,15 +156,13 @@ def best_change(
     its own; `calm` says whether a changed model settles as well."""
     c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
     part, names = np.isin(np.arange(len(scene.number)), members), geom_names(scene.model)
+    now = _worst(c, part, what)
     for option, value in _options(c.subset(part)) if harm[what] > 1 else ():
         other, state = copy.copy(scene.model), copy.copy(scene.data)
         apply(other, option, value)
         mujoco.mj_fwdPosition(other, state)
         changed = dataclasses.replace(c, **parameters(other, state, scene.number))
-        harms, (now, then) = (
-            scene.harm(changed),
-            (_worst(each, part, what) for each in (c, changed)),
-        )
+        harms, then = scene.harm(changed), _worst(changed, part, what)
         left = max(float(each.max()) for each in harms.values())
         softness = [(model.geom_solref, model.geom_solimp) for model in (scene.model, other)]
         differ = np.any([(old != new).any(1) for old, new in zip(*softness, strict=True)], axis=0)

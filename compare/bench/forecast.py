@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,15 +26,16 @@ from compare.bench.settled import (
     Rest,
     UnsettledError,
     awake,
-    few,
     loads_by_pair,
     measured_slip,
+    part,
     radii,
     settle,
     step_to_most_contacts,
     with_control,
 )
 from model import InputError
+from model.errors import few
 
 CREEP, DEPTH = 1e-5, 0.01
 """What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller
@@ -109,7 +110,8 @@ class Forecast:
         """If nothing that touches is at rest: what moves, in words."""
         if not all(p.moves for p in self.pairs):
             return ""
-        return f"what touches still moves: {few([*self.settled.moving.values()] or [p.name for p in self.pairs])}"
+        those = [*self.settled.moving.values()] or [p.name for p in self.pairs]
+        return f"what touches still moves: {few(those)}"
 
 
 def forecast(
@@ -134,9 +136,8 @@ def forecast(
         """Whether a changed model settles as well: contacts may chatter that are stable for small
         motions."""
         try:
-            return len(settle(other, copy.copy(scene.data), CHECKED, control).moving) <= len(
-                settled.moving
-            )
+            found = settle(other, copy.copy(scene.data), CHECKED, control)
+            return len(found.moving) <= len(settled.moving)
         except UnsettledError:
             return False
 
@@ -155,18 +156,21 @@ def follow_advice(
     before: Forecast,
     limit: float,
     control: Control | None = None,
+    tell: Callable[[float], object] = float,
     **good: Any,
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
     """Follow the advice and settle anew, for at most `limit` s: the forecast with what was found,
     after it, and beyond.
 
     The second forecast is that after the change, the third that with the remedy on top.
-    What isn't advised isn't tried: None. The change is made in `model`. Raises as `forecast` does.
+    What isn't advised isn't tried: None. The change is made in `model`. `tell` is called with the
+    fraction done. Raises as `forecast` does.
     """
     after = held = None
     if change := before.change:
         advice.apply(model, change.option, change.value)
-        after = _settled_anew(model, data, mujoco.mj_step, limit, control, good)
+        rest = settle(model, data, limit, control, tell=part(tell, 0, 2))
+        after = _settled_anew(model, data, mujoco.mj_step, rest, control, good)
         quantity = (
             f"{change.quantity}_measured"
             if change.quantity in ("creep", "depth")
@@ -177,7 +181,9 @@ def follow_advice(
             before, change=dataclasses.replace(change, found=max(found, default=math.nan))
         )
     if before.remedy:
-        held = _settled_anew(*advice.remedied(model, data), limit, control, good)
+        twin, state, law = advice.remedied(model, data)
+        rest = settle(twin, state, limit, control, law, part(tell, 1, 2))
+        held = _settled_anew(twin, state, law, rest, control, good)
         nothing = [
             dataclasses.replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs
         ]
@@ -189,12 +195,11 @@ def _settled_anew(
     model: Any,
     data: Any,
     law: Advance,
-    limit: float,
+    settled: Rest,
     control: Control | None,
     good: Mapping[str, Any],
 ) -> Forecast:
     """A forecast without advice, of a model that is settled anew under another law of stepping."""
-    settled = settle(model, data, limit, control, law)
     return _without_advice(
         _measured(awake(model), data, settled, with_control(control, law), **good), settled
     )
@@ -217,7 +222,7 @@ def _measured(
     if not len(number):
         flexible = _count_flexible(data)
         also = f"; {flexible} contacts of flexible bodies are left out" if flexible else ""
-        also += f"; after {data.time:.3g} s {few([*moving.values()])}" if moving else ""
+        also += f"; after {data.time:.3g} s {few(moving.values())}" if moving else ""
         also += f"; gone down: {few(settled.collapsed)}" if settled.collapsed else ""
         raise InputError(f"nothing touches: the model has no contact under load{also}")
     start, bodies = copy.copy(data), model.geom_bodyid[those.geoms]

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from compare.bench.advice import FAULTS
 from compare.bench.contact_law import FAINT
 from compare.bench.forecast import SHOWN, Forecast
-from compare.bench.settled import NOISE, few
+from compare.bench.settled import NOISE
 from compare.kit import pages
+from model.errors import few
 
 SLIGHT = 0.05
 """Share of Coulomb's friction that a pyramid may lack without a word."""

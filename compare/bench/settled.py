@@ -17,6 +17,7 @@ import numpy as np
 
 from compare.bench.contact_law import Array, Contacts
 from model import InputError, StorageError
+from model.errors import few
 from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
 
 Control = Callable[[Any, Any], None]
@@ -88,7 +89,7 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     data, names = mujoco.MjData(model), [model.key(k).name or str(k) for k in range(model.nkey)]
     if keyframe is not None:
         if keyframe not in names and keyframe not in map(str, range(model.nkey)):
-            others = f", but {', '.join(names)}" if names else ""
+            others = f", but {few(names)}" if names else ""
             raise InputError(f"{path} has no keyframe {keyframe!r}{others}")
         mujoco.mj_resetDataKeyframe(
             model, data, names.index(keyframe) if keyframe in names else int(keyframe)
@@ -148,6 +149,11 @@ def with_control(control: Control | None, step: Advance = mujoco.mj_step) -> Adv
     return controlled
 
 
+def part(tell: Callable[[float], object], number: int, count: int) -> Callable[[float], object]:
+    """A function to be called with the fraction done of one of so many parts of a work."""
+    return lambda done: tell((number + done) / count)
+
+
 def awake(model: Any) -> Any:
     """The model, or a copy of it in which MuJoCo puts no body to sleep."""
     sleep = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
@@ -163,10 +169,12 @@ def settle(
     limit: float,
     control: Control | None = None,
     law: Advance = mujoco.mj_step,
+    tell: Callable[[float], object] = float,
 ) -> Rest:
     """Advance until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
 
-    `law` steps in the place of `mj_step`. Raises `UnsettledError` if the model diverges.
+    `law` steps in the place of `mj_step`; `tell` is called with the fraction done, about. Raises
+    `UnsettledError` if the model diverges.
     """
     sleepy, model, step = model, awake(model), with_control(control, law)
     mujoco.mj_forward(model, data)
@@ -175,6 +183,7 @@ def settle(
     last = np.full((model.nbody, 6), 1e9)
     begin, calm, restless = data.time, 0, np.zeros(model.nbody, bool)
     speed, change = np.zeros((2, model.nbody))
+    too_much = list[float]()
     while data.time < begin + limit and calm < 2:
         start, velocity = data.time, mean_velocities(model, data, step)
         speed, change = (
@@ -187,6 +196,9 @@ def settle(
         calm = (
             calm + 1 if (change <= STEADY * speed + STILL).all() else 0
         )  # a speed may pass through a maximum
+        too_much.append(math.log(max(1.0, (change / (STEADY * speed + STILL)).max())))
+        passed = data.time - begin
+        tell(min(1.0, passed / min(limit, time_to_settle(too_much, passed))))
     moving = {
         int(b): f"{_body_name(model, int(b))} at {speed[b]:.2g} m/s"
         for b in np.flatnonzero(restless)
@@ -200,6 +212,15 @@ def settle(
             _body_name(model, int(np.flatnonzero(model.body_treeid == tree)[0])) for tree in trees
         ]
     return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(asleep))
+
+
+def time_to_settle(too_much: Sequence[float], passed: float) -> float:
+    """After which time velocities would no longer change, if they go on as in the second half of
+    what has passed; from logarithms of how many times too much they change."""
+    middle, now = len(too_much) // 2, too_much[-1]
+    falls = (too_much[middle] - now) / max(1, len(too_much) - 1 - middle)  # in a window
+    more = now / falls if falls > 0 else math.inf if now else 0.0
+    return passed * (1 + more / len(too_much))
 
 
 def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
@@ -320,8 +341,3 @@ def radii(model: Any) -> Array:
 def _body_name(model: Any, body: int) -> str:
     name = model.body(body).name
     return f"body {name!r}" if name else f"body {int(body)}"
-
-
-def few(names: Sequence[str]) -> str:
-    """The first three of some names, and how many more there are."""
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

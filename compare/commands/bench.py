@@ -100,6 +100,8 @@ def run_forecast(args: argparse.Namespace) -> int:
     from compare.bench import forecast, forecast_page, settled
 
     good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
+    count = 3 if args.tries else 2
+    settling, trying = (settled.part(args.tell, k, count) for k in (0, 2))
     heard = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(
         lambda _: None
@@ -107,10 +109,14 @@ def run_forecast(args: argparse.Namespace) -> int:
     try:
         model, data = settled.load(args.file, args.keyframe)
         settled.set_controls(model, data, args.ctrl)
-        found = forecast.forecast(model, data, settled.settle(model, data, args.settle), **good)
+        rest = settled.settle(model, data, args.settle, tell=settling)
+        found = forecast.forecast(model, data, rest, **good)
+        args.tell(2 / count)
         after = held = None
         if args.tries:
-            found, after, held = forecast.follow_advice(model, data, found, args.settle, **good)
+            found, after, held = forecast.follow_advice(
+                model, data, found, args.settle, tell=trying, **good
+            )
     except settled.UnsettledError as error:
         print(f"dualball: {args.file}: {error}", file=sys.stderr)
         return 1

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     asked = parameters.read_toml(args.file)
     try:
-        made = design.design(request(asked), args.seed)
+        made = design.design(request(asked), args.seed, args.tell)
     except InputError as error:
         raise InputError(f"{args.file}: {error}") from error
     if args.output:

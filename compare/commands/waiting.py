@@ -23,7 +23,7 @@ def told(what: str) -> Iterator[Callable[[float], None]]:
 
     def tell(fraction: float) -> None:
         nonlocal done
-        done = fraction
+        done = max(done, fraction)
 
     def watch() -> None:
         for _ in range(round(SOON / OFTEN)):

@@ -23,7 +23,7 @@ from mjsim import ContactSettings, RigidContacts
 from mjsim.contact_settings import LANDING_PARTS, ContactModel
 from model import InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
-from model.errors import suggestion
+from model.errors import MOST_NAMES, few, suggestion
 from model.versions import version
 
 
@@ -281,8 +281,7 @@ def engine(name: str) -> Engine:
     name = "event" if name == "analytic" else name
     if name not in ENGINES:
         raise InputError(
-            f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are "
-            f"{', '.join(ENGINES)}"
+            f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are {few(ENGINES, MOST_NAMES)}"
         )
     return ENGINES[name]
 

@@ -18,7 +18,6 @@ from rich.progress import (
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 
 from compare.kit.workers import Spread
@@ -38,6 +37,38 @@ def show_nothing(what: str, done: int, total: int, failed: int) -> None:
     """A progress function that shows nothing."""
 
 
+class _Pace:
+    """How fast something goes, by what was last said of it."""
+
+    def __init__(self) -> None:
+        self._began = self._said = time.monotonic()
+        self._before, self._done, self._total = -1, 0, 0
+
+    def note(self, done: int, total: int) -> bool:
+        """Note how much is done; return whether that is the first to go by.
+
+        What an earlier session did, or getting ready, is no measure of how fast this is."""
+        if (done, total) != (self._done, self._total):
+            self._said, self._done, self._total = time.monotonic(), done, total
+        if first := self._before < 0 or not total:
+            self._began, self._before = time.monotonic(), done
+        return first
+
+    def left(self) -> float:
+        """Seconds that are left; 0 where nobody knows.
+
+        While nothing is said, that is no sign that it is slow."""
+        if not self._done > self._before >= 0:
+            return 0.0
+        a_part = (self._said - self._began) / (self._done - self._before)
+        left = a_part * (self._total - self._done) - (time.monotonic() - self._said)
+        return max(left, 0.0)
+
+    def __str__(self) -> str:
+        left = self.left()
+        return f"about {left:.0f} s to go" if left else ""
+
+
 @contextmanager
 def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
     """Yield a function that shows progress on standard error, which is never silent for longer than
@@ -54,36 +85,32 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
                 f"{what}: {done} of {total} runs", done, total, failed
             )
     elif sys.stderr.isatty():
-        times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
-        columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), *times
-        with Progress(*columns, console=Console(stderr=True)) as bar:
-            line = bar.add_task("", total=None)
+        left = TextColumn("{task.fields[pace]}")  # a new text whenever it is looked at
+        columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()
+        with Progress(*columns, TimeElapsedColumn(), left, console=Console(stderr=True)) as bar:
+            pace = _Pace()
+            line = bar.add_task("", total=None, pace=pace)
 
             def show(what: str, done: int, total: int, failed: int) -> None:
+                pace.note(done, total)
                 failures = f" [red]{failed} failed[/]" if failed else ""
                 bar.update(line, description=what + failures, completed=done, total=total)
 
             yield show
     else:  # what is being done at once, and how far it is every `INTERVAL`, whatever happens
         began, ended = time.monotonic(), threading.Event()
-        since, before, last = began, -1, ("", 0, 0, 0)
+        pace, last = _Pace(), ("", 0, 0, 0)
 
         def remember(what: str, done: int, total: int, failed: int) -> None:
-            nonlocal since, before, last
-            if what != last[0] and (before < 0 or not total):
+            nonlocal last
+            if pace.note(done, total) and what != last[0]:
                 print(what, file=sys.stderr, flush=True)
-            if before < 0 or not total:
-                # What an earlier session did, or getting ready, is no measure of how fast this is.
-                since, before = time.monotonic(), done
             last = what, done, total, failed
 
         def print_progress() -> None:
             while not ended.wait(INTERVAL):
                 what, done, total, failed = last
-                rate = (time.monotonic() - since) / (done - before) if done > before >= 0 else 0.0
-                left = (
-                    f", about {rate * (total - done):.0f} s to go" if rate and total > done else ""
-                )
+                left = f", {pace}" if pace.left() else ""
                 share = f", {done / total:.0%}" if total else ""
                 bad = f", {failed} failed" if failed else ""
                 print(

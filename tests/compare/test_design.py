@@ -4,12 +4,17 @@ asked."""
 import json
 import math
 import re
+from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
 
 from analytic import operating_range, thresholds
+from analytic.flowmeter import design
+from compare.commands import design as commands
 from model import Parameters
+from model.parameters import read_toml
 from tests.commands import carried_out, refused, told
 
 METER = {
@@ -54,6 +59,16 @@ def test_the_best_meter_as_json_and_as_a_page(tmp_path, capsys):
     for shown in (f"{worst['omega_0']:.3g}", f"{values['eta']:.4g}", "cork can't be used"):
         assert shown in text
     assert text.count('<figure class="plot"') == 3
+
+
+def test_a_search_tells_how_far_it_is(tmp_path):
+    told = list[float]()
+    path = Path(written(tmp_path, bounds=METER["bounds"] | {"mu": 0.2, "r": 0.005}))
+    design.design(commands.request(read_toml(path)), tell=told.append)
+    half = max(told) / 2  # of two materials the second floats
+    assert 0 <= min(told) < half / 4
+    assert half == 0.25
+    assert abs(np.median(told) - half) < half / 2  # steadily, as it takes as long a generation
 
 
 BALL = {"r": 0.005, "R": 0.02, "rho_b": 7850, "mu": 0.2, "eta": 0.2}

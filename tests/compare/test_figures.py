@@ -221,6 +221,14 @@ def test_functions_draw_into_axes_that_are_given_or_new():
     assert "N" in of_file.get_ylabel()
 
 
+def test_functions_warn_of_a_fluid_for_which_the_model_does_not_hold():
+    p = Parameters.named("reference")
+    spun = p.replace(fluid_torque=p.c)  # as fast as drag
+    for draw in (plot.characteristic, plot.regions):
+        assert "doesn't hold for this fluid" in " ".join(draw(spun).get_title().split())
+        assert draw(p).get_title() == ""
+
+
 @pytest.mark.parametrize(
     ("draw", "said"),
     [

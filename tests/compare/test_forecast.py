@@ -16,7 +16,7 @@ import pytest
 
 from compare.adapters.mujoco_free import Bodies
 from compare.bench import forecast, forecast_page, native
-from compare.bench.settled import STILL, settle
+from compare.bench.settled import STILL, settle, time_to_settle
 from model import InputError
 from tests.commands import carried_out, told
 from tests.exact_cases import CASES
@@ -401,6 +401,27 @@ def test_the_page_the_json_and_what_the_engine_replaces(forecasts, tmp_path):
         == "0.012 s: 0.016 s is taken (refsafe)"
     )
     assert "To paste: MJCF" in page.read_text("utf-8")
+
+
+def test_settling_and_following_advice_tell_how_far_they_are():
+    for world, limit in ((GROUND + box("0 0 .05", "0 0 0"), 100.0), (ON_SLOPE, 1.0)):
+        model, told = mujoco.MjModel.from_xml_string(mjcf(world)), list[float]()
+        data = mujoco.MjData(model)
+        rest = settle(model, data, limit, tell=told.append)
+        assert told[-1] == 1.0
+        assert all(0 < done <= 1 for done in told)
+        assert data.time < 10.0  # long before the most that it may take
+    told.clear()
+    before = forecast.forecast(model, data, rest)
+    forecast.follow_advice(model, data, before, limit, tell=told.append)
+    assert told == sorted(told)
+    assert told[-1] > 0
+
+
+def test_what_never_settles_is_as_far_as_its_time():
+    assert time_to_settle([3.0, 4.0, 3.0, 4.0], 4.0) == math.inf
+    assert time_to_settle([8.0, 7.0, 6.0, 5.0, 4.0], 5.0) == pytest.approx(9.0)
+    assert time_to_settle([2.0, 0.0], 2.0) == 2.0
 
 
 @UNADVISED

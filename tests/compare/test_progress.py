@@ -1,4 +1,4 @@
-"""What a validation announces of the time that is left is true on machines of any pace."""
+"""What is announced of the time that is left is true on machines of any pace."""
 
 import pytest
 
@@ -37,3 +37,15 @@ def test_what_is_stored_tells_nothing_of_the_pace(monkeypatch):
     before = far.left()
     far.measured("protocol 0")
     assert far.left() == before
+
+
+def test_silence_between_two_parts_is_no_sign_that_they_are_slow(monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    pace = progress._Pace()
+    for done in range(5):
+        now = 10.0 * done
+        pace.note(done, 10)
+    now += 9.0
+    pace.note(4, 10)  # nothing new
+    assert pace.left() == pytest.approx(100.0 - now)
