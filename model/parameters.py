@@ -189,7 +189,7 @@ class Parameters:
             value = check_number(field.name, getattr(self, field.name), unit, allowed, meaning)
             if value:
                 check_number(field.name, abs(value), unit, SIZES, "the size of what isn't 0")
-            object.__setattr__(self, field.name, value)
+            object.__setattr__(self, field.name, value + 0.0)  # without the sign of -0
         check_choice("drag", self.drag, laws.LAWS)
         if self.drag != laws.STOKES and self.nu_f == 0:
             raise InputError(

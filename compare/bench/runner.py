@@ -259,6 +259,8 @@ def _load(given: Any) -> tuple[Any, About]:
     engine = given
     if isinstance(given, str):
         module, _, member = given.partition(":")
+        if not all(part.isidentifier() for part in module.split(".")):
+            raise InputError("write it as Python imports it, package.module")
         try:
             engine = importlib.import_module(module)
             engine = getattr(engine, member) if member else engine

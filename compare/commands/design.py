@@ -98,16 +98,16 @@ def request(asked: Mapping[str, Any]) -> Request:
 
 def _interval(name: str, value: Any, unit: str, allowed: Range) -> Interval:
     """The interval that a number, or a list [lowest, highest], means, checked."""
+    of = f" {unit}" * (unit != "1")
     ends = value if isinstance(value, list | tuple) else (value, value)
     if len(ends) != 2:
         raise InputError(
-            f"{name} = {value!r} must be a number in {unit}, or the two between which it may be"
+            f"{name} = {value!r} must be a number{of and ' in'}{of}, or the two between which it may be"
         )
     low, high = (check_number(name, end, unit, allowed) for end in ends)
     if low > high:
         raise InputError(
-            f"{name} = [{low:g}, {high:g}] {unit} excludes everything: the lower bound must come "
-            f"first"
+            f"{name} = [{low:g}, {high:g}]{of} excludes everything: the lower bound must come first"
         )
     return low, high
 

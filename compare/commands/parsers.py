@@ -367,7 +367,10 @@ def forecast(parser: Parser) -> None:
     """What the contacts of a MuJoCo model will do: depth, creep, hovering, largest step."""
     parser.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
     parser.add_argument(
-        "--keyframe", metavar="NAME", help="begin with this keyframe, by name or number"
+        "--keyframe",
+        metavar="NAME",
+        type=str.strip,
+        help="begin with this keyframe, by name or number",
     )
     driven = "controls: a number for each actuator, or NAME=NUMBER for some"
     parser.add_argument("--ctrl", nargs="+", default=[], metavar="[NAME=]N", help=driven)

@@ -110,6 +110,8 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         def print_progress() -> None:
             while not ended.wait(INTERVAL):
                 what, done, total, failed = last
+                if not what:
+                    continue
                 left = f", {pace}" if pace.left() else ""
                 share = f", {done / total:.0%}" if total else ""
                 bad = f", {failed} failed" if failed else ""

@@ -128,7 +128,7 @@ WRONG = [
         {"fluid": FLUID | {"drag": "quadratic"}, "flow": FLOW | {"response": 9}},
         "flow.response can't",
     ),
-    ({"bounds": BOUNDS | {"eta": [0.3, 0.1]}}, "steel: eta = [0.3, 0.1] 1 excludes everything"),
+    ({"bounds": BOUNDS | {"eta": [0.3, 0.1]}}, "steel: eta = [0.3, 0.1] excludes everything"),
     ({"bounds": {"r": 0.01}}, "missing bound of steel: 'R', 'mu', 'eta'"),
     (
         {"material": [{"name": "cork", "rho_b": 200}]},

@@ -80,6 +80,10 @@ def test_dimensionless_groups_do_not_depend_on_units(p, length, time):
     assert q.Omega_0 == pytest.approx(p.Omega_0, rel=1e-12)
 
 
+def test_nothing_has_no_sign():
+    assert str(REFERENCE.replace(omega_0=-0.0).omega_0) == "0.0"
+
+
 @pytest.mark.parametrize("name", FIELDS)
 def test_a_bad_value_is_named_with_unit_and_range(name):
     field = Parameters.__dataclass_fields__[name]
