@@ -40,7 +40,8 @@ def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
 
     Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p,
     f)``: then a theory that was exchanged is the one that is asked."""
-    result: R = _computed(function, *args, **options)  # type: ignore[arg-type]  # they can be hashed
+    # they can be hashed
+    result: R = _computed(function, *args, **options)  # type: ignore[arg-type]
     return result
 
 
@@ -75,8 +76,9 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     Refuted if one check deviates beyond its tolerance; else inconclusive if of a criterion too few
     checks are fine enough to tell, see `ENOUGH`; else not run if the claim predicts numbers and has
     none, since counts confirm no number; else inconclusive if planned numbers are lost without a
-    reason that their protocol gave; else confirmed. A check that is too coarse confirms nothing, and is
-    counted apart. Whatever a prediction raises makes the verdict an error of this claim alone."""
+    reason that their protocol gave; else confirmed. A check that is too coarse confirms nothing,
+    and is counted apart. Whatever a prediction raises makes the verdict an error of this claim
+    alone."""
     lost = lost_to(claim, records)
     left_out = Counter[Missing]()
     for each in (*lost, *(m for m in records.missing if m.protocol in claim.protocols)):

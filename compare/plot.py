@@ -44,8 +44,8 @@ def characteristic(
     """The stationary solutions of a set, omega_c over omega_0 up to the fastest, rad/s: dashed
     where unstable.
 
-    Dotted: the thresholds (84) to (88). The title warns of a fluid for which the model doesn't hold.
-    Raises `InputError` where a set has none, as without drag.
+    Dotted: the thresholds (84) to (88). The title warns of a fluid for which the model doesn't
+    hold. Raises `InputError` where a set has none, as without drag.
     """
     axes, top = _given_or_new(axes), fastest or flowmeter.top_flow(p)
     flowmeter.theory(axes, p, top)

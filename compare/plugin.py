@@ -100,7 +100,10 @@ class ExactCase(pytest.Item):
             at = ", ".join(
                 f"{e:.2g} at {1e3 * h:g} ms" for e, h in zip(found.errors, found.steps, strict=True)
             )
-            allowed = f"{self.case.about}: errors, in units of its scales, are {at}; allowed is {TOLERANCE:g}"
+            allowed = (
+                f"{self.case.about}: errors, in units of its scales, are {at}; allowed is "
+                f"{TOLERANCE:g}"
+            )
             pytest.fail(found.failure or allowed, pytrace=False)
 
     def reportinfo(self) -> tuple[Path, None, str]:

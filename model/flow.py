@@ -181,7 +181,8 @@ class Flow:
         if np.any(np.diff(t) <= 0):
             k = int(np.argmax(np.diff(t) <= 0))
             raise InputError(
-                f"flow times must increase, but sample {k + 1} is at {t[k + 1]:g} s after {t[k]:g} s"
+                f"flow times must increase, but sample {k + 1} is at {t[k + 1]:g} s after "
+                f"{t[k]:g} s"
             )
         return cls(kind, np.array(t), np.array(v), np.array(list(slope), dtype=float))
 

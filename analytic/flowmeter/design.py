@@ -184,8 +184,8 @@ def best(
 
     Among all that answer within `slowest_response`, s, the one with the largest margin at the worst
     corner of the tolerances; among equals the quickest. Differential evolution (scipy), as the
-    margin has a ridge at eta = j; the seed determines the result. `tell` is called with the fraction
-    done: of the decades by which the meters that compete are still to come together.
+    margin has a ridge at eta = j; the seed determines the result. `tell` is called with the
+    fraction done: of the decades by which the meters that compete are still to come together.
 
     Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one
     can."""

@@ -274,7 +274,8 @@ def solve_pair(
         elif sweeps >= PLAIN_SWEEPS * (1 + attempt):
             if change <= last * (BOLD if attempt % 2 else WARY):
                 span = min(span * growth, LONGEST_SPAN)
-            else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
+            # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
+            else:
                 span, growth = (
                     max(span / SHORTER, 1 / (10 + rough)),
                     max(growth**CALMER, LEAST_GROWTH),

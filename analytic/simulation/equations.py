@@ -2,8 +2,8 @@
 
 At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with
 h = 0; away from it both are written in the resting frame. `dynamics` has them for arrays of states,
-and test_coordinates holds these against it. A function writes what it finds into a list or an array that
-it is given."""
+and test_coordinates holds these against it. A function writes what it finds into a list or an array
+that it is given."""
 
 from __future__ import annotations
 
@@ -100,9 +100,27 @@ def in_case(k: Motion, case: int, side: float, line: Line, fall: Fall) -> Motion
     """The constants of the motion, changed to another case, side, line of the flow or known
     fall."""
     return Motion(
-        k.m, k.r, k.R, k.j, k.mu, k.eta, k.g, k.c, k.law, k.stokes, k.rtol, k.restitution, k.leaves, k.unit, k.spin,
-        k.waves, line, case, side, fall,
-    )  # fmt: skip
+        k.m,
+        k.r,
+        k.R,
+        k.j,
+        k.mu,
+        k.eta,
+        k.g,
+        k.c,
+        k.law,
+        k.stokes,
+        k.rtol,
+        k.restitution,
+        k.leaves,
+        k.unit,
+        k.spin,
+        k.waves,
+        line,
+        case,
+        side,
+        fall,
+    )
 
 
 def fluid(t: float, k: Motion) -> float:
@@ -125,8 +143,19 @@ def drag_rate(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
     return max(slow, blunt * speed)
 
 
-def forces(case: int, omega_c: float, v_y: float, w_x: float, c: float, lag: float, s_A: float, c_A: float, s_B: float,
-            c_B: float, k: Motion) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+def forces(
+    case: int,
+    omega_c: float,
+    v_y: float,
+    w_x: float,
+    c: float,
+    lag: float,
+    s_A: float,
+    c_A: float,
+    s_B: float,
+    c_B: float,
+    k: Motion,
+) -> tuple[float, float, float, float, float, float]:
     """Forces of floor and wall along i, j, k in the cases at the wall, N; in RR with B_y = 0.
 
     `lag` is omega_c - omega_0; s and c are sine and cosine of the directions of slip.

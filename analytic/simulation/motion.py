@@ -56,9 +56,27 @@ def of_ball(p: Parameters, flow: Flow, settings: Settings) -> Motion:
         [(amplitude, 2 * math.pi * f, phase) for amplitude, f, phase in flow.waves.tolist()]
     ).reshape(-1, 3)
     return Motion(
-        m, r, R, j, mu, eta, g, c, law, p.drag == STOKES, float(settings.rtol), float(settings.restitution), leaves,
-        unit, R / (unit * r), waves, line_of(flow, 0.0), int(Case.NN), 0.0, equations.NO_FALL,
-    )  # fmt: skip
+        m,
+        r,
+        R,
+        j,
+        mu,
+        eta,
+        g,
+        c,
+        law,
+        p.drag == STOKES,
+        float(settings.rtol),
+        float(settings.restitution),
+        leaves,
+        unit,
+        R / (unit * r),
+        waves,
+        line_of(flow, 0.0),
+        int(Case.NN),
+        0.0,
+        equations.NO_FALL,
+    )
 
 
 class Recorder:

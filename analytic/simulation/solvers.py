@@ -84,9 +84,18 @@ def _interpolate(x: float, z: Array, F: Array, out: Array) -> None:
 
 
 def _root(
-    guard: int, level: float, low: float, high: float, t: float, h: float, k: Motion, z: Array, F: Array, now: Array,
+    guard: int,
+    level: float,
+    low: float,
+    high: float,
+    t: float,
+    h: float,
+    k: Motion,
+    z: Array,
+    F: Array,
+    now: Array,
     values: Array,
-) -> float:  # fmt: skip
+) -> float:
     """Share of a step within (low, high) at which a guard falls through its level, to the last
     digit of the time.
 

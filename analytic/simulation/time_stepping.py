@@ -48,9 +48,15 @@ def run(
     ball, stretches, given = prepared(x0, theta_0, p, flow, settings, times)
     n, dt, place = len(times), float(stretches.dt[0]), (0, 0, 0.0, 0.0)
     kept = stepping.Rows(
-        np.empty((n, 8)), np.empty(n, np.int8), np.zeros(n, np.int64), np.empty((n, 9)), np.empty((AT_ONCE, 9)),
-        np.zeros(2, np.int64), math.inf, np.zeros(1, bool),
-    )  # fmt: skip
+        np.empty((n, 8)),
+        np.empty(n, np.int8),
+        np.zeros(n, np.int64),
+        np.empty((n, 9)),
+        np.empty((AT_ONCE, 9)),
+        np.zeros(2, np.int64),
+        math.inf,
+        np.zeros(1, bool),
+    )
     first = stepping.step(ball, dt, float(flow(dt / 2)), given)
     ball = ball._replace(case=first.case)
     stepping.keep_sample(ball, first.P, dt, 0.0, given, kept)

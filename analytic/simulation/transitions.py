@@ -69,9 +69,18 @@ def react(guard: int, case: int, at: HybridState, k: Motion) -> tuple[int, Hybri
             )
         c = equations.drag_rate(x.v_h, x.v_y, k.R * lag, k)
         A_x, _, A_z, _, B_y, B_z = equations.forces(
-            case, x.omega_c, x.v_y, x.slip_x, c, lag, math.sin(at.alpha), math.cos(at.alpha), math.sin(at.beta),
-            math.cos(at.beta), k,
-        )  # fmt: skip
+            case,
+            x.omega_c,
+            x.v_y,
+            x.slip_x,
+            c,
+            lag,
+            math.sin(at.alpha),
+            math.cos(at.alpha),
+            math.sin(at.beta),
+            math.cos(at.beta),
+            k,
+        )
         if guard == A_SLIPS:
             return 3 * SLIPS + B, with_directions(at, x, math.atan2(A_z, -A_x), at.beta), NOTHING
         return 3 * A + SLIPS, with_directions(at, x, at.alpha, math.atan2(-B_z, B_y)), NOTHING

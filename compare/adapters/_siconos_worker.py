@@ -97,7 +97,8 @@ class Scene:
         outward, along, upward = self.axes @ force
         self.ball.setFExtPtr(np.array([outward, along, upward - self.weight, 0.0, 0.0, 0.0]))
         self.ball.computeForces(0.0, self.ball.q(), self.ball.velocity())
-        self.ball.swapInMemory()  # a theta method takes a part of the force that is kept from before the step
+        # a theta method takes a part of the force that is kept from before the step
+        self.ball.swapInMemory()
         self.simulation.computeOneStep()
         self.simulation.nextStep()
         q, rates = self.ball.q(), self.ball.velocity()

@@ -20,7 +20,10 @@ from model.arrays import Array
 from model.kinematics import tangent
 from model.versions import ABSENT, absent, version
 
-CORNERS = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
+CORNERS = (
+    "every corner of the facets takes away some of the speed, until the wall no longer carries "
+    "the ball"
+)
 """Why a ball in facets is slow."""
 State = tuple[Any, ...]
 """Position, velocity and spin in world axes; of two bodies those of both."""
@@ -112,7 +115,10 @@ class Free(ABC):
         """`note`: what is worst, and why; `best` declares settings other than the engine's own;
         empty for those."""
         self.NAME, self.NOTE, self.best = name, note, bool(best)
-        moved = "one plane that goes with the body for a cylinder; positions half a step ahead of velocities"
+        moved = (
+            "one plane that goes with the body for a cylinder; positions half a step ahead of "
+            "velocities"
+        )
         self.DECLARED = "; ".join(
             filter(None, (moved if best else f"{FACETS} planes for a cylinder", best))
         )

@@ -207,7 +207,8 @@ class Scene:
                 f'pos="{_text(at)}" friction="0 0 0"/>'
                 for k, at in enumerate(body.parts)
             ]
-            parts.append(f"""<body name="{name}" pos="{_text(body.position)}" quat="{_text(body.orientation)}">
+            at = f'pos="{_text(body.position)}" quat="{_text(body.orientation)}"'
+            parts.append(f"""<body name="{name}" {at}>
       {joint or "<freejoint/>"}
       <inertial pos="0 0 0" mass="{body.mass}" diaginertia="{_text(body.inertia)}"/>
       {(chr(10) + "      ").join(geoms)}

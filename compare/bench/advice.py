@@ -52,7 +52,8 @@ class Change:
     @property
     def written(self) -> str:
         """The option and its value as an attribute in MJCF."""
-        return f'{self.option}="{"elliptic" if self.option == "cone" else " ".join(f"{v:g}" for v in self.value)}"'
+        numbers = " ".join(f"{v:g}" for v in self.value)
+        return f'{self.option}="{"elliptic" if self.option == "cone" else numbers}"'
 
     @property
     def mjcf(self) -> str:

@@ -141,7 +141,8 @@ def _on_slope(tangent: float, v: float, *row: str, **given: Any) -> None:
     """Add the case of a block with a speed v on a slope of this tangent."""
     angle, source = math.atan(tangent), "Coulomb's law with Newton's second, integrated by hand"
     floor = Surface("floor", MU, normal=slope(angle)[1])
-    _case(*row, block(angle), (floor,), source=source, **given)(partial(_slides_down, angle=angle, v=v))
+    add = _case(*row, block(angle), (floor,), source=source, **given)
+    add(partial(_slides_down, angle=angle, v=v))
 
 
 _on_slope(
@@ -167,15 +168,18 @@ _on_slope(
     "growing-pull", "a block under a force that grows by 10 N a second breaks away at mu m g and "
                     "then slides",
     block(), (Surface("floor", MU),),
-    wrong={"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
+    wrong={"it creeps from the first": {"mu": 0.0},
+           "static friction a tenth greater": {"grip": 1.1}},
     until=1.0, scales=(0.1, 0.5, math.inf), contacts=("R", MU * G / 10.0, "S"),
-    source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive", growth=(10.0, 0.0, 0.0))
+    source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive",
+    growth=(10.0, 0.0, 0.0))
 def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> _Motion:
     """A block pulled by a force that grows by 10 N each second: it slides once that is more than
     friction can hold."""
     late = np.maximum(t - grip * mu * G / 10.0, 0.0)
     a0 = (grip - 1) * mu * G
-    return along(WAY, a0 * late**2 / 2 + 10.0 * late**3 / 6, a0 * late + 5.0 * late**2, 0 * t, BLOCK[2] * UP)
+    return along(WAY, a0 * late**2 / 2 + 10.0 * late**3 / 6, a0 * late + 5.0 * late**2, 0 * t,
+                 BLOCK[2] * UP)
 
 
 _PUSH = G / (0.5 * MU)
@@ -202,7 +206,8 @@ def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
     "sphere-slides-rolls",
     "a sphere that is pushed off at 2 m/s without spin slides, then rolls on at 5/7 of its speed",
     sphere(), (Surface("floor", 0.2),),
-    wrong={"a hollow sphere": {"j": 2 / 3}, "friction 5 % too weak": {"mu": 0.19}, "it slides on": {"j": 1e9}},
+    wrong={"a hollow sphere": {"j": 2 / 3}, "friction 5 % too weak": {"mu": 0.19},
+           "it slides on": {"j": 1e9}},
     until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
     source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)")
 def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
@@ -266,7 +271,8 @@ def _circles_on_turntable(t: Array, j: float = J) -> _Motion:
     table's axis."""
     k = _TURNING * j / (1 + j)
     cos, sin, none = np.cos(k * t), np.sin(k * t), 0 * t
-    place, way = 0.5 * np.stack([cos, sin, none], axis=1), 0.5 * k * np.stack([-sin, cos, none], axis=1)
+    place = 0.5 * np.stack([cos, sin, none], axis=1)
+    way = 0.5 * k * np.stack([-sin, cos, none], axis=1)
     rolling = np.cross(UP, way - np.cross(_TURNING * UP, place)) / RADIUS
     return place + RADIUS * UP, way, rolling
 
@@ -294,7 +300,8 @@ def _rolls_in_cylinder(t: Array, j: float = J) -> _Motion:
     z, fall = -deep * (1 - np.cos(k * t)), -deep * k * np.sin(k * t)
     out = np.stack([np.cos(_TURNS * t), np.sin(_TURNS * t), 0 * t], axis=1)
     on = np.cross(UP, out)
-    spin = (_TURNS * z / RADIUS)[:, None] * out - _ORBIT * _TURNS / RADIUS * UP + (fall / RADIUS)[:, None] * on
+    turned = (_TURNS * z / RADIUS)[:, None] * out - _ORBIT * _TURNS / RADIUS * UP
+    spin = turned + (fall / RADIUS)[:, None] * on
     return _ORBIT * out + np.outer(z, UP), _ORBIT * _TURNS * on + np.outer(fall, UP), spin
 
 
@@ -313,7 +320,8 @@ def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> 
     Each plane of the groove carries m g cos/sqrt(2).
     """
     way, normal = slope(angle)
-    a = max(G * math.sin(angle) / (1 + lever), G * (math.sin(angle) - mu * math.cos(angle) / math.sqrt(0.5)))
+    a = max(G * math.sin(angle) / (1 + lever),
+            G * (math.sin(angle) - mu * math.cos(angle) / math.sqrt(0.5)))
     spin = a * t / (math.sqrt(0.5) * RADIUS) if lever < 9 else 0 * t
     return along(way, a * t**2 / 2, a * t, spin, RADIUS / math.sqrt(0.5) * np.array(normal))
 
@@ -339,7 +347,8 @@ _case(
     "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its "
     "friction",
     _CUBE, _groove(_PINCHED, 0.5),
-    wrong={"a threshold as on a plane": {"mu": 0.5 * math.sqrt(0.5)}, "at 0.85 of Coulomb's": {"mu": 0.425}},
+    wrong={"a threshold as on a plane": {"mu": 0.5 * math.sqrt(0.5)},
+           "at 0.85 of Coulomb's": {"mu": 0.425}},
     until=2.0, scales=SPEED_ALONE, contacts=("RR",), source=_IN_GROOVE,
 )(partial(_descends, angle=_PINCHED, lever=math.inf))
 # fmt: on

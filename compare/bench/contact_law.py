@@ -432,7 +432,10 @@ def replacements(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tupl
         own = getattr(model, f"geom_{name}")[c.geoms[0]]
         if not np.allclose(own[0], own[1]):
             first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
-            said = f"{first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): {taken} is taken"
+            said = (
+                f"{first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): "
+                f"{taken} is taken"
+            )
             yield f"{name} of two geoms", said
 
 

@@ -21,13 +21,8 @@ Table = tuple[str, list[list[str]]]
 """Its title and its rows, a head first."""
 
 
-def sentences(f: Forecast) -> Iterator[str]:
-    """A forecast in sentences: what to do, what was found when it was tried, and what else one
-    should know."""
-    short = {p.name: f"{p.name} by {100 * p.short:.0f} %" for p in f.pairs if p.short > SLIGHT}
-    sliding = [p.name for p in f.pairs if p.slides and p.name not in short]
-    rattling = [p.name for p in f.pairs if p.moves]
-    moving = [*f.settled.moving.values()]
+def _cures(f: Forecast) -> Iterator[str]:
+    """What to do, and what was found when it was tried."""
     if f.change:
         name, factor, unit = FAULTS[f.change.quantity]
         endless = "any" if f.change.quantity == "largest_step" else "∞"
@@ -35,16 +30,31 @@ def sentences(f: Forecast) -> Iterator[str]:
             _number(v, factor, endless) for v in (f.change.before, f.change.after, f.change.found)
         )
         done = "" if found == "–" else f" Tried: {found} {unit}."
-        yield f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to {after} {unit}.{done}"
+        yield (
+            f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to "
+            f"{after} {unit}.{done}"
+        )
     if f.remedy:
         yield (
             f"{'That alone does not cure' if f.change else 'No single option cures'} the creep. "
-            f"Step with "
-            "mjsim.Coulomb: what friction can hold then stays. Creep 0, depth as it is; what it "
-            "costs is not forecast."
+            "Step with mjsim.Coulomb: what friction can hold then stays. Creep 0, depth as it is; "
+            "what it costs is not forecast."
         )
+
+
+def sentences(f: Forecast) -> Iterator[str]:
+    """A forecast in sentences: what to do, what was found when it was tried, and what else one
+    should know."""
+    yield from _cures(f)
+    short = {p.name: f"{p.name} by {100 * p.short:.0f} %" for p in f.pairs if p.short > SLIGHT}
+    sliding = [p.name for p in f.pairs if p.slides and p.name not in short]
+    rattling = [p.name for p in f.pairs if p.moves]
+    moving = [*f.settled.moving.values()]
     if sliding:
-        yield f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction holds them."
+        yield (
+            f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction "
+            "holds them."
+        )
     if short:
         yield (
             "Loaded, or sliding, off the axes of MuJoCo's friction pyramid, where it is weaker "
@@ -57,28 +67,49 @@ def sentences(f: Forecast) -> Iterator[str]:
     if off := [
         p.name for p in f.pairs if abs(p.creep_measured - p.creep) > CREEP_OFF * p.creep + NOISE
     ]:
-        yield f"Creep is not what was predicted at {few(off)}: not settled yet, or the solver stops early (tolerance)."
+        yield (
+            f"Creep is not what was predicted at {few(off)}: not settled yet, or the solver "
+            "stops early (tolerance)."
+        )
     if f.settled.collapsed:
         how = "To hold it up: --ctrl, --keyframe, or in Python control."
-        yield f"Collapsed since the start: {few(f.settled.collapsed)}. The table is of how it lies. {how}"
+        yield (
+            f"Collapsed since the start: {few(f.settled.collapsed)}. The table is of how it "
+            f"lies. {how}"
+        )
     if moving:
         yield f"Not settled: {few(moving)}."
     elif not f.settled.steady:
-        yield "Speeds still change, slowly: loads, and what is forecast from them, are means over a second."
+        yield (
+            "Speeds still change, slowly: loads, and what is forecast from them, are means over "
+            "a second."
+        )
     if rattling:
-        yield f"Nothing is forecast, and what is shown are means, where bodies move or lose contact: {few(rattling)}."
+        yield (
+            "Nothing is forecast, and what is shown are means, where bodies move or lose "
+            f"contact: {few(rattling)}."
+        )
     if not (f.change or f.remedy or sliding or short or moving or rattling or f.settled.collapsed):
         yield "Nothing needs to change."
     if f.settled.asleep:
-        yield f"MuJoCo puts to sleep, so that nothing creeps till it wakes: {few(f.settled.asleep)}. Forecast awake."
+        yield (
+            "MuJoCo puts to sleep, so that nothing creeps till it wakes: "
+            f"{few(f.settled.asleep)}. Forecast awake."
+        )
     if stuck := [p.name for p in f.pairs if not p.parts]:
-        yield f"No joint can part these; they bear what the overlap they were built with asks for: {few(stuck)}."
+        yield (
+            "No joint can part these; they bear what the overlap they were built with asks for: "
+            f"{few(stuck)}."
+        )
     for kind in dict.fromkeys(kind for p in f.pairs for kind in p.replaced):
         those = [p for p in f.pairs if kind in p.replaced]
         more = f", and at {len(those) - 1} more" if len(those) > 1 else ""
         yield f"MuJoCo replaces {kind} at {those[0].name}{more}: {those[0].replaced[kind]}."
     if math.isfinite(f.largest_step):
-        yield f"The contacts are stable up to a step of {1e3 * f.largest_step:.3g} ms (now {1e3 * f.timestep:g} ms)."
+        yield (
+            f"The contacts are stable up to a step of {1e3 * f.largest_step:.3g} ms (now "
+            f"{1e3 * f.timestep:g} ms)."
+        )
     if f.flexible:
         yield f"{f.flexible} contacts of flexible bodies are left out."
 

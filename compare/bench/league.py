@@ -87,19 +87,27 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
     for name, results in ranked(league).items():
         own = [result for result in results if not result.skipped]
-        medians = [_median(r.error if math.isfinite(r.error) else math.inf for r in own if kinds[r.case] == each)
-                   for each in KINDS]  # fmt: skip
+        medians = [
+            _median(
+                r.error if math.isfinite(r.error) else math.inf
+                for r in own
+                if kinds[r.case] == each
+            )
+            for each in KINDS
+        ]
         order, cost = (_median(v for v in values if math.isfinite(v)) for values in
                        ([r.order for r in own], [r.cost for r in own]))  # fmt: skip
         floor = FLOORS[own[0].engine.precision]
-        table.append([
-            name,
-            own[0].engine.precision,
-            f"{sum(r.passed for r in own)} of {len(own)}",
-            *(number(value, floor) for value in medians),
-            "" if math.isnan(order) else f"{order:.1f}",
-            "" if math.isnan(cost) else f"{cost:.2g}",
-        ])  # fmt: skip
+        table.append(
+            [
+                name,
+                own[0].engine.precision,
+                f"{sum(r.passed for r in own)} of {len(own)}",
+                *(number(value, floor) for value in medians),
+                "" if math.isnan(order) else f"{order:.1f}",
+                "" if math.isnan(cost) else f"{cost:.2g}",
+            ]
+        )
     return table
 
 

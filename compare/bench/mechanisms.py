@@ -122,7 +122,8 @@ _STOP = _MEET + (_SPEED - _ABOVE * G * _MEET) / (_BELOW * G)
              "stop on the floor",
     block(), (Surface("floor", _BELOW),),
     wrong={"the floor doesn't feel the block": {"load": 0.0},
-           "friction between them 5 % too weak": {"above": 0.95 * _ABOVE}, "the plank is held": {"below": _ABOVE}},
+           "friction between them 5 % too weak": {"above": 0.95 * _ABOVE},
+           "the plank is held": {"below": _ABOVE}},
     until=1.2, scales=(0.2, 0.5, math.inf), contacts=("SS", _MEET, "SR", _STOP, "RR"),
     source="Coulomb's law and Newton's third: m mu g drives the plank, mu' (m + M) g brakes it",
     under=_plate(_HEAVIER, 0.0, _PLANK), between=_ABOVE)
@@ -142,7 +143,8 @@ def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float
     v, w = _SPEED - above * G * early - brake * late, a * early - brake * late
     height = _PLANK[2] * UP
     up = 2 * height + BLOCK[2] * UP
-    return *along(WAY, ours + after, v, 0 * t, up - 0.3 * WAY), *along(WAY, theirs + after, w, 0 * t, height)
+    return *along(WAY, ours + after, v, 0 * t,
+                  up - 0.3 * WAY), *along(WAY, theirs + after, w, 0 * t, height)
 
 
 _LEAN = math.atan(0.9 * 0.5)
@@ -163,7 +165,8 @@ def _stays(t: Array, mu: float = 0.5) -> _Motion:
     a = max(G * (math.sin(_LEAN) - mu * math.cos(_LEAN)), 0.0)
     under, half = 0.1, 0.2
     low, high = under * np.array(normal), (2 * under + half) * np.array(normal)
-    return *along(way, a * t**2 / 2, a * t, 0 * t, high), *along(way, a * t**2 / 2, a * t, 0 * t, low)
+    return *along(way, a * t**2 / 2, a * t, 0 * t,
+                  high), *along(way, a * t**2 / 2, a * t, 0 * t, low)
 
 
 _INCLINE, _DOWNHILL = math.atan(0.3), 0.8
@@ -173,7 +176,8 @@ _INCLINE, _DOWNHILL = math.atan(0.3), 0.8
 @_case(
     "belt", "a block slides down an inclined belt that runs up, stops and is carried off by it",
     block(_INCLINE),
-    (Surface("belt", 0.5, normal=slope(_INCLINE)[1], velocity=tuple((-slope(_INCLINE)[0]).tolist())),),
+    (Surface("belt", 0.5, normal=slope(_INCLINE)[1],
+             velocity=tuple((-slope(_INCLINE)[0]).tolist())),),
     wrong={"the belt stands": {"belt": 1e-9}, "friction 5 % too strong": {"mu": 1.05 * 0.5}},
     until=2.0, scales=(0.5, 0.5, math.inf),
     contacts=("S", (_DOWNHILL + 1.0) / (G * (0.5 * math.cos(_INCLINE) - math.sin(_INCLINE))), "R"),
@@ -184,7 +188,8 @@ def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
     a = G * (mu * math.cos(_INCLINE) - math.sin(_INCLINE))
     slid = np.minimum(t, (_DOWNHILL + belt) / a)
     s = _DOWNHILL * slid - a * slid**2 / 2 - belt * (t - slid)
-    return along(slope(_INCLINE)[0], s, _DOWNHILL - a * slid, 0 * t, BLOCK[2] * np.array(slope(_INCLINE)[1]))
+    return along(slope(_INCLINE)[0], s, _DOWNHILL - a * slid, 0 * t,
+                 BLOCK[2] * np.array(slope(_INCLINE)[1]))
 
 
 @_case(
@@ -253,8 +258,10 @@ def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _M
         begin, side, first = peak + quarter, -side, False
         risen = kept**2 * (math.cos(alpha - top) - math.cos(alpha))  # of the centre, divided by arm
         top = alpha - math.acos(math.cos(alpha) + risen)
-    tilt = np.sign(angle) * alpha - angle  # of the way from the edge to the centre, from the vertical
-    place = np.stack([np.sign(angle) * _HALF[0] - arm * np.sin(tilt), 0 * t, arm * np.cos(tilt)], axis=1)
+    # of the way from the edge to the centre, from the vertical
+    tilt = np.sign(angle) * alpha - angle
+    place = np.stack([np.sign(angle) * _HALF[0] - arm * np.sin(tilt), 0 * t, arm * np.cos(tilt)],
+                     axis=1)
     velocity = np.stack([arm * np.cos(tilt) * rate, 0 * t, arm * np.sin(tilt) * rate], axis=1)
     return place, velocity, np.outer(rate, [0.0, 1.0, 0.0])
 
@@ -272,10 +279,12 @@ def _bounces(t: Array, share: float = 0.7, drop: float = 1.8) -> _Motion:
     while begin < t[-1]:
         speed *= share
         since = t - begin
-        z, v = np.where(since < 0, z, speed * since - G * since**2 / 2), np.where(since < 0, v, speed - G * since)
+        z, v = np.where(since < 0, z,
+                        speed * since - G * since**2 / 2), np.where(since < 0, v, speed - G * since)
         begin += 2 * speed / G
     none = 0 * t
-    return np.stack([none, none, 0.1 + z], axis=1), np.stack([none, none, v], axis=1), np.zeros((len(t), 3))
+    return np.stack([none, none, 0.1 + z],
+                    axis=1), np.stack([none, none, v], axis=1), np.zeros((len(t), 3))
 
 
 _RADIUS, _THICK, _TILT = 0.2, 0.02, math.radians(80)
@@ -285,7 +294,8 @@ _ACROSS = _RADIUS**2 / 4 + _THICK**2 / 3
 
 @_case(
     "rolling-disc", "a disc that leans rolls on its rim, round and round",
-    {"shape": "disc", "size": (_RADIUS, _THICK), "mass": 1.0, "inertia": (_ACROSS, _ACROSS, _RADIUS**2 / 2),
+    {"shape": "disc", "size": (_RADIUS, _THICK), "mass": 1.0,
+     "inertia": (_ACROSS, _ACROSS, _RADIUS**2 / 2),
      "orientation": (math.cos(_TILT / 2), 0.0, math.sin(_TILT / 2), 0.0)},
     (Surface("floor", 0.5),),
     wrong={"inertia of a ring": {"ring": 1.0}, "no thickness": {"half": 0.0},

@@ -113,7 +113,10 @@ def read(path: Path) -> Native:
             "conaffinity meet its own, and contacts switched on"
         )
     missing, other = ("floor", "wall") if walls else ("wall", "floor")
-    note = f"{path}: there is no {missing} that the ball can touch; the contact with its {other} stands for both"
+    note = (
+        f"{path}: there is no {missing} that the ball can touch; the contact with its {other} "
+        "stands for both"
+    )
     option = {name: getattr(model.opt, name) for name in OPTIONS}
     for name, allowed in OPTIONS.items():
         check_number(f"{path}: {name}", option[name], "1", allowed)

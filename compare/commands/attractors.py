@@ -256,7 +256,10 @@ def run_basins(args: argparse.Namespace) -> int:
             f"{attractor:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to "
             f"{100 * high:.1f} %)"
         )
-    where = f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
+    where = (
+        f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a "
+        f"boundary: {differ}"
+    )
     data = {"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}
     options.show(data, args.json, *said, *([where] if args.mujoco else []))
     return 0

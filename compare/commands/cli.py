@@ -1,7 +1,8 @@
 """The program ``dualball``: one command line for everything. Commands are declared in `parsers`.
 
 Exit codes: 0 done and as expected, 1 a verdict on the engine on trial failed, a run broke down or
-a design doesn't reach its fastest flow, 2 a mistake in what was asked, 130 interrupted by Ctrl-C, 143 by SIGTERM."""
+a design doesn't reach its fastest flow, 2 a mistake in what was asked, 130 interrupted by Ctrl-C,
+143 by SIGTERM."""
 
 from __future__ import annotations
 

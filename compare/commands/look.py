@@ -110,4 +110,5 @@ def explore(args: argparse.Namespace) -> int:
     from compare.view import explore as served  # here, because nothing else needs it
 
     served.serve(options.parameters(args), args.port, not args.no_browser)
-    raise KeyboardInterrupt  # it ends by a signal alone, which the server's loop keeps to itself now and then
+    # it ends by a signal alone, which the server's loop keeps to itself now and then
+    raise KeyboardInterrupt

@@ -85,7 +85,8 @@ def in_words(found: list[Fit], best: Fit | None, name: str, flow: Array, read: A
         "combination of μ and η.",
         f"Flow: the fluid turns with {factor}{', by theory 1' * (name == 'omega_0')}.",
         f"Told: {alone if best else 'no parameter by itself'}.",
-        f"Theory is off by {off[0]} before the kink, where any theory fits, and by {off[1]} beyond.",
+        f"Theory is off by {off[0]} before the kink, where any theory fits, and by {off[1]} "
+        "beyond.",
     ]
 
 

@@ -357,7 +357,8 @@ def add_engine_name(parser: argparse._ActionsContainer, default: str | None, usu
     """The option that chooses an engine; `usual` says what is if none is named."""
     known = (
         "mujoco is under Coulomb's law, mujoco-plain isn't, mujoco-defaults is MuJoCo as it comes; "
-        f"others: mujoco-free, event, time-stepping, siconos, and NAME or NAME-defaults of {FOREIGN} "
+        "others: mujoco-free, event, time-stepping, siconos, and NAME or NAME-defaults of "
+        f"{FOREIGN} "
         f"({usual})"
     )
     parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
@@ -416,7 +417,10 @@ def add_verdicts(parser: Parser) -> None:
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
     """Options that choose a parameter set and change some of its values."""
-    what = "a set, and values that replace its own, as --mu 0.3 --omega-0 25: 'dualball parameters' tells of each"
+    what = (
+        "a set, and values that replace its own, as --mu 0.3 --omega-0 25: 'dualball parameters' "
+        "tells of each"
+    )
     group = parser.add_argument_group("parameters", what)
     source = group.add_mutually_exclusive_group()
     source.add_argument(

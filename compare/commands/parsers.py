@@ -166,7 +166,10 @@ def simulate(parser: Parser) -> None:
 @command("the ball", "look.inspect", "run.h5 --plot run.png")
 def inspect(parser: Parser) -> None:
     """What a trajectory file holds; or how a claim comes to its verdict."""
-    what = "a run, or a collection of 'dualball collect'; of a claim the directory of a validation (default: results)"
+    what = (
+        "a run, or a collection of 'dualball collect'; of a claim the directory of a validation "
+        "(default: results)"
+    )
     parser.add_argument("file", type=Path, nargs="?", help=what)
     chain = (
         "the chain of a claim: statement, measurement, numbers, verdict, each with file and line"
@@ -407,7 +410,10 @@ def league(parser: Parser) -> None:
         "newton-semiimplicit-defaults, newton-vbd-defaults"
     )
     parser.add_argument("--engine", action="append", metavar="NAME", help=named)
-    mine = "MuJoCo with the options of an MJCF file and the contacts of its ball, too; beside it MuJoCo alone"
+    mine = (
+        "MuJoCo with the options of an MJCF file and the contacts of its ball, too; beside it "
+        "MuJoCo alone"
+    )
     parser.add_argument("--settings", type=Path, metavar="FILE.xml", help=mine)
     options.add_processes(parser)
     options.add_directory(parser, "results")

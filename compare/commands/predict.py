@@ -57,7 +57,10 @@ def show_parameters(args: argparse.Namespace) -> int:
     shown.add_row("--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}")
     others = [name for name in Parameters.names() if args.parameters or name != args.set]
     own = f"Values of {args.parameters or args.set}; other sets: {', '.join(others)}."
-    toml = "A file of your own for --parameters: TOML, a line NAME = value each, named as in the options (omega_0)."
+    toml = (
+        "A file of your own for --parameters: TOML, a line NAME = value each, named as in the "
+        "options (omega_0)."
+    )
     options.show(
         {"parameters": rows, "drag": p.drag, "sets": Parameters.names()},
         args.json,
@@ -142,7 +145,10 @@ def reading(p: Parameters) -> str:
     if len(cases) == 1 and cases[0] not in (Case.SR, Case.NR):
         lag = 1 - attractors[0].state.omega_c / p.omega_0
         return f"the ball slips ({cases[0].name}) and lags {100 * lag:.1f} % behind the fluid"
-    return f"ambiguous: {', '.join(c.name for c in cases)} all attract, the reading depends on the history"
+    return (
+        f"ambiguous: {', '.join(c.name for c in cases)} all attract, the reading depends on the "
+        "history"
+    )
 
 
 def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
@@ -192,8 +198,9 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     ]
     remarks += filter(None, [torque_left_out(p)])
     if data["fluid_inertia"]:
+        rate = "the rate at which rolling follows the flow"
         shifts = ", ".join(
-            f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "
+            f"{QUANTITIES[name].symbol if name in QUANTITIES else rate} "
             f"by {float(f'{100 * shift:.2g}'):+g} %"
             for name, shift in data["fluid_inertia"].items()
             if math.isfinite(shift)

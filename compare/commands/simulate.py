@@ -20,8 +20,19 @@ from model.files import reading_json, write_text
 
 DURATION = 10.0
 """Of a run, s, unless asked otherwise."""
-_TOLD_APART = ("vary", "random", "seed", "direction", "start", "time", "timestep", "rtol", "restitution",
-               "sample_interval", "means_only")  # fmt: skip
+_TOLD_APART = (
+    "vary",
+    "random",
+    "seed",
+    "direction",
+    "start",
+    "time",
+    "timestep",
+    "rtol",
+    "restitution",
+    "sample_interval",
+    "means_only",
+)
 """Options by which sweeps differ, beside engine and parameters."""
 
 

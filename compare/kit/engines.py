@@ -36,8 +36,8 @@ class Role(Enum):
     AS_IT_COMES = auto()
     """With its own settings and step, beside the one on trial."""
     FREE_BODY = auto()
-    """The ball as a free body, beside the one on trial, above the quick level: what its joints could
-    be to blame for."""
+    """The ball as a free body, beside the one on trial, above the quick level: what its joints
+    could be to blame for."""
 
 
 AnySettings = RigidContacts | ContactSettings | analytic.Settings | vessel.Settings
@@ -281,7 +281,8 @@ def engine(name: str) -> Engine:
     name = "event" if name == "analytic" else name
     if name not in ENGINES:
         raise InputError(
-            f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are {few(ENGINES, MOST_NAMES)}"
+            f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are "
+            f"{few(ENGINES, MOST_NAMES)}"
         )
     return ENGINES[name]
 

@@ -52,7 +52,8 @@ class Sampling:
     granted: bool = (
         False  # whether the ends between which something is looked for are taken for granted
     )
-    slow: bool = True  # whether that is measured that takes long: sinking next to the least flow that holds, folds
+    # whether that is measured that takes long: sinking next to the least flow that holds, folds
+    slow: bool = True
 
     # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are
     # longer, because a ball on the wall that goes on from its mean swings again, if less, and that
@@ -164,14 +165,16 @@ OWN_STEPS = replace(
     # the same run twice: all numbers are extrapolated to no step from several steps
     AT_QUICK, halves=(2, 2), granted=True, slow=False,
     settling_rounds=(0.45, 1.0, 1.0), settling_steps=512,
-    settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))), settled_loose=100.0,
+    settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))),
+    settled_loose=100.0,
     settled_divisor=1,
     thresholds_width=5e-4, thresholds_loose=1e4, thresholds_rounds=(0.4, 1.0),
     plane_rounds=(1.0, 2.0),
     hysteresis_hold=15.0, hysteresis_parts=1,
     unsteady_lasts=24.0, unsteady_divisors=(2, 2), unsteady_ramps=(1, 1), unsteady_rates=(4e-2,),
     # where friction creeps, slip counts as such later
-    pulsation_octaves=(3,), pulsation_steps=256, pulsation_samples=512, pulsation_divisor=1, pulsation_reach=1.5,
+    pulsation_octaves=(3,), pulsation_steps=256, pulsation_samples=512, pulsation_divisor=1,
+    pulsation_reach=1.5,
     pulsation_width=2e-3,
     rates_divisors=(16, 16), rates_leaning=(16, 16), rates_more=0.5,
     bounds_divisor=1,

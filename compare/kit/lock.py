@@ -41,7 +41,10 @@ class Lock:
                 print(f"dualball: {why}: start no second program there", file=sys.stderr)
             try:
                 if self._path.stat().st_ino == os.fstat(self._file.fileno()).st_ino:
-                    owner = f"process {os.getpid()} on {platform.node()}, since {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+                    owner = (
+                        f"process {os.getpid()} on {platform.node()}, since "
+                        f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+                    )
                     self._file.truncate(0)
                     self._file.write(owner.encode())
                     return

@@ -179,7 +179,8 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
                         found[name] = future.result()
                         yield known[name], future.result()
                     elif isinstance(error, StorageError) or not isinstance(error, Exception):
-                        raise error  # a full disk, or a file that was touched, is for the user to mend
+                        # a full disk, or a file that was touched, is for the user to mend
+                        raise error
                     else:
                         broken[name] = error
                         yield known[name], error

@@ -3,7 +3,8 @@ required of a check of it.
 
 A check has the resolution r if it would notice a prediction that is off by r times the quantity's
 scale, see `compare.claim`. A check with less than `Quantity.resolution` is inconclusive, however
-well the numbers agree. Required resolutions follow from the errors of each protocol at its quick level:
+well the numbers agree. Required resolutions follow from the errors of each protocol at its quick
+level:
 
 * settled states don't depend on the time step: what is left is their drift, which is waited for
   down to 1e-8. A slip is a difference of spins ten times its size, a force one of accelerations;

@@ -291,8 +291,8 @@ _PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     """Write records, whole or not at all; `about` says whose they are (JSON-able, see `Origin`).
 
-    A condition or a cause of error that a row doesn't have is nan, or empty where it is text. Raises
-    `StorageError`.
+    A condition or a cause of error that a row doesn't have is nan, or empty where it is text.
+    Raises `StorageError`.
     """
     rows = records.measurements
     columns: dict[str, Sequence[Any]] = {"row": range(len(rows))}

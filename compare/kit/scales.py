@@ -1,4 +1,5 @@
-"""Natural sizes, by which deviations and uncertainties are divided: functions of a parameter set."""
+"""Natural sizes, by which deviations and uncertainties are divided: functions of a parameter
+set."""
 
 from __future__ import annotations
 

@@ -40,8 +40,8 @@ STEPS_A_SAMPLE = 8
 that."""
 SOLVED = 2e-11
 """Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a
-time 1/c. (Twenty times what it was before settled states of rigid contacts had been seen, which creep
-by as much.)"""
+time 1/c. (Twenty times what it was before settled states of rigid contacts had been seen, which
+creep by as much.)"""
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
 """What mechanics determine of the forces where both contacts roll: the rest is a family of one
@@ -184,7 +184,10 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
         excess, failure = max(drifting, swings / 1e-3), ""
         if counts.max() < 0.98 * length and loose < math.inf:
             excess = math.inf
-            failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
+            failure = (
+                f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the "
+                "last samples)"
+            )
         elif max(excess, solving) > loose:
             way = "drifts" if max(drifting, solving) > loose else "swings"
             failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
@@ -195,8 +198,8 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
 def settle_finer(
     runner: Runner, states: Sequence[SteadyState], criteria: SettlingCriteria = SettlingCriteria()
 ) -> list[SteadyState]:
-    """The same states with the time step divided by `Sampling.settled_divisor`, each from its mean and
-    the height from which it started; as they are where that is one."""
+    """The same states with the time step divided by `Sampling.settled_divisor`, each from its mean
+    and the height from which it started; as they are where that is one."""
     divisor = runner.sampling.settled_divisor
     if divisor == 1:
         return list(states)
@@ -210,13 +213,13 @@ def settle_finer(
 def with_changes(
     value: Estimate, change: float, p: Parameters, size: float, divisor: float
 ) -> Estimate:
-    """A value of a settled state, of which half the step and other starts change so much; `size` is its
-    natural size, and it has so many time steps in a coarse one.
+    """A value of a settled state, of which half the step and other starts change so much; `size` is
+    its natural size, and it has so many time steps in a coarse one.
 
-    Errors of solving for forces add up from step to step, for a time 1/c. What adds up with one sign
-    is twice as much with half the step, so that it is about twice the change; what adds up at random
-    the change may not show. Both take the place of what `judge_run` allows for them. (The second was
-    added after a round played blind, where two claims were refuted without it.)"""
+    Errors of solving for forces add up from step to step, for a time 1/c. What adds up with one
+    sign is twice as much with half the step, so that it is about twice the change; what adds up at
+    random the change may not show. Both take the place of what `judge_run` allows for them. (The
+    second was added after a round played blind, where two claims were refuted without it.)"""
     if divisor == 1:
         return value.also(start=change)
     return estimate(

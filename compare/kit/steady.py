@@ -1,4 +1,5 @@
-"""What a run comes to, and how far it may still be from there: a motion that hasn't settled says so.
+"""What a run comes to, and how far it may still be from there: a motion that hasn't settled says
+so.
 
 A mean over the last quarter is free of swings, and its drift tells how far it has to go, as long as
 some of the way is seen. Of a ball that takes minutes seconds show almost none: no limit is taken to
@@ -43,7 +44,8 @@ def time_constant(p: Parameters, state: analytic.StationarySolution) -> float:
 
 def enough(sets: Sequence[Parameters]) -> tuple[float, float]:
     """How long a run of the slowest of these sets should last for its last quarter to be within
-    `DRIFT` of the limit, rounded up, and its time constant, both in s; of many sets some are asked."""
+    `DRIFT` of the limit, rounded up, and its time constant, both in s; of many sets some are
+    asked."""
     some = sets[:: math.ceil(len(sets) / SETS_ASKED)]
     states = ((p, state) for p in some if p.c for state in analytic.stable_solutions(p))
     slowest = max((time_constant(p, state) for p, state in states), default=0.0)

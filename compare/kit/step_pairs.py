@@ -99,18 +99,19 @@ def carry_out(
 
 
 EXTRAPOLATION, DOUBT = 1 / 2, 1 / math.sqrt(12)
-"""By how much the limit of a vanishing step lies beyond the run with half the step, and its standard
-uncertainty, in differences of the two runs.
+"""By how much the limit of a vanishing step lies beyond the run with half the step, and its
+standard uncertainty, in differences of the two runs.
 
-The error of the finer run is as large as the difference if it is of first order in the step, a third
-of it if of second, and next to none where it is what is left of the start: contacts forget that by a
-factor in each step (`ContactSettings.contact_decay`, up to 0.95), and twice the steps forget much
-more. So it is anything between none and all of the difference: a uniform distribution."""
+The error of the finer run is as large as the difference if it is of first order in the step, a
+third of it if of second, and next to none where it is what is left of the start: contacts forget
+that by a factor in each step (`ContactSettings.contact_decay`, up to 0.95), and twice the steps
+forget much more. So it is anything between none and all of the difference: a uniform
+distribution."""
 
 
 def of_no_step(coarse: float, fine: Estimate) -> Estimate:
-    """The limit of a vanishing step of a number that is a smooth function of it, from the values with
-    a step and with half of it."""
+    """The limit of a vanishing step of a number that is a smooth function of it, from the values
+    with a step and with half of it."""
     change = fine.value - coarse
     return replace(fine, value=fine.value + change * EXTRAPOLATION).also(
         time_step=abs(change) * DOUBT
@@ -123,8 +124,8 @@ def unlike(changes: Array) -> Array:
 
     A change is a sum of parts of first order and of what is left of the start. Where they cancel by
     chance it is little, but what is left of them once the step is extrapolated isn't; and equations
-    couple the numbers, so that their parts are of like size. (A quarter was chosen after results had
-    been seen: with a tenth 3 of 2104 numbers were off by more than three uncertainties.)"""
+    couple the numbers, so that their parts are of like size. (A quarter was chosen after results
+    had been seen: with a tenth 3 of 2104 numbers were off by more than three uncertainties.)"""
     sizes = np.abs(changes)
     return np.asarray(np.hypot(sizes, sizes.max(initial=0.0) / 4))
 

@@ -149,14 +149,20 @@ def marks(states: Sequence[Measurement]) -> str:
         if between
         else ""
     )
-    said += f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the mark is larger."
+    said += (
+        f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the "
+        "mark is larger."
+    )
     most = max(abs(m.value) for m in states)
     if any(COVERAGE * m.uncertainty > LONGEST_BAR * most for m in states):
         said += f" Pale: known to no better than {LONGEST_BAR:.0%} of the axis, without a bar."
     if alone := dict.fromkeys(m.engine for m in states if ENGINES[m.engine].divisors != (1,)):
         steps = sorted({500 * coarse_step(m.parameters) for m in states if m.engine in alone})
         at = " or ".join(f"{step:g}" for step in steps)
-        said += f" {' and '.join(alone)}: as measured with a time step of {at} ms, not in the zero-step limit."
+        said += (
+            f" {' and '.join(alone)}: as measured with a time step of {at} ms, not in the "
+            "zero-step limit."
+        )
     return said
 
 

@@ -1,7 +1,8 @@
 """Deviations from theory in standard uncertainties: are the uncertainties what they say?
 
-Of numbers whose errors are normally distributed 32 % lie beyond one standard uncertainty, 5 % beyond
-two and .3 % beyond three; of an error that may be anything within bounds 42 %, and none beyond two."""
+Of numbers whose errors are normally distributed 32 % lie beyond one standard uncertainty, 5 %
+beyond two and .3 % beyond three; of an error that may be anything within bounds 42 %, and none
+beyond two."""
 
 from __future__ import annotations
 

@@ -127,8 +127,8 @@ def described(verdict: Verdict) -> dict[str, Any]:
 
 
 def _outcome(verdict: Verdict) -> dict[str, Any]:
-    """A verdict in numbers, without its checks: outcome, counts, resolving power, what each engine says;
-    JSON-able."""
+    """A verdict in numbers, without its checks: outcome, counts, resolving power, what each engine
+    says; JSON-able."""
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
     counts = {
         name: sum(getattr(check, name) for check in verdict.checks)

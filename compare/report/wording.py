@@ -60,9 +60,8 @@ def conditions(of: Mapping[str, Condition]) -> str:
         if isinstance(each, str):
             said.append(each if name == "side" else f"{plain} {each}")
         elif each or name not in ("y", "v_y", "h", "v_h", "slip_x", "slip_y", "slip_z"):
-            said.append(
-                f"{SYMBOLS.get(name, plain)} = {each:.4g} {readable(_UNITS.get(name, '1'))}".rstrip()
-            )
+            unit = readable(_UNITS.get(name, "1"))
+            said.append(f"{SYMBOLS.get(name, plain)} = {each:.4g} {unit}".rstrip())
     return ", ".join(said)
 
 

@@ -1,4 +1,5 @@
-"""The nine kinematic cases by picture and in words: seen along the orbit, floor below, wall right."""
+"""The nine kinematic cases by picture and in words: seen along the orbit, floor below, wall
+right."""
 
 from __future__ import annotations
 

@@ -60,8 +60,10 @@ SLIDERS: dict[str, tuple[str, float, float, float]] = {
 """Text, range and step of each."""
 SYMBOLS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄"}
 LIMITS = (
-    "The model is the paper's: a rigid ball with Coulomb's friction in a fluid that turns like a rigid "
-    "body. Left out are rolling resistance, the fluid's inertia and its torque on the spinning ball. "
+    "The model is the paper's: a rigid ball with Coulomb's friction in a fluid that turns like "
+    "a rigid "
+    "body. Left out are rolling resistance, the fluid's inertia and its torque on the spinning "
+    "ball. "
     "In water or oil that torque changes the numbers by tens of per cent."
 )
 """What a user of the page may not take from it."""
@@ -155,8 +157,18 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     }
     annotations = [label | {"x": at, "text": str(typeset(SYMBOLS[name]))} for name, at in shown]
     cells = np.linspace(0.0, fastest, 81).tolist()
-    data.insert(0, {"type": "heatmap", "x": cells, "y": cells, "z": _as_bytes(np.zeros((81, 81))), "opacity": 0.0,
-                    "showscale": False, "hoverinfo": "none"})  # fmt: skip
+    data.insert(
+        0,
+        {
+            "type": "heatmap",
+            "x": cells,
+            "y": cells,
+            "z": _as_bytes(np.zeros((81, 81))),
+            "opacity": 0.0,
+            "showscale": False,
+            "hoverinfo": "none",
+        },
+    )
     return _figure(
         data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, shapes=shapes, annotations=annotations
     )
@@ -186,8 +198,14 @@ def regions(p: Parameters, fastest: float) -> Figure:
         "colorscale": colours, "zmin": -0.5, "zmax": len(kinds) - 0.5, "showscale": False,
         "hovertemplate": "η %{x:.2f}, ω₀ %{y:.1f} rad/s<extra></extra>",
     }  # fmt: skip
-    return _figure([heat, _cross(p.eta, p.omega_0)], "friction of the wall η", "ω₀ (rad/s)", eta[-1], fastest,
-                   annotations=names_at)  # fmt: skip
+    return _figure(
+        [heat, _cross(p.eta, p.omega_0)],
+        "friction of the wall η",
+        "ω₀ (rad/s)",
+        eta[-1],
+        fastest,
+        annotations=names_at,
+    )
 
 
 def _as_bytes(cells: npt.NDArray[Any]) -> dict[str, str]:
@@ -334,7 +352,8 @@ def _heading(ui: Any) -> None:
     ui.html("<h1>A ball that a fluid takes round in a vessel</h1>", sanitize=False).classes("title")
     about = (
         "It touches the floor and the wall. A case has a letter for each: R rolls, S slips, N does "
-        "not touch. Left: move a slider. Middle: which steady motions theory has. Right: the motion, "
+        "not touch. Left: move a slider. Middle: which steady motions theory has. Right: the "
+        "motion, "
         "simulated anew. The address holds what you set: to share it, copy the link."
     )
     ui.html(f"<p>{about}</p><p>{LIMITS}</p>", sanitize=False).classes("text-sm about")
@@ -458,7 +477,10 @@ def _theory(ui: Any, tab: Tab, draw: list[Callable[[], None]], follow: Callable[
             plot.update_figure(figures[name]())
 
     draw.append(redraw)
-    hint = "A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η and ω₀."
+    hint = (
+        "A click on the curve starts the ball at that ω_c in that flow; one on the map chooses η "
+        "and ω₀."
+    )
     ui.html(typeset(hint), sanitize=False)
 
 

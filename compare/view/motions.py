@@ -89,7 +89,10 @@ def table(about: dict[str, Any]) -> Table:
     units = {
         field.name: pages.readable(field.metadata["unit"]) for field in Parameters.quantities()
     }
-    told = f"{flow.kind}, ω₀ from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
+    told = (
+        f"{flow.kind}, ω₀ from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within "
+        f"{flow.start[-1]:g} s"
+    )
     if flow.is_steady:
         told = f"steady, ω₀ = {flow.value[0]:g} rad/s"
     elif len(flow.waves):

@@ -181,5 +181,5 @@ figure.legend(*loads.get_legend_handles_labels(), loc="outside upper center", nc
 plt.show()
 
 # %% [markdown]
-# [The forecast](../forecast.md) has the formulas, [Coulomb's law in MuJoCo](../friction.md) the law, and says
-# where it ends.
+# [The forecast](../forecast.md) has the formulas, [Coulomb's law in MuJoCo](../friction.md) the
+# law, and says where it ends.

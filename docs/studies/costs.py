@@ -153,7 +153,10 @@ def growth() -> Rows:
     with tempfile.TemporaryDirectory() as directory:
         for count in (1000, 10_000, MOST):
             runs, table = Path(directory) / str(count), Path(directory) / f"{count}.h5"
-            vary = f"sweep --vary omega_0=5:45:{count} --time 0.1 --means-only --quiet --workers 0 -o {runs}"
+            vary = (
+                f"sweep --vary omega_0=5:45:{count} --time 0.1 --means-only --quiet --workers 0 "
+                f"-o {runs}"
+            )
             taken = [
                 _spent([*PROGRAM, *words.split()])
                 for words in (vary, f"collect {runs} -o {table} --workers 0")

@@ -493,7 +493,8 @@ def pile(seed: int, mixed: bool) -> Any:
         x, y = rng.uniform(-0.1, 0.1, 2)
         kind = rng.choice(["box", "capsule", "ellipsoid", "cylinder", "sphere"]) if mixed else "box"
         q, s = (" ".join(map(str, values)) for values in (turn / np.linalg.norm(turn), size))
-        bodies += f'<body pos="{x} {y} {0.1 + 0.12 * k}" quat="{q}"><freejoint/><geom type="{kind}" size="{s}"/></body>'
+        geom = f'<freejoint/><geom type="{kind}" size="{s}"/>'
+        bodies += f'<body pos="{x} {y} {0.1 + 0.12 * k}" quat="{q}">{geom}</body>'
     return mujoco.MjModel.from_xml_string(
         '<mujoco><option cone="elliptic"/><default><geom friction=".6"/></default><worldbody>'
         f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
@@ -559,9 +560,14 @@ def piles() -> Rows:
 
 
 TABLES: dict[str, Callable[[], Rows]] = {
-    "holding": holding, "sliding": sliding, "landing": landing, "costs": costs, "choices": choices, "servo": servo,
+    "holding": holding,
+    "sliding": sliding,
+    "landing": landing,
+    "costs": costs,
+    "choices": choices,
+    "servo": servo,
     "piles": piles,
-}  # fmt: skip
+}
 
 
 if __name__ == "__main__":

@@ -15,16 +15,22 @@ from tests.mutants.trial import KINDS, PATIENCE, Judged, Trial, name_of
 
 BY_HAND = {
     "SS whose wall never opens": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
-    "a floor without load that is never lost": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "a floor without load that is never lost": (
+        "analytic/test_hybrid::test_a_case_ends_where_its_forces_do"
+    ),
     "NR that slips by B_y alone": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
     "RN's slip limit 5 % late": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
-    "onset of slip that isn't mirrored": "analytic/test_choice::test_never_beyond_what_forces_can_hold_and_continuous_"
-    "where_it_ends",
-    "the fluid's spin with the wrong sign of ω₀": "analytic/test_real_fluid::test_rolling_with_the_torque_obeys_newton_"
-    "and_euler",
+    "onset of slip that isn't mirrored": (
+        "analytic/test_choice::test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends"
+    ),
+    "the fluid's spin with the wrong sign of ω₀": (
+        "analytic/test_real_fluid::test_rolling_with_the_torque_obeys_newton_and_euler"
+    ),
     "shares of starts by the normal distribution": "compare/test_basins::test_intervals_of_shares",
     "a return map without its section": "analytic/test_orbits::test_newton_closes_the_orbit",
-    "a pinch at 0.95 of the friction": "compare/test_cases::test_rest_needs_the_share_of_friction_that_is_said",
+    "a pinch at 0.95 of the friction": (
+        "compare/test_cases::test_rest_needs_the_share_of_friction_that_is_said"
+    ),
 }
 """Faults in compiled code and in methods, put in by hand, and the test that saw each."""
 OTHERS = (
@@ -33,8 +39,8 @@ OTHERS = (
     ("by a referee, `tests/mutants/referee.py` of aa5b007", 80, 67, 0, 1, 12),
     ("by a second one, `tests/mutants/umpire.py` of ca3cac1", 80, 63, 0, 3, 14),
 )
-"""Lists of wrong theories that others wrote, each judged once, at quick, before anything was changed
-for it: faults, and how many were noticed in which way of `KINDS`."""
+"""Lists of wrong theories that others wrote, each judged once, at quick, before anything was
+changed for it: faults, and how many were noticed in which way of `KINDS`."""
 
 
 def write(
@@ -60,11 +66,11 @@ def page(tried: Mapping[str, Sequence[Trial]], engines: Sequence[Trial] = ()) ->
 Every verdict must be able to be lost: theory is replaced by slightly wrong ones, one at a time, and
 stored measurements are judged again by the claims whose predictions call the function that is
 wrong; then MuJoCo is replaced by slightly wrong engines, which measure anew. A fault is noticed if
-the verdict on a claim changes; a prediction that takes longer than {PATIENCE:g} s of processor time is given
-up, and its claim says nothing of the fault. Lists that others wrote say more than ours, which was
-written beside the claims: each of theirs was judged once, at quick, before anything was changed for
-it. Who notices which fault, and the unit test that sees what no measurement can show, is in
-[mutants.csv](mutants.csv). `make mutants` writes both.
+the verdict on a claim changes; a prediction that takes longer than {PATIENCE:g} s of processor time
+is given up, and its claim says nothing of the fault. Lists that others wrote say more than ours,
+which was written beside the claims: each of theirs was judged once, at quick, before anything was
+changed for it. Who notices which fault, and the unit test that sees what no measurement can show,
+is in [mutants.csv](mutants.csv). `make mutants` writes both.
 
 {pages.markdown([head, *counts, *others])}
 """

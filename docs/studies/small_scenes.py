@@ -247,7 +247,8 @@ def tendon(way: Way) -> Found:
         'axis="0 0 1"/>'
         '<geom size=".05" mass=".306"/><site name="hook"/></body>'
     )
-    tendon = '<tendon><spatial frictionloss="5"><site site="above"/><site site="hook"/></spatial></tendon>'
+    sites = '<site site="above"/><site site="hook"/>'
+    tendon = f'<tendon><spatial frictionloss="5">{sites}</spatial></tendon>'
     run = Run(way, model(world, more=tendon), passive=True)
     run.advance(1)
     return run.found({CREEP: run.creep("weight")})

@@ -1,5 +1,5 @@
-"""What theory costs: ``python -m docs.studies.speed docs/records/speed.md`` writes the tables of that page,
-in ten minutes."""
+"""What theory costs: ``python -m docs.studies.speed docs/records/speed.md`` writes the tables of
+that page, in ten minutes."""
 
 from __future__ import annotations
 

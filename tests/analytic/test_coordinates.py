@@ -1,5 +1,5 @@
-"""Rates, forces and margins of simulations, scalar and in coordinates of their own, are those of the
-formulas for arrays of states."""
+"""Rates, forces and margins of simulations, scalar and in coordinates of their own, are those of
+the formulas for arrays of states."""
 
 import cmath
 import math
@@ -59,7 +59,8 @@ def derivative(of, span):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", list(Case))
 def test_rates_in_all_coordinates(case, law):
-    """Also of the azimuth, and of the work of drag and friction, which is what energy changes by."""
+    """Also of the azimuth, and of the work of drag and friction, which is what energy changes
+    by."""
     p = P.replace(drag=law)
     for at in moments(case, p):
         k, z, scale, rates = begun(case, at, p)

@@ -89,7 +89,8 @@ def test_where_82_and_83_contradict_12():
 
 
 def test_rolling_is_unstable_on_all_sides_beyond_omega_03():
-    """(73), 5.2: for eta > j slip at the floor grows out of RR on either side, below it dies out."""
+    """(73), 5.2: for eta > j slip at the floor grows out of RR on either side, below it dies
+    out."""
     for mu, eta, side, flow in product(
         np.geomspace(0.05, 3.0, 7), np.geomspace(0.42, 3.0, 7), (1.0, -1.0), (0.7, 0.99, 1.01, 1.4)
     ):

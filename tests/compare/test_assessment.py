@@ -181,8 +181,8 @@ def test_what_has_no_limit_counts_as_too_coarse(near, outcome):
     [(1, Outcome.CONFIRMED), (2, Outcome.INCONCLUSIVE), (3, Outcome.INCONCLUSIVE)],
 )
 def test_an_engine_is_asked_every_bearing_on_every_set_that_it_shares(lost, outcome):
-    """The engine on trial has a count and a flow on three sets, the other one all counts, but not all
-    flows."""
+    """The engine on trial has a count and a flow on three sets, the other one all counts, but not
+    all flows."""
     flow = Criterion("thresholds", "omega_03", lambda m: m.parameters.omega_0)
     of = claim("it", Criterion("thresholds", "lifts", lambda m: 1.0), flow)
     sets = ("one", "another", "third")

@@ -98,7 +98,10 @@ def test_basins_count_measure_and_keep_their_points(tmp_path):
 
 
 def test_the_command_draws_the_map_or_keeps_its_data(tmp_path, capsys):
-    line = f"basins --omega-0 40 --across omega_c=5:45:2 --up slip_x=0:1:2 --results {tmp_path} --workers 0 --json"
+    line = (
+        f"basins --omega-0 40 --across omega_c=5:45:2 --up slip_x=0:1:2 --results {tmp_path} "
+        "--workers 0 --json"
+    )
     assert '"shares"' in told(capsys, f"{line} -o {tmp_path / 'map.png'}")
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
     told(capsys, f"{line} -o {tmp_path / 'map.json'}")

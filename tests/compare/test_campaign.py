@@ -393,7 +393,10 @@ def test_a_second_program_is_refused_until_the_first_is_dead(tmp_path, capsys):
         f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch",
         Lock(tmp_path),
     )
-    in_use = rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it, or choose"
+    in_use = (
+        rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it, "
+        "or choose"
+    )
     assert re.search(in_use, refused(capsys, f"{line} 2"))
     assert [path.name for path in tmp_path.iterdir()] == [".lock"]
     first._file.close()  # as when a process is killed
@@ -443,7 +446,10 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr("compare.kit.lock.fcntl.flock", none)
     Lock(tmp_path).release()
-    said = f"dualball: {tmp_path} can't be locked (Function not implemented): start no second program there\n"
+    said = (
+        f"dualball: {tmp_path} can't be locked (Function not implemented): start no second "
+        "program there\n"
+    )
     assert capsys.readouterr().err == said
     with pytest.raises(StorageError, match="cannot write to"):
         Lock(tmp_path / "absent")

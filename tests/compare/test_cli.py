@@ -75,7 +75,10 @@ def test_predict_says_where_the_fluid_and_a_law_of_drag_end(capsys):
 def test_predict_waits_for_no_heavy_package():
     """Formulas need numpy only; the engines, scipy and the figures would take most of a second to
     load."""
-    code = "import sys; from compare.commands import cli; cli.main(['predict']); print(*sys.modules, file=sys.stderr)"
+    code = (
+        "import sys; from compare.commands import cli; cli.main(['predict']); "
+        "print(*sys.modules, file=sys.stderr)"
+    )
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stderr.split()
@@ -156,7 +159,10 @@ def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path, capsys, design)
 def test_attractors_says_what_is_undecided_and_what_it_did_last(capsys, tmp_path):
     """JSON, and a page with a row for each set."""
     page = tmp_path / "page.md"
-    line = f"attractors --set hopping --start omega_c=20 --time 1 --vary omega_0=60,70 -o {page} --json"
+    line = (
+        f"attractors --set hopping --start omega_c=20 --time 1 --vary omega_0=60,70 -o {page} "
+        "--json"
+    )
     data = json.loads(told(capsys, line))
     assert [each["omega_0"] for each in data["sets"]] == [60, 70]
     for (only,) in (each["attractors"] for each in data["sets"]):
@@ -263,7 +269,10 @@ def test_shells_complete_commands_and_options(tmp_path, monkeypatch, capsys):
         text = capsys.readouterr().out
         assert "sample-interval" in text
     (tmp_path / "bash").write_text(text)
-    words = "source ./bash; COMP_WORDS=(dualball sim); COMP_CWORD=1; _shtab_dualball; echo ${COMPREPLY[@]}"
+    words = (
+        "source ./bash; COMP_WORDS=(dualball sim); COMP_CWORD=1; _shtab_dualball; echo "
+        "${COMPREPLY[@]}"
+    )
     assert (
         subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True).stdout
         == "simulate\n"

@@ -101,7 +101,8 @@ def test_theory_stands_beside_what_was_measured(tmp_path):
     """For a ball that slips at both points; its height is free on the wall, and in a flow that
     changes all is."""
     for name, omega_0, height, flow in (
-        ("SS", 25.0, 0.0, None), ("NR", 40.0, 0.01, None), ("NR", 41.0, 0.0, Flow.staircase([41.0, 42.0], 0.5))
+        ("SS", 25.0, 0.0, None), ("NR", 40.0, 0.01, None),
+        ("NR", 41.0, 0.0, Flow.staircase([41.0, 42.0], 0.5))
     ):  # fmt: skip
         p = P.replace(omega_0=omega_0)
         x0 = analytic.solution(p, name).state._replace(y=height)
@@ -187,7 +188,10 @@ def test_means_alone_make_the_same_collection_in_any_number_of_processes(
 
 
 def test_a_sweep_is_sampled_as_often_as_asked(tmp_path, capsys):
-    sweep = f"sweep --vary omega_0=5,6 --time 0.2 --workers 0 --quiet -o {tmp_path / 's'} --sample-interval"
+    sweep = (
+        f"sweep --vary omega_0=5,6 --time 0.2 --workers 0 --quiet -o {tmp_path / 's'} "
+        "--sample-interval"
+    )
     for wrong in ("0.5", "1e-5"):
         assert "within this run it must be >= 0.001 and <= 0.2" in refused(
             capsys, f"{sweep} {wrong}"

@@ -270,8 +270,8 @@ def test_under_coulombs_law_mujoco_is_right_in_every_case():
         coarse, fine = mujoco.result(CASES["rolling-disc"], (4e-3, 2e-3)).errors
         assert coarse < 1e-3
         assert coarse / fine > 3.5
-        # An impact that lifts the ball off its floor: else gravity has it for up to a step and a half
-        # before, 2e-2.
+        # An impact that lifts the ball off its floor: else gravity has it for up to a step and a
+        # half before, 2e-2.
         assert max(mujoco.result(CASES["hits-the-wall"], (1.09e-3, 1e-3, 0.93e-3)).errors) < 2.5e-3
 
 

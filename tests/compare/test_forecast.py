@@ -45,11 +45,14 @@ FINGER = (
     '<geom name="{0}" type="box" size=".01 .03 .03" mass=".2"/></body>'
 )
 GRIPPER = FINGER.format("left", -0.0305) + FINGER.format("right", 0.0305)
-GRIPPER += '<body name="rod" pos="0 0 .2"><freejoint/><geom name="rod" type="capsule" size=".02 .03" mass=".1"/></body>'
-SQUEEZE = '<actuator><motor joint="left" ctrlrange="-9 9"/><motor joint="right" ctrlrange="-9 9"/></actuator>'
+GRIPPER += '<body name="rod" pos="0 0 .2"><freejoint/>'
+GRIPPER += '<geom name="rod" type="capsule" size=".02 .03" mass=".1"/></body>'
+SQUEEZE = '<actuator><motor joint="left" ctrlrange="-9 9"/>'
+SQUEEZE += '<motor joint="right" ctrlrange="-9 9"/></actuator>'
 SQUEEZE += '<keyframe><key name="held" ctrl="5 -5"/></keyframe>'
 BALL = SLOPE + box(".013 0 .0515", "0 0 0", "ball", f'{SPHERE} condim="6" friction=".6 .01 .03"')
-PAIR = '<contact><pair geom1="floor" geom2="box" friction=".7 .5 .01" solreffriction="{}" condim="4"/></contact>'
+PAIR = '<contact><pair geom1="floor" geom2="box" friction=".7 .5 .01" '
+PAIR += 'solreffriction="{}" condim="4"/></contact>'
 WHEEL = (
     '<body pos="{0} {1} 0"><joint axis="0 1 0" frictionloss="1"/>'
     '<geom name="wheel{2}" type="cylinder" size=".05 .02" euler="90 0 0" mass=".3"/></body>'
@@ -358,7 +361,8 @@ def test_advice_does_what_it_says(scene, tmp_path, monkeypatch):
         assert pair.creep_measured < 1e-3 * forecast.CREEP
 
 
-CLOTH = '<flexcomp name="c" type="grid" count="4 4 1" spacing=".05 .05 .05" pos="1 1 .1" radius=".01" mass=".1">'
+CLOTH = '<flexcomp name="c" type="grid" count="4 4 1" spacing=".05 .05 .05" '
+CLOTH += 'pos="1 1 .1" radius=".01" mass=".1">'
 CLOTH += '<edge equality="true"/></flexcomp>'
 FALLING = '<body name="stone"><freejoint/><geom size=".1"/></body>'
 REFUSED = {

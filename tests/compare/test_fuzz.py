@@ -244,7 +244,10 @@ def test_nothing_in_a_run_is_followed_to_another_file(tmp_path, stocked, capsys,
     ("add", "says"),
     [
         *((outside, "'y'") for outside in (virtual, link, external)),
-        (lambda file, _: file.create_dataset("y", (4 * 10**9,), float, chunks=(1000,)), "4e+09 samples, and 1e+07 are"),
+        (
+            lambda file, _: file.create_dataset("y", (4 * 10**9,), float, chunks=(1000,)),
+            "4e+09 samples, and 1e+07 are",
+        ),
         *((lambda file, _, data=data: file.create_dataset("y", data=data), "'y' is no column of "
                                                                            "numbers")
           for data in (["a", "b"], np.ones((SAMPLES, 3)), 1.0)),

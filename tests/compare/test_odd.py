@@ -44,8 +44,22 @@ ODD = (
     "99999999999999999999",
 )
 USUAL = ("1", "2", "0.01", "0.3")
-AXES = ("eta=0.1:0.3:2", "omega_0=10,20", "eta=0.1:0.3", "mu=", "=3", "eta", "omega_0=nan:1:2", "eta=1e300:2e300:2",
-        "y=0:0.01:2", "omega_c=-5:5:2", "slip_x=3:1:2", "eta=0.2,0.2", "mu=0.1:0.2:0", "ω=1:2:3")  # fmt: skip
+AXES = (
+    "eta=0.1:0.3:2",
+    "omega_0=10,20",
+    "eta=0.1:0.3",
+    "mu=",
+    "=3",
+    "eta",
+    "omega_0=nan:1:2",
+    "eta=1e300:2e300:2",
+    "y=0:0.01:2",
+    "omega_c=-5:5:2",
+    "slip_x=3:1:2",
+    "eta=0.2,0.2",
+    "mu=0.1:0.2:0",
+    "ω=1:2:3",
+)
 WORDS = (
     "",
     "x",
@@ -75,10 +89,39 @@ READ = [
 ]
 MINE = [*READ, "mine.html", "mine.md", "mine.json", "mine.png", "mine.svg"]
 """Files of the user."""
-ABSURD = ["cut.h5", "empty.h5", "folder.h5", "loop.h5", "dangling.h5", "cut.toml", "cut.csv", "bytes.csv", "cut.xml",
-          "pipe", "runs", ".", "..", "/", "~", "a/b.h5"]  # fmt: skip
-NEW = ["new.h5", "new.html", "new.md", "new.json", "new.png", "new.svg", "new.gif", "new", "new/deep", "no/new.h5",
-       "/dev/null", "/dev/full", "pipe"]  # fmt: skip
+ABSURD = [
+    "cut.h5",
+    "empty.h5",
+    "folder.h5",
+    "loop.h5",
+    "dangling.h5",
+    "cut.toml",
+    "cut.csv",
+    "bytes.csv",
+    "cut.xml",
+    "pipe",
+    "runs",
+    ".",
+    "..",
+    "/",
+    "~",
+    "a/b.h5",
+]
+NEW = [
+    "new.h5",
+    "new.html",
+    "new.md",
+    "new.json",
+    "new.png",
+    "new.svg",
+    "new.gif",
+    "new",
+    "new/deep",
+    "no/new.h5",
+    "/dev/null",
+    "/dev/full",
+    "pipe",
+]
 CUT = {"cut.h5": "run.h5", "cut.toml": "set.toml", "cut.csv": "flow.csv", "cut.xml": "scene.xml"}
 
 
@@ -247,7 +290,8 @@ def carried_out(words: list[str], criteria: float) -> tuple[int, str, str]:
     if pressed:
         if time.process_time() - pressed[0] > 10.0:
             raise TimeoutError
-        gc.collect()  # what it broke off may have left a file open: that is heard here, where it is ignored
+        # what it broke off may have left a file open: that is heard here, where it is ignored
+        gc.collect()
     said = "".join(
         line
         for line in err.getvalue().splitlines(True)

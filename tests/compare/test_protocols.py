@@ -359,8 +359,8 @@ def test_numbers_that_no_quick_set_has_are_judged_too():
 
 
 def narrowed(answer, width, task=lambda v, b, attempt: (v, attempt), careful=True):
-    """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a runner whose tasks
-    are their runs."""
+    """The bracket in which an answer to (value, attempt) changes, from 0 to 1, of a runner whose
+    tasks are their runs."""
     runner = SimpleNamespace(each=list, sampling=SimpleNamespace(sections=7, granted=False))
     (bracket,) = narrow(runner, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
     return bracket

@@ -300,13 +300,18 @@ def test_errata_are_the_documented_ones():
     assert "<h1>" not in text
 
 
-OPEN = "document.querySelectorAll('details').forEach(row => { row.open = true; }); document.documentElement.scrollWidth"
+OPEN = (
+    "document.querySelectorAll('details').forEach(row => { row.open = true; }); "
+    "document.documentElement.scrollWidth"
+)
 CONTRAST = """(() => {
-    const light = colour => { const [r, g, b] = colour.match(/[\\d.]+/g).map(Number).map(v => v / 255)
+    const light = colour => {
+        const [r, g, b] = colour.match(/[\\d.]+/g).map(Number).map(v => v / 255)
         .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
         return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
     const ground = light(getComputedStyle(document.body).backgroundColor);
-    return Math.min(...["body", ".soft", ".verdict.pass", ".verdict.fail", ".verdict.other", "dt", "a"].map(name => {
+    const shown = ["body", ".soft", ".verdict.pass", ".verdict.fail", ".verdict.other", "dt", "a"];
+    return Math.min(...shown.map(name => {
         const ink = light(getComputedStyle(document.querySelector(name)).color);
         return (Math.max(ink, ground) + 0.05) / (Math.min(ink, ground) + 0.05); }));
 })()"""
@@ -383,7 +388,10 @@ def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_leg
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("ω̃_x, ω₀₂ > A_z", "<i>ω̃</i><sub>x</sub>, <i>ω</i><sub>02</sub> &gt; <i>A</i><sub>z</sub>"),
+        (
+            "ω̃_x, ω₀₂ > A_z",
+            "<i>ω̃</i><sub>x</sub>, <i>ω</i><sub>02</sub> &gt; <i>A</i><sub>z</sub>",
+        ),
         ("(g - Rω₀²)/c", "(<i>g</i> − <i>R</i><i>ω</i><sub>0</sub>²)/<i>c</i>"),
         (
             "r = 0.2 m, 8πρ_fνr/(jm)",

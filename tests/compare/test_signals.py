@@ -107,7 +107,8 @@ import analytic, mjsim
 from model import Flow, Parameters
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
-p, hopping, rest = Parameters.named("reference").replace(omega_0=25.0), Parameters.named("hopping"), [0] * 6
+p = Parameters.named("reference").replace(omega_0=25.0)
+hopping, rest = Parameters.named("hopping"), [0] * 6
 soft = mjsim.ContactSettings()
 calls = {
     "event": lambda t: analytic.simulate(p, rest, t, Flow.sine(20, 5, 1)),

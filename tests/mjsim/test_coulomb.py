@@ -565,7 +565,8 @@ def test_geoms_that_cannot_part_come_to_rest(rigid, bodies):
 @WAYS
 @pytest.mark.parametrize("direction", [0.0, 0.5])
 def test_what_slides_has_kinetic_friction_and_what_stops_holds_by_static_friction(rigid, direction):
-    """Beyond mu W a box breaks away, with kinetic mu it slides, in any direction; at rest it holds again."""
+    """Beyond mu W a box breaks away, with kinetic mu it slides, in any direction; at rest it holds
+    again."""
     mu, kinetic, h = 0.5, 0.6, 2e-3
     model, data = scene(mu=mu, geom=FLAT, option=f'timestep="{h}"')
     law, along = Coulomb(model, rigid=rigid, kinetic=kinetic), np.array([1.0, 0.0, 0.0])

@@ -14,8 +14,10 @@ HOLDS = """
 import mujoco
 from mjsim import Coulomb
 model = mujoco.MjModel.from_xml_string(
-    '<mujoco><option tolerance="1e-12" gravity="2.5 0 -9.5"/><worldbody><geom type="plane" size="9 9 1"/>'
-    '<body pos="0 0 .05"><freejoint/><geom type="box" size=".05 .05 .05"/></body></worldbody></mujoco>'
+    '<mujoco><option tolerance="1e-12" gravity="2.5 0 -9.5"/><worldbody>'
+    '<geom type="plane" size="9 9 1"/>'
+    '<body pos="0 0 .05"><freejoint/><geom type="box" size=".05 .05 .05"/></body>'
+    '</worldbody></mujoco>'
 )
 data, coulomb = mujoco.MjData(model), Coulomb(model)
 coulomb.step(data, 1000)

@@ -39,8 +39,8 @@ def test_what_rolls_doesnt_slip_while_it_settles():
 
 
 def test_loads_are_steady_however_much_friction_lifts() -> None:
-    """A ball that sinks along a rough wall: there errors of the slip that is predicted grow from step
-    to step, until a step is solved, and loads went to and fro by 4e-4."""
+    """A ball that sinks along a rough wall: there errors of the slip that is predicted grow from
+    step to step, until a step is solved, and loads went to and fro by 4e-4."""
     p = P.replace(omega_0=7.0, eta=0.8)
     exact = State.one(analytic.solution(p, "NS").state)._replace(y=100.0)
     run = mjsim.simulate(p, exact, 4.0, settings=mjsim.RigidContacts(timestep=4e-3))

@@ -166,7 +166,8 @@ def test_ranges(allowed, inside, outside, words):
         ),
         ("fluid = 3", "must be a table"),
         (
-            "r = 0.01\nR = '5 cm'\nm = 1\nj = 0.4\nmu = 0.2\neta = 0.2\ng = 9.8\nc = 1\nomega_0 = 1",
+            "r = 0.01\nR = '5 cm'\nm = 1\nj = 0.4\nmu = 0.2\neta = 0.2\n"
+            "g = 9.8\nc = 1\nomega_0 = 1",
             "R = '5 cm'",
         ),
     ],

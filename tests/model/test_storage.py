@@ -185,7 +185,10 @@ from model import StorageError, storage
 path, hard = sys.argv[1], resource.getrlimit(resource.RLIMIT_FSIZE)[1]
 for size in (0, 40, 900, 3000, 20_000, 60_000, 90_000):
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    for write in (lambda: storage.save(make(2000), path), lambda: storage.save_batch({"a": make(400)}, path)):
+    for write in (
+        lambda: storage.save(make(2000), path),
+        lambda: storage.save_batch({"a": make(400)}, path),
+    ):
         try:
             write()
         except StorageError as error:

@@ -15,12 +15,18 @@ from tests.mutants import trial
 def main() -> int:
     """Return 0 if enough faults were noticed, 1 if not, 2 where there is nothing to judge."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=trial.__doc__)
-    results = "results of 'dualball validate'; a theory is judged on them until a claim notices it, the quickest first"
+    results = (
+        "results of 'dualball validate'; a theory is judged on them until a claim notices it, "
+        "the quickest first"
+    )
     parser.add_argument("directories", type=Path, nargs="+", metavar="DIR", help=results)
     parser.add_argument(
         "--engines", action="store_true", help="also measure with every wrong engine"
     )
-    one = "also judge by what this engine alone says, as mujoco-plain, stored in DIR or the first of all; repeatable"
+    one = (
+        "also judge by what this engine alone says, as mujoco-plain, stored in DIR or the first "
+        "of all; repeatable"
+    )
     parser.add_argument("--alone", action="append", default=[], metavar="NAME[=DIR]", help=one)
     parser.add_argument(
         "--whole",
@@ -57,7 +63,8 @@ def main() -> int:
     missed, count = [each for each in trials if each.kind != "by_numbers"], len(trials)
     hanging = sum(bool(each.hung) for each in trials)
     print(
-        f"{count - len(missed)} of {count} faults were noticed by numbers; with {hanging} of them the "
+        f"{count - len(missed)} of {count} faults were noticed by numbers; with {hanging} of "
+        "them the "
         f"predictions of a claim hang"
     )
     for each in missed:

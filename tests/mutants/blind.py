@@ -1,8 +1,8 @@
 """``python -m tests.mutants.blind SEED``: a round played blind.
 
 The seed draws parameter sets that nobody has seen, and plants faults in theories and engines, which
-are kept in a file that the judge doesn't read. Engines of the study measure; claims are judged by the
-right theory and by each wrong one. What came out, whatever it is, becomes a section of
+are kept in a file that the judge doesn't read. Engines of the study measure; claims are judged by
+the right theory and by each wrong one. What came out, whatever it is, becomes a section of
 docs/blind.md."""
 
 from __future__ import annotations

@@ -42,8 +42,8 @@ def wrong_engine(
     fault: Stretch = nullcontext,
     other: Callable[[RigidContacts], ContactModel] = lambda settings: settings,
 ) -> Engine:
-    """MuJoCo with one fault: it moves another ball than it says, under a fault that lasts as long as
-    a run, or with other settings."""
+    """MuJoCo with one fault: it moves another ball than it says, under a fault that lasts as long
+    as a run, or with other settings."""
 
     def stream(
         p: Parameters, x0: Any, t_end: float, flow: Any, settings: RigidContacts, **more: Any

@@ -1,5 +1,5 @@
-"""Faults out of a grammar of formulas: a sign, a factor, an argument, a power, a case mixed up, at a
-place in the source of a function that chance chooses."""
+"""Faults out of a grammar of formulas: a sign, a factor, an argument, a power, a case mixed up, at
+a place in the source of a function that chance chooses."""
 
 from __future__ import annotations
 

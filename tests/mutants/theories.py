@@ -439,14 +439,14 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "flowmeter.characteristic.slope_jump": {"the slope jumps by 3 % more": scaled(1.03)},
     "flowmeter.characteristic.unloading_limit": {"unloading 2 % too high": scaled(1.02)},
     "flowmeter.design.choice": {
-        "a design takes slip for the end of every range": lambda right, make, values, tolerances, fastest: (
-            replace(
+        "a design takes slip for the end of every range": (
+            lambda right, make, values, tolerances, fastest: replace(
                 right(make, values, tolerances, fastest),
                 margin=bifurcation.thresholds(make(**values)).omega_01,
             )
         ),
-        "a design's margin without its tolerances": lambda right, make, values, tolerances, fastest: (
-            right(make, values, {}, fastest)
+        "a design's margin without its tolerances": (
+            lambda right, make, values, tolerances, fastest: right(make, values, {}, fastest)
         ),
     },
     "flowmeter.design.corners": {
@@ -646,8 +646,10 @@ _FAULTS_FOR_TESTS: dict[str, dict[str, Fault]] = {
         "the fluid's torque takes 2 % more friction": answer(fields(friction=times(1.02))),
     },
     "flowmeter.design.best": {
-        "a design takes less friction at the wall than it may": lambda right, make, bounds, *wanted: (
-            right(make, {**bounds, "eta": (0.05, 0.2)}, *wanted)
+        "a design takes less friction at the wall than it may": (
+            lambda right, make, bounds, *wanted: right(
+                make, {**bounds, "eta": (0.05, 0.2)}, *wanted
+            )
         )
     },
     "stationary.slipping_branch.hopf_places": {
@@ -683,11 +685,21 @@ _SEEN_BY = {
     "simulation.equations.smooth_rates": "choice::test_a_single_rolling_contact_holds_or_gives_way",
     "mechanics.dynamics.newton_euler": "dynamics::test_rates_and_forces_at_random_states",
     "stationary.solutions.stationary_solutions": "stationary::test_vanishing_parameters",
-    "bifurcation.diagram.inertia_shifts": "bifurcation::test_the_fluid_that_comes_along_slows_the_answer",
-    "stationary.slipping_branch.eta_critical": "closed_forms_with_drag_laws::test_fold_against_a_scan",
-    "slipping.slip_stability.slip_rates": "slip_stability::test_normal_forces_while_a_slip_is_slight",
-    "bifurcation.diagram.thresholds_with_inertia": "other_ways::test_the_inertia_of_the_fluid_shifts_thresholds",
-    "flowmeter.real_fluid.rolling": "other_ways::test_the_least_friction_that_rolls_against_the_torque_of_the_fluid",
+    "bifurcation.diagram.inertia_shifts": (
+        "bifurcation::test_the_fluid_that_comes_along_slows_the_answer"
+    ),
+    "stationary.slipping_branch.eta_critical": (
+        "closed_forms_with_drag_laws::test_fold_against_a_scan"
+    ),
+    "slipping.slip_stability.slip_rates": (
+        "slip_stability::test_normal_forces_while_a_slip_is_slight"
+    ),
+    "bifurcation.diagram.thresholds_with_inertia": (
+        "other_ways::test_the_inertia_of_the_fluid_shifts_thresholds"
+    ),
+    "flowmeter.real_fluid.rolling": (
+        "other_ways::test_the_least_friction_that_rolls_against_the_torque_of_the_fluid"
+    ),
     "flowmeter.design.best": "other_ways::"
     "test_the_best_design_has_a_wall_as_rough_as_the_inertia_and_the_smallest_ball",
     "stationary.slipping_branch.hopf_places": "other_ways::test_the_hopf_point_of_figure_12",
@@ -698,7 +710,9 @@ _SEEN_BY = {
     "flowmeter.pulsation.fast_onset": "other_ways::"
     "test_onsets_of_slip_in_very_slow_and_very_fast_pulsations",
     "orbits.attractors.lyapunov": "orbits::test_lyapunov_exponent_of_a_known_growth",
-    "flowmeter.real_fluid.torque_rate": "real_fluid::test_the_torque_is_of_the_order_of_the_drag_for_every_ball",
+    "flowmeter.real_fluid.torque_rate": (
+        "real_fluid::test_the_torque_is_of_the_order_of_the_drag_for_every_ball"
+    ),
 }
 """The tests of `analytic` that see them."""
 

@@ -126,7 +126,8 @@ CLAIMS = (
     claim(
         "calm",
         _PERIODIC,
-        "In strong drag, κ > 2, no ball was found that hops on: each settles to a stationary motion.",
+        "In strong drag, κ > 2, no ball was found that hops on: each settles to a stationary "
+        "motion.",
         Criterion("calm", "hops", _hops, by="analytic.simulate"),
         Criterion(
             "calm",

@@ -52,7 +52,8 @@ DISTURBED = 2.0
 HOPS_DIVISORS = (16, 32)
 """Time steps in a coarse one."""
 SAMPLE = 1e-3
-"""Time between samples, s: a parabola through three samples then gives a top to 1e-6 of the height."""
+"""Time between samples, s: a parabola through three samples then gives a top to 1e-6 of the
+height."""
 FOLLOWED = 10.0
 """How long a hop is followed at a wall, s."""
 LEFT_ALONE = 60.0
@@ -362,8 +363,8 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
 def calm(
     runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
-    """Whether balls still hop after 60/c of the weakest drag, or how they go round: three of each of
-    16 sets."""
+    """Whether balls still hop after 60/c of the weakest drag, or how they go round: three of each
+    of 16 sets."""
     reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
     low, high = np.array([0.05, 0.05, 0.2, 2.0, 0.5]), np.array([1.0, 1.0, 0.6, 8.0, 6.0])
     for mu, eta, j, kappa, Omega_0 in (low + sobol(len(low), 16, 5) * (high - low)).tolist():

@@ -317,7 +317,8 @@ FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, dra
 }
 
 
-# --- a designed meter, on its page ------------------------------------------------------------------------------
+# --- a designed meter, on its page
+# ------------------------------------------------------------------------------
 
 
 _LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f")} | {

@@ -88,7 +88,8 @@ class Curve:
     p: Parameters  # with the flow at which the slope is wanted
     flows: tuple[float, ...]
     x0: tuple[float, ...] = (0.0,) * 8
-    noise: float = 0.0  # standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1
+    # standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1
+    noise: float = 0.0
 
 
 def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
@@ -272,7 +273,8 @@ UNLOADED_FROM = 1.02
 UNLOADED_TO = 0.95
 """The flow after it, in the same unit."""
 WALL_PUSH = 1e-2
-"""Speed of a push on the wall in units of sqrt(g R), or more spin in units of its spin on the wall."""
+"""Speed of a push on the wall in units of sqrt(g R), or more spin in units of its spin on the
+wall."""
 
 
 def unloading(

@@ -25,7 +25,10 @@ from model.cases import TRAITS
 from model.drag import STOKES
 from model.kinematics import TURNING, VARIABLES
 
-_OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
+_OWN = (
+    "The paper has no equations away from the wall: (20), with a drag on radial motion, is this "
+    "project's extension."
+)
 
 
 _RUN = "analytic.simulate"

@@ -313,7 +313,8 @@ CLAIMS = (
         claim(
             f"lift-{inner.name}-{outer.name}",
             "Fig. 6, dotted",
-            f"Out of {inner.name} the ball never lifts off the floor: whatever its orbit, the floor "
+            f"Out of {inner.name} the ball never lifts off the floor: whatever its orbit, the "
+            "floor "
             "carries its weight."
             if inner is Case.RS
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in "

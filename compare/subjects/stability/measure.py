@@ -252,7 +252,10 @@ def chosen_states(
         places = {int((k + 0.5) * len(alike) / count) for k in range(count)} if alike else set()
         yield from (alike[k] for k in sorted(places))
         if (lacking := min(count, len(of)) - len(places)) > 0 or not of:
-            why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a push"
+            why = (
+                f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a "
+                "push"
+            )
             yield Missing(PROTOCOL, name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
 
 
@@ -389,8 +392,8 @@ def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Me
     record later.
 
     This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum`
-    does, to a vanishing push and step, and uncertain by what they change, by what two thirds of the record
-    say, and by the accuracy of the solver."""
+    does, to a vanishing push and step, and uncertain by what they change, by what two thirds of the
+    record say, and by the accuracy of the solver."""
     names, (lasts, samples), length = (
         TRAITS[state.case].active,
         state.record,

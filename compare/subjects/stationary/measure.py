@@ -110,7 +110,10 @@ def _values(
     if fine.failure:
         yield _unsettled(fine, len(fine.values))
     elif settling.physical_case(fine.case) is not settling.physical_case(same[0].case):
-        why = f"{same[0].case.name} at omega_0 = {p.omega_0:.4g} rad/s is {fine.case.name} with half the time step"
+        why = (
+            f"{same[0].case.name} at omega_0 = {p.omega_0:.4g} rad/s is {fine.case.name} with "
+            "half the time step"
+        )
         yield Missing(PROTOCOL, fine.start.set, why, len(fine.values))
     else:
         for group in settling.ERROR_GROUPS:

@@ -223,7 +223,10 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     style.guides(axes, guides)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_X)
-    caption = f"Stationary solutions {_SHOWN[of.figure]}; {style.named(p)}, r/R = {p.r / p.R:g}. Dashed: unstable."
+    caption = (
+        f"Stationary solutions {_SHOWN[of.figure]}; {style.named(p)}, r/R = {p.r / p.R:g}. "
+        "Dashed: unstable."
+    )
     if of.figure == "fig-12" and slipping_branch.hopf_places(p):
         caption += " H: a Hopf point of SS, beyond which an oscillation grows, too."
     if of.states and of.figure in ("fig-10", "fig-11"):

@@ -155,7 +155,8 @@ CLAIMS = (
     claim(
         "pulsation-mean",
         "(20), (23), (24), (26), Definitions 1-3",
-        "A pulsation that makes the ball slip at both points makes its mean reading low: on average "
+        "A pulsation that makes the ball slip at both points makes its mean reading low: on "
+        "average "
         "its spin about the tangent takes drag. One that makes it slip at the wall alone does not "
         "change the mean, under Stokes' law.",
         Criterion("pulsation", "mean_error", _mean_error, when=given(slips=_BOTH), by=_MEAN),

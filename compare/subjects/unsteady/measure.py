@@ -491,7 +491,10 @@ def jumps(
         elif math.isfinite(coarse) and math.isfinite(fine):
             yield result.row(runner, "ramp_end", of_no_step(coarse, estimate(fine)))
         else:
-            why = f"a ramp of {pair.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
+            why = (
+                f"a ramp of {pair.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both "
+                "points"
+            )
             yield Missing("unsteady", pair.set, why)
 
 
@@ -520,8 +523,8 @@ def _jump(runner: Runner, start: Start, size: float) -> StepPair:
 
 
 def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator[StepPair]:
-    """Step pairs of ramps of the flow at several rates, rad s-2, from settled SS, which is between two
-    flows."""
+    """Step pairs of ramps of the flow at several rates, rad s-2, from settled SS, which is between
+    two flows."""
     p, span = start.p, ends - begins
     last = begins + RAMP[1] * span
     for rate in runner.sampling.unsteady_rates:

@@ -54,8 +54,8 @@ WINDOW_CENTRES = (16, 40, 64)
 AROUND_WINDOW = 4
 """Steps in which the case doesn't change, either: friction has built up."""
 LOADS_FOUND = 1e-7
-"""Part of a weight, or of gravity, to which a law of rigid contacts finds what they bear in a motion:
-a hundredth of its share. (Chosen after a measurement.)"""
+"""Part of a weight, or of gravity, to which a law of rigid contacts finds what they bear in a
+motion: a hundredth of its share. (Chosen after a measurement.)"""
 MOST_TURN = 0.5
 """Largest change of a slip, and of that which friction alone would make, divided by the slip: where
 slip is about to vanish, or very small, friction turns too fast."""
@@ -122,7 +122,10 @@ def field(
                 yield result.row(runner, what, value, case=case.name, **state_of(x))
     for name, case in product(sets, Case):
         if lacking := runner.sampling.field_kept - kept[name, sets[name].nu_f, case]:
-            why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
+            why = (
+                f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} "
+                "steps"
+            )
             rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
             yield Missing("field", name, why, lacking * rows)
 
@@ -170,8 +173,8 @@ def _values(
     }
     best, fine, lower = np.transpose([of / size for of, size in read_off.values()])
     steps, degrees = unlike(best - fine), unlike(fine - lower)
-    # A contact that rolls is held by friction of a moment ago: its slip should not change at all, and
-    # what it changes comes from the rates of other variables.
+    # A contact that rolls is held by friction of a moment ago: its slip should not change at all,
+    # and what it changes comes from the rates of other variables.
     slips = [k for k in range(8)[SLIP_XYZ] if VARIABLES[k] in TRAITS[case].constraints]
     rolling = float(np.abs(rows[0, 8:16] / scales)[slips].max(initial=0.0))
     values = {}
@@ -260,7 +263,10 @@ def motions(
             continue
         chosen = pieces(run, count)
         if lacking := count - len(chosen):
-            why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips by a trace"
+            why = (
+                "near the ends of pieces the case changes, or a contact hovers, creeps or slips "
+                "by a trace"
+            )
             yield Missing("motions", name, why, lacking * (1 + len(VARIABLES[TURNING])))
         for first, last in ((first, first + PIECE) for first in chosen):
             case = Case(int(run.case[last]))

@@ -160,8 +160,8 @@ class Push:
         ]
 
     def tasks(self, runner: Runner) -> list[Task]:
-        """Tasks with every size of slip and both time steps; of the engine on trial these are half as
-        long, since the first ones of a run are seen in it for a while."""
+        """Tasks with every size of slip and both time steps; of the engine on trial these are half
+        as long, since the first ones of a run are seen in it for a while."""
         divisor = 1 if runner.has_own_steps else 2
         return [task for size in self.sizes for task in self.pair(runner, size, divisor)]
 
@@ -311,7 +311,8 @@ def steepest(
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
     why = "without friction at the wall, or drag, no direction stands out"
     yield from (Missing("steepest", name, why) for name in sets if name not in rough)
-    fans = []  # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
+    # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
+    fans = []
     for name, p in rough.items():
         rng = np.random.default_rng([58, *name.encode()])
         for _ in range(runner.sampling.steepest_states):

@@ -172,7 +172,9 @@ class Crossing:
 class Growths:
     """gamma at some flows of a line, for a vanishing step and size of slip."""
 
-    points: Array  # flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2; gamma is nan where a slip didn't last
+    # flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2; gamma is nan where a slip
+    # didn't last
+    points: Array
     tasks: list[Task]
     strays: list[
         Measurement | Missing

@@ -67,11 +67,11 @@ def stays_rolling(run: Trajectory) -> bool | None:
     still dies out.
 
     None, too, while a ball that has slipped lags behind the fluid: it rolls more slowly than it is
-    asked about; and while it touches the floor now and then: where friction alone could hold it, it may
-    come to rest there. Slip dies out that has fallen below 0.6 of what it was in the second half
-    (moved from 0.9 after results had been seen); slip below a hundredth of what counts is none. On
-    a floor that carries next to nothing slip up to `CREEPS` shows nothing (chosen after a set with
-    mu eta = 0.8 had crept so below its threshold)."""
+    asked about; and while it touches the floor now and then: where friction alone could hold it, it
+    may come to rest there. Slip dies out that has fallen below 0.6 of what it was in the second
+    half (moved from 0.9 after results had been seen); slip below a hundredth of what counts is
+    none. On a floor that carries next to nothing slip up to `CREEPS` shows nothing (chosen after a
+    set with mu eta = 0.8 had crept so below its threshold)."""
     if not presses(run):
         return None if np.any(run.force_A[tail(run), 1] > 0) else False
     speeds, _ = sliding_speeds(run)

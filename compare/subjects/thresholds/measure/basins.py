@@ -137,6 +137,9 @@ CLOSING = (0.1, 0.17, 0.26, 0.38)
 begins."""
 
 
+SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
+
+
 def borders(
     runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
@@ -149,8 +152,7 @@ def borders(
     for name, p in sets.items():
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
         if p.drag == QUADRATIC:
-            why = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
-            yield Missing("edge", name, why)
+            yield Missing("edge", name, SWINGS_ON)
         elif holds and folds:
             limits[name] = holds.value, folds.value
         else:
@@ -177,11 +179,11 @@ def borders(
             or lifted.failure
             or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR)
         ):
-            fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
+            came_to = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
             yield Missing(
                 "edge",
                 name,
-                f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {fates}",
+                f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}",
             )
         else:
             a, b = _on_floor_and_wall(slipping.mean), _on_floor_and_wall(lifted.mean)
@@ -198,9 +200,8 @@ def borders(
     for name, (low, high) in limits.items():
         last = low + (max(CLOSING) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
-        if len(near) >= len(
-            CLOSING
-        ):  # the edge meets the lifted ball where both have the same omega_c
+        if len(near) >= len(CLOSING):
+            # The edge meets the lifted ball where both have the same omega_c.
             noise = max(float(_uncertainty(edge)[2]) for edge in near)
             apart = [estimate((edge.crossing - edge.lifted)[2], edge=noise) for edge in near]
             place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)

@@ -23,7 +23,8 @@ from model import Case, Parameters
 FIRST_DRAGS = (2.0, 4.0)
 """Drag at which the range of slipping is measured first, c sqrt(R/g)."""
 NEARER_DRAGS = (1.6, 2.6)
-"""Drag measured then, in units of that extrapolated from those: far off, where states settle soon."""
+"""Drag measured then, in units of that extrapolated from those: far off, where states settle
+soon."""
 BEFORE_FOLD = (0.02, 0.035, 0.055, 0.08, 0.12)
 """Distances of flows below omega_02, in parts of the range of slipping."""
 

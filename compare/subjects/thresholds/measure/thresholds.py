@@ -165,7 +165,10 @@ class Findings:
         """The measurement of a threshold, or of a number on the set; or why the threshold was not
         found."""
         if at is None:
-            why = f"too few states settled for {quantity} by {how['by']}, or their extrapolation has no zero"
+            why = (
+                f"too few states settled for {quantity} by {how['by']}, or their extrapolation "
+                "has no zero"
+            )
             return self.missing(why)
         p = self.p.replace(omega_0=at.value) if isinstance(at, Estimate) else self.p
         return measurement(self.runner, "thresholds", self.set, p, quantity, at, tasks, **how)
@@ -408,7 +411,10 @@ def _rows(each: Findings) -> Iterator[Measurement | Missing]:
                 "omega_03", returns, "from above", "return to rolling when pressed"
             )
         else:
-            why = "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
+            why = (
+                "a lifted ball did not settle, and could not be pressed back to the floor: no "
+                "second omega_03"
+            )
             yield each.missing(why)
     else:
         yield each.row("lifts", 0.0, rolling.tasks)
