@@ -102,7 +102,8 @@ def _interval(name: str, value: Any, unit: str, allowed: Range) -> Interval:
     ends = value if isinstance(value, list | tuple) else (value, value)
     if len(ends) != 2:
         raise InputError(
-            f"{name} = {value!r} must be a number{of and ' in'}{of}, or the two between which it may be"
+            f"{name} = {value!r} must be a number{of and ' in'}{of}, or the two between which "
+            "it may be"
         )
     low, high = (check_number(name, end, unit, allowed) for end in ends)
     if low > high:
