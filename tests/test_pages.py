@@ -1,15 +1,20 @@
 """What pages print is true: commands are those of the program, and what stands below one is what it
 says. Pages with cells are run where they are built."""
 
+import os
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from compare.commands import parsers
-from tests.commands import COMMANDS, ROOT, carried_out
+from docs.studies import cells
+from model import Parameters
+from tests.commands import COMMANDS, METER, ROOT, SCENE, carried_out
 
 DOCS = ROOT / "docs"
 PAGES = [
@@ -93,20 +98,82 @@ def test_the_first_lines_of_readme_print_what_it_says(capsys):
     assert capsys.readouterr().out == found[code + 1].text
 
 
-@pytest.mark.parametrize(
-    "number", [0, pytest.param(1, marks=pytest.mark.slow)], ids=["quick", "longer"]
+NEEDS_MORE = {
+    "explore": "it waits for a browser",
+    "--scheduler": "it wants a cluster",
+    "mypkg": "an adapter of the reader's own",
+}
+"""What isn't run as printed, by a word of it, and why."""
+ENDS_WITH_1 = {
+    "dualball forecast docs/friction/box.xml --max-creep 1e-3 --max-depth 1e-3",  # it creeps
+}
+
+
+MADE = (
+    "simulate --time 1 -o run.h5",
+    "calibrate --parameters mine.toml -o curve.csv",
+    "sweep --vary eta=0.1,0.2 --time 0.1 --workers 0 -o sweep",
 )
-def test_the_cheat_sheet_runs(number, here, capsys):
-    (here / "meter.toml").write_text(
-        "fluid = {nu_f = 1e-6, rho_f = 1000}\nflow = {slowest = 2, fastest = 8}\n"
-        "bounds = {r = [2e-3, 8e-3], R = [2e-2, 8e-2], mu = 0.1, eta = 0.1, rho_b = 7800}\n"
-    )
-    sheet = [block.text for block in blocks(DOCS / "cheat-sheet.md") if block.language == "sh"]
-    for line in sheet[number].splitlines():
-        words = shlex.split(line, comments=True)[1:]
-        if words[0] != "explore":  # which waits for a browser
-            code, _, err = carried_out(capsys, *words)
-            assert code == 0, f"{line}: {err}"
+"""What pages take for made before."""
+
+
+def printed(page: Path) -> list[str]:
+    """The lines that a page gives to be typed into a shell, whole; those of cells are run where the
+    site is built."""
+    code = "\n".join(block.text for block in blocks(page) if block.language in ("sh", "console"))
+    lines = re.findall(r"^(?:\$ )?(dualball [a-z].*)$", code, re.M)
+    there = {line.partition("#")[0].strip() for line in lines}
+    told = [each for each in commands(page) if each not in there]
+    lines += [each for each in told if f"!{each}" not in written(page)]
+    return [line for line in lines if not any(word in line for word in NEEDS_MORE)]
+
+
+@pytest.fixture
+def at_home(here, capsys):
+    """A fresh directory with the files that pages take for the reader's own, and its shell."""
+    (here / "meter.toml").write_text(METER.replace("fastest = 40", "fastest = 8"))
+    for name in ("mine.toml", "glass.toml"):
+        Parameters.named("glass-in-water").save(here / name)
+    (here / "scene.xml").write_text(SCENE)
+    for line in MADE:
+        code, _, err = carried_out(capsys, line)
+        assert code == 0, err
+    program = here / "bin" / "dualball"
+    program.parent.mkdir()
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m compare "$@"\n')
+    program.chmod(0o755)
+    paths = {"PATH": f"{program.parent}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+
+    def run(line: str) -> None:
+        """Carry a line out as it is printed."""
+        done = subprocess.run(
+            line, shell=True, capture_output=True, text=True, env=os.environ | paths
+        )
+        assert done.returncode == (line in ENDS_WITH_1), f"{line}: {done.stdout}{done.stderr}"
+
+    return run
+
+
+def test_the_first_lines_of_the_cheat_sheet_run(at_home):
+    first = next(block for block in blocks(DOCS / "cheat-sheet.md") if block.language == "sh")
+    for line in first.text.splitlines():
+        at_home(line)
+
+
+def test_cells_of_pages_hide_no_mistake(capsys):
+    cells.shell("exit 1")
+    with pytest.raises(RuntimeError, match="exit code 2"):
+        cells.shell("exit 2")
+    cells.shell(f"exit 2  {cells.REFUSED}")
+    with pytest.raises(RuntimeError, match="exit code 0"):
+        cells.shell(f"exit 0  {cells.REFUSED}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [*filter(printed, PAGES)], ids=lambda page: page.stem)
+def test_commands_run_as_printed(page, at_home):
+    for line in printed(page):
+        at_home(line)
 
 
 def test_pages_stay_short():
