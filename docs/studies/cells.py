@@ -6,7 +6,6 @@ import os
 import subprocess
 from typing import Any
 
-
 REFUSED = "# is refused"
 """How a line ends that shows a mistake."""
 
