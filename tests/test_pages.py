@@ -112,9 +112,10 @@ ENDS_WITH_1 = {
 MADE = (
     "simulate --time 1 -o run.h5",
     "calibrate --parameters mine.toml -o curve.csv",
-    "sweep --vary eta=0.1,0.2 --time 0.1 --workers 0 -o sweep",
 )
 """What pages take for made before."""
+SWEEP = "dualball sweep --vary eta=0.1,0.2 --time 0.1 --workers 0"
+"""The same, of pages that carry none out themselves."""
 
 
 def printed(page: Path) -> list[str]:
@@ -172,7 +173,9 @@ def test_cells_of_pages_hide_no_mistake(capsys):
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [*filter(printed, PAGES)], ids=lambda page: page.stem)
 def test_commands_run_as_printed(page, at_home):
-    for line in printed(page):
+    lines = printed(page)
+    own = any(line.startswith("dualball sweep") for line in lines)
+    for line in lines if own else [SWEEP, *lines]:
         at_home(line)
 
 
