@@ -1,4 +1,5 @@
-"""Settings of MuJoCo's own contacts, and the theory of what they do to a ball that slides and rolls.
+"""Settings of MuJoCo's own contacts, and the theory of what they do to a ball that slides and
+rolls.
 
 Force f and acceleration a of a row obey ``a + R f = a_ref`` inside the friction cone, with ``R = (1
 - d)/d A`` of the inverse mass A and the impedance d (`solimp`), ``R_t = R / impratio`` in friction
@@ -8,8 +9,8 @@ rows, and
     friction rows: a_ref = -b_f v,         b_f = 2/(d tc_f),                 solreffriction = tc_f
 
 On the cone, slip lifts the contact: with ``w = a - a_ref + R_t f`` of the friction rows, in steady
-motion ``-k gap = R f - mu |w|``, ``|w| = b_f v_slip - mu R_t f``. So sliding is continuous only while
-``mu |w| < R f``: beyond, the contact switches on and off from step to step.
+motion ``-k gap = R f - mu |w|``, ``|w| = b_f v_slip - mu R_t f``. So sliding is continuous only
+while ``mu |w| < R f``: beyond, the contact switches on and off from step to step.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ FORESEEN, YIELDS = 2e-3, 1e-5
 at most twice, and once all is steady a hundredth of `Law.softness` of mjsim.coulomb. (Both were
 chosen after slips of a rolling ball had been seen.)"""
 LANDING_PARTS = 16
-"""Into how many parts a step is divided in which a ball with rigid contacts lands: a blow falls into
-one of them."""
+"""Into how many parts a step is divided in which a ball with rigid contacts lands: a blow falls
+into one of them."""
 _LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
 """`contact_decay` beyond which contacts are made slower; and `solref` with its time in steps, the
 fastest first: stable up to mu eta = 1.03, 2.1, 5 and 9."""
@@ -152,14 +153,14 @@ class ContactSettings:
         return (1 - self.solimp) / self.solimp
 
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
-        """The hover number mu |w| / (R f): a sliding contact stays closed below 1; needs `load` > 0.
+        """The hover number mu |w| / (R f): a sliding contact stays closed below 1; of a `load` > 0.
 
         What R_t takes off |w| is left out, to be on the safe side."""
         return friction * self.b_f * slip_speed / (self.softness * load)
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) of a contact that rolls steadily, R_t f_t / b_f, under a friction force of
-        m times `load` (m s-2)."""
+        """Slip speed (m s-1) of a contact that rolls steadily, R_t f_t / b_f, under a friction
+        force of m times `load` (m s-2)."""
         return np.asarray(self.softness / self.impratio / self.b_f * np.asarray(load, dtype=float))
 
     def dead_band(self, load: npt.ArrayLike) -> Array:
@@ -180,8 +181,8 @@ class ContactSettings:
         )
 
     def depth(self, load: float) -> float:
-        """How deep the ball sinks under a steady load (force divided by mass, m s-2) while it rolls,
-        m; slip lifts it."""
+        """How deep the ball sinks under a steady load (force divided by mass, m s-2) while it
+        rolls, m; slip lifts it."""
         return self.softness * load / self.k
 
     def touching(self, g: float) -> float:
@@ -220,12 +221,12 @@ class ContactSettings:
 
     @classmethod
     def for_problem(cls, p: Parameters, timestep: float, speed: float, **changes: Any) -> Self:
-        """MuJoCo's own contacts, so soft that those of this ball which slide with `speed` (m s-1) under
-        the load of gravity stay closed instead of hovering.
+        """MuJoCo's own contacts, so soft that those of this ball which slide with `speed` (m s-1)
+        under the load of gravity stay closed instead of hovering.
 
-        The impedance is lowered, where need be, until the hover number is 1/20, since a contact about
-        to lift off carries little; the engine's least one, 1e-4, may stop that short. Damping and
-        softness of the friction rows stay what they are."""
+        The impedance is lowered, where need be, until the hover number is 1/20, since a contact
+        about to lift off carries little; the engine's least one, 1e-4, may stop that short. Damping
+        and softness of the friction rows stay what they are."""
         settings = cls.at(timestep, **changes)
         hover = settings.hover_number(p.g, max(p.mu, p.eta), speed)
         if hover <= 0.05:

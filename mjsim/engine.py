@@ -93,8 +93,8 @@ class Run:
         check_start(self._x0, p, self._settings)
         self._model, mjcf = scene.build(p, self._settings)
         shown = dataclasses.asdict(self._settings) | {
-            "t_end": float(t_end), "sample_interval": self._interval * self._timestep, "x0": list(self._x0),
-            "theta_0": self._theta_0, "event_times": EVENT_TIMES,
+            "t_end": float(t_end), "sample_interval": self._interval * self._timestep,
+            "x0": list(self._x0), "theta_0": self._theta_0, "event_times": EVENT_TIMES,
         }  # fmt: skip
         self.header = Header("mujoco", p, self._flow, shown, mjcf)
         """Where the trajectory comes from; a failure appears here."""
@@ -224,8 +224,8 @@ def simulate_many(
 
     `flow` is one for all, one for each, or None for each one's own omega_0. `threads` of them go on
     at once; None is a thread for each processor that has `RUNS_A_THREAD` of them. Results are the
-    same to the bit whatever the number. A run that breaks down has a header that says so; the others
-    go on.
+    same to the bit whatever the number. A run that breaks down has a header that says so; the
+    others go on.
 
     Raises
     ------

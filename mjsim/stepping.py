@@ -31,8 +31,8 @@ _NEAR, _PART, _MOST = 32.0, 0.25, 1024
 """Steps to the axis below which they are shorter, where it is nearer than that part of R; into how
 many parts, at most, a step is divided."""
 _CHANGE = 0.1
-"""Part of the weight: as long as a contact force changes by more in a step, those after a landing are
-divided, too. (Chosen after balls that hop had been seen.)"""
+"""Part of the weight: as long as a contact force changes by more in a step, those after a landing
+are divided, too. (Chosen after balls that hop had been seen.)"""
 SHARE = 1e-5
 """`share` of the law: part of gravity to which the slip of contacts must be predicted."""
 _NORMAL_A, _NORMAL_B = range(NSENSOR)[recorder.NORMALS]
@@ -83,7 +83,8 @@ def velocity_of(body: Joints) -> Velocity:
     a, b, c = float(v[3]), float(v[4]), float(v[5])
     return Velocity(
         float(v[0]), float(v[1]), float(v[2]),
-        x[0] * a + x[1] * b + x[2] * c, y[0] * a + y[1] * b + y[2] * c, z[0] * a + z[1] * b + z[2] * c,
+        x[0] * a + x[1] * b + x[2] * c, y[0] * a + y[1] * b + y[2] * c, z[0] * a + z[1] * b + z[2] *
+        c,
     )  # fmt: skip
 
 
@@ -134,8 +135,8 @@ def take_step(body: Joints, step: float, omega_0: float) -> None:
 
 
 def change_step(body: Joints, old: float, new: float) -> None:
-    """Go on in steps of another length, s: places stay ahead by the same part of a step, and margins
-    are what a fall makes in one."""
+    """Go on in steps of another length, s: places stay ahead by the same part of a step, and
+    margins are what a fall makes in one."""
     v = velocity_of(body)
     for i in range(COORDINATES):
         body.qpos[i] += body.ahead * (new - old) * body.qvel[i]

@@ -95,7 +95,7 @@ class Callback:
     def install(
         self, model: int, adopt: Callable[[int], Simulation], simulations: Mapping[int, Simulation]
     ) -> None:
-        """Have all simulations of a model under one law: these, and new ones, which `adopt` makes."""
+        """Have all simulations of a model under one law: these, and new ones that `adopt` makes."""
         with self._lock:
             others = {k: s for k, s in self._simulations.items() if s.record["model"][0] != model}
             self._simulations = others | dict(simulations)

@@ -1,4 +1,5 @@
-"""Compiled functions: numba with a cache on disk that is never stale, and C functions by address."""
+"""Compiled functions: numba with a cache on disk that is never stale, and C functions by
+address."""
 
 from __future__ import annotations
 
@@ -157,7 +158,8 @@ def c_function(name: str, address: int, returns: Any, *arguments: Any) -> Any:
 
 
 def address_of(name: str, array: npt.NDArray[Any]) -> Any:
-    """A compiled function that returns an array's address, also in code another process compiled."""
+    """A compiled function that returns an array's address, also in code another process
+    compiled."""
     llvmlite.binding.add_symbol(name, array.ctypes.data)
 
     @intrinsic  # type: ignore[untyped-decorator]

@@ -206,7 +206,8 @@ def jacobian_length(model: Any, data: Any, memory: Any) -> int:
 
 @kernel
 def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
-    """Copy the Jacobians of all rows, without zeros: MuJoCo's own are gone when the next step asks for forces."""
+    """Copy the Jacobians of all rows, without zeros: MuJoCo's own are gone when the next step asks
+    for forces."""
     rows, sparse, limit = (
         rows_of(memory),
         mj_isSparse(memory.model),

@@ -32,37 +32,39 @@ _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
 
 class Coulomb:
-    """Coulomb's law of friction in a MuJoCo simulation: what sticks does not creep, what slides does
-    not lift.
+    """Coulomb's law of friction in a MuJoCo simulation: what sticks does not creep, what slides
+    does not lift.
 
     Parameters
     ----------
-    model : any `mujoco.MjModel`, of MuJoCo 3.3.6 or later; condim 1, 3, 4 and 6. Coulomb's law has no
-        pyramid: the cone is elliptic while the law acts, and then again what it was. So give a model
-        whose forces you read by `mj_contactForce` the elliptic cone, or read them in `acting`:
-        MuJoCo would take the rows for a pyramid's
+    model : any `mujoco.MjModel`, of MuJoCo 3.3.6 or later; condim 1, 3, 4 and 6. Coulomb's law
+        has no pyramid: the cone is elliptic while the law acts, and then again what it was. So give
+        a model whose forces you read by `mj_contactForce` the elliptic cone, or read them in
+        `acting`: MuJoCo would take the rows for a pyramid's
     rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say.
         True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
         within one step. Geoms get a `margin` in which contacts are seen ahead, but bear nothing: at
-        least the way of a step at the speed of a fall through the scene, or a fifth of their radius.
-        Margins are for steps up to the model's as it is now. While the law acts the integrator is
-        Euler's, and dampers are inertia of the same effect, which contacts know
+        least the way of a step at the speed of a fall through the scene, or a fifth of their
+        radius. Margins are for steps up to the model's as it is now. While the law acts the
+        integrator is Euler's, and dampers are inertia of the same effect, which contacts know
     restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1; or
         one for each geom, of which two in contact have the larger, as MuJoCo mixes friction
-    kinetic : friction of contacts that slide, in units of the friction that keeps them from it, above
-        0 up to 1
-    servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It
-        needs geoms with a `margin`, more than bodies sink in, of which an open contact then takes no
-        notice; and it must be slower than the contact, best five times the time constant of `solref`
+    kinetic : friction of contacts that slide, in units of the friction that keeps them from it,
+        0.001 … 1
+    servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has
+        them. It needs geoms with a `margin`, more than bodies sink in, of which an open contact
+        then takes no notice; and it must be slower than the contact, best five times the time
+        constant of `solref`
     share : share of gravity to which a step must know beforehand how contacts slip, and what rigid
         ones bear; if it doesn't, it is solved again
-    depth : depth that rigid contacts keep at a time step of 2 ms, in units of the smaller radius; it
-        falls with the square of the step. 0 is for colliders that see all points within the margin,
-        as spheres on planes
+    depth : depth that rigid contacts keep at a time step of 2 ms, in units of the smaller radius;
+        it falls with the square of the step. 0 is for colliders that see all points within the
+        margin, as spheres on planes
 
     Each `MjData` has a memory of its own. It takes part in the state of the simulation, so save and
     restore both. Contacts of flexes are left as they are; so is all in a soft simulation in which
-    nothing touches. A copy, also by pickle, has the memory of the only `MjData` that there was; of several none.
+    nothing touches. A copy, also by pickle, has the memory of the only `MjData` that there was; of
+    several none.
 
     Raises
     ------
@@ -175,7 +177,7 @@ class Coulomb:
         return simulation
 
     def _adopt(self, address: int) -> Simulation:
-        """A memory for the data at an address, which go on from a restored state if there is one."""
+        """A memory for the data at an address, which go on from a restored state, if any."""
         simulation = self._simulations[address] = Simulation(self.model, self._law)
         if self._restored is not None:
             simulation.restore(self._restored)
@@ -185,7 +187,8 @@ class Coulomb:
         return simulation
 
     def addresses(self, data: Any) -> tuple[int, int, int]:
-        """Addresses of model, data and memory, for compiled loops that call `mj_step` in `acting`."""
+        """Addresses of model, data and memory, for compiled loops that call `mj_step` in
+        `acting`."""
         return self.model._address, data._address, self._simulation(data).address
 
     def reset(self) -> None:
@@ -197,8 +200,8 @@ class Coulomb:
     def state(self, data: Any = None) -> dict[str, npt.NDArray[Any]]:
         """A copy of the memory, for `restore`: structured and other arrays by name.
 
-        Contacts with their fields (`memory.REMEMBERED`), friction of joints, N or N m, spins of free
-        bodies (m, 6), N m s, time and time step, s. `data`: of which simulation, if there are
+        Contacts with their fields (`memory.REMEMBERED`), friction of joints, N or N m, spins of
+        free bodies (m, 6), N m s, time and time step, s. `data`: of which simulation, if there are
         several or MuJoCo has stepped it itself.
 
         Raises
@@ -334,8 +337,8 @@ class Coulomb:
         """Switch the model to options under which the law acts.
 
         Rigid contacts ask for velocities after a step, so they must know of dampers: `add_dampers`
-        makes these inertia, and Euler's method leaves them alone. MuJoCo's integrators take them into
-        account, too, but only after contacts have been solved for.
+        makes these inertia, and Euler's method leaves them alone. MuJoCo's integrators take them
+        into account, too, but only after contacts have been solved for.
 
         Returns
         -------
@@ -363,8 +366,8 @@ class Coulomb:
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[Coulomb]:
-        """Within this, `mujoco.mj_step`, `mj_forward` and `mj_step1` with `mj_step2` obey the law for
-        this model.
+        """Within this, `mujoco.mj_step`, `mj_forward` and `mj_step1` with `mj_step2` obey the law
+        for this model.
 
         That is for programs that step by themselves. Other models are left alone. Several may be
         installed at once.

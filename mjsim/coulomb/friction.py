@@ -1,9 +1,9 @@
 """Coulomb's law: De Saxcé's shift, forces on the friction cone, and how contacts will slip.
 
-MuJoCo's law is convex: slip would lift a contact. De Saxcé's bipotential (1992; Acary and Brogliato,
-Numerical Methods for Nonsmooth Dynamical Systems, 2008, 2.3) gives Coulomb's law by the same cone if
-the coefficient of friction times the slip is taken off the normal row's reference. The shift of
-a step is predicted from the step before; where that is in doubt the step is solved for it.
+MuJoCo's law is convex: slip would lift a contact. De Saxcé's bipotential (1992; Acary and
+Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, 2.3) gives Coulomb's law by the
+same cone if the coefficient of friction times the slip is taken off the normal row's reference. The
+shift of a step is predicted from the step before; where that is in doubt the step is solved for it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .memory import NEW, OPEN, SLIDES, STICKS, contacts_of, dry_of, rows_of
 from .parameters import FEEDBACK, SLOWEST, STEADIER
 from .rows import multiply
 
-# -- static and kinetic -------------------------------------------------------------------------------
+# -- static and kinetic ----------------------------------------------------------------------------
 
 
 @kernel
@@ -35,7 +35,8 @@ def strengthen(data: Any, memory: Any) -> None:
 
 @kernel
 def weaken(model: Any, data: Any, memory: Any, gravity: float) -> None:
-    """Give contacts that slide kinetic friction, mu_k = `kinetic` mu; what stops holds by mu again."""
+    """Give contacts that slide kinetic friction, mu_k = `kinetic` mu; what stops holds by mu
+    again."""
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
     velocity, slowest = reals(data.efc_vel, data.nefc), SLOWEST * gravity * model.opt.timestep
     for i in range(memory.contacts):
@@ -162,7 +163,8 @@ def shift(rows: Any, contact: Any) -> float:
 
 @kernel
 def feedback(contact: Any, estimate: Any) -> float:
-    """How strongly a contact's load acts on its slip, through friction: mu^2 (1 + 1/j) of a ball."""
+    """How strongly a contact's load acts on its slip, through friction: mu^2 (1 + 1/j) of a
+    ball."""
     gain = 0.0
     for t in range(contact.dim - 1):
         across = contact.mu[t] ** 2 * estimate[contact.address + 1 + t]
@@ -208,7 +210,8 @@ def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: flo
 
 @kernel
 def power(rows: Any, contact: Any) -> float:
-    """Friction that is remembered times what it is asked to give way to; negative while it slides."""
+    """Friction that is remembered times what it is asked to give way to; negative while it
+    slides."""
     total = 0.0
     for r in range(contact.address + 1, contact.address + contact.dim):
         total += rows[r].remembered * rows[r].residual

@@ -78,15 +78,15 @@ ROW = np.dtype(
         ("kind", _i4),
         ("first", _i4),  # where its Jacobian begins, and how long that is without zeros
         ("length", _i4),
-        # if it is the first of a unit of Newton's method: how many rows that has, else 0; its contact,
-        # or -1; a degree of freedom that it moves, -1: none; the next unit of its island
+        # if it is the first of a unit of Newton's method: how many rows that has, else 0; its
+        # contact, or -1; a degree of freedom that it moves, -1: none; the next unit of its island
         *((name, _i4) for name in ("dim", "contact", "dof", "next")),
         ("R", _f8),  # regularisation: acceleration per force, kg-1
         ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
         ("remembered", _f8),  # force of the step before, or of the last solution of this one, N
         ("held", _f8),  # the part of it that it keeps without giving way, N
-        # m s-2: J qacc after `multiply`; less the reference after `subtract_references`; less R times
-        # what is held, too, in Newton's method, and in `find_forces`, which adds the shift to normals
+        # m s-2: J qacc after `multiply`; less the reference after `subtract_references`; less R
+        # times what is held, too, in Newton's method, and in `find_forces`, which adds the shift
         ("residual", _f8),
         ("force", _f8),  # as found, N
         ("limit", _f8),  # the most that a dry joint bears, N or N m
@@ -201,7 +201,7 @@ _NAMES = ", ".join(_SIZES)
 
 
 def sizes(model: Any) -> npt.NDArray[np.int64]:
-    """By what a model is known: its signature is gone once it was pickled, and MuJoCo 3.3 has none."""
+    """By what a model is known: its signature is gone once it was pickled; MuJoCo 3.3 has none."""
     return np.array([getattr(model, name) for name in _SIZES], np.int64)
 
 

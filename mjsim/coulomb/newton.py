@@ -148,7 +148,8 @@ def root(dofs: Any, i: int) -> int:
 
 @kernel
 def find_envelope(model: Any, memory: Any, first: int) -> int:
-    """Number an island's degrees of freedom, and find where rows of its derivative begin; its size."""
+    """Number an island's degrees of freedom, and find where rows of its derivative begin; its
+    size."""
     starts, columns = integers(model.M_rowadr, model.nv), integers(model.M_colind, model.nC)
     rows, dofs, i, size = rows_of(memory), dofs_of(memory), first, 0
     while i >= 0:
@@ -387,7 +388,7 @@ def find_residuals(memory: Any, a: Any) -> None:
 def solve_closed(
     model: Any, data: Any, memory: Any, a: Any, accuracy: float, enough: float
 ) -> None:
-    """Solve for the accelerations of all islands of closed contacts of which one closes just now."""
+    """Solve for the accelerations of all islands of closed contacts of which one just closes."""
     find_units(memory)
     find_islands(model, memory)
     dofs = dofs_of(memory)

@@ -12,7 +12,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Law:
-    """What a `Coulomb` is asked for, and its numbers; docs/records/law.md shows what some of them decide."""
+    """What a `Coulomb` is asked for, and its numbers; docs/records/law.md shows what some of them
+    decide."""
 
     rigid: bool = False
     restitution: tuple[float, ...] = ()
@@ -22,7 +23,8 @@ class Law:
     servo: float = 0.0
     """Time in which contacts lose their depth, s; 0: never."""
     share: float = 5e-2
-    """Share of gravity to which the slip of contacts, and what rigid ones bear, must be predicted."""
+    """Share of gravity to which the slip of contacts, and what rigid ones bear, must be
+    predicted."""
     most: int = 20
     """Solutions that a step may take for that."""
     softness: float = 1e-3

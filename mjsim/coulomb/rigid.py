@@ -54,7 +54,8 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
 def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -> float:
     """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1.
 
-    So it does of the gap of a contact that has borne something: closed at once, that would be a blow.
+    So it does of the gap of a contact that has borne something: closed at once, that would be a
+    blow.
     """
     h, law = model.opt.timestep, memory.law
     if contact.gap > 0:
@@ -65,7 +66,8 @@ def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -
 
 @kernel
 def restitution_of(memory: Any, contact: Any) -> float:
-    """Share of its normal speed with which a contact parts after a blow: the larger of its geoms'."""
+    """Share of its normal speed with which a contact parts after a blow: the larger of its
+    geoms'."""
     given = reals(memory.restitution_at, memory.bounces)
     return float(max(given[contact.geoms[0]], given[contact.geoms[1]]))
 
@@ -241,8 +243,8 @@ def rotated(a: Any, turn: Any) -> Any:
 
 @kernel
 def turn_accelerations(model: Any, data: Any, memory: Any, elapsed: float) -> None:
-    """Turn the angular accelerations of the last step, of so many seconds, along with the bodies, in
-    whose axes they are."""
+    """Turn the angular accelerations of the last step, of so many seconds, along with the bodies,
+    in whose axes they are."""
     types, dofs = integers(model.jnt_type, model.njnt), integers(model.jnt_dofadr, model.njnt)
     velocity = reals(data.qvel, model.nv)
     for i in range(model.njnt if memory.law.rigid else 0):
@@ -321,7 +323,8 @@ def turned_freely(inertia: Any, momentum: Any, spin: Any, pushed: Any, h: float)
 
 @kernel
 def of_the_origin(mass: float, arm: Any, spin: Any, after: Any, h: float) -> Any:
-    """Force and moment that keep the velocity of a centre of mass which is off the origin, N, N m."""
+    """Force and moment that keep the velocity of a centre of mass which is off the origin, N, N
+    m."""
     across = cross(after, arm)
     swung = plus(rotated(across, times_vector(h, after)), -1.0, across)
     force = plus(times_vector(mass / h, swung), -mass, cross(spin, cross(spin, arm)))

@@ -29,7 +29,8 @@ def multiply(model: Any, data: Any, memory: Any) -> None:
 
 @kernel
 def set_up(data: Any, memory: Any) -> None:
-    """Read regularisation and reference acceleration of all rows; of soft contacts, friction is held."""
+    """Read regularisation and reference acceleration of all rows; of soft contacts, friction is
+    held."""
     contacts, rows = contacts_of(memory), rows_of(memory)
     R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
     for r in range(len(rows)):

@@ -1,4 +1,5 @@
-"""The law of a step, between MuJoCo's velocities and its solver; and the callback that applies it."""
+"""The law of a step, between MuJoCo's velocities and its solver; and the callback that applies
+it."""
 
 from __future__ import annotations
 
@@ -153,7 +154,8 @@ def conclude(model: Any, data: Any, memory: Any) -> None:
 
 @kernel
 def keep_forces(memory: Any, over: bool) -> None:
-    """What the rows of this step remember, if nothing has moved: of a step that is over its forces."""
+    """What the rows of this step remember, if nothing has moved: of a step that is over its
+    forces."""
     rows = rows_of(memory)
     for r in range(len(rows) if over else 0):
         if rows[r].kind == DRY or rows[r].kind == CONTACT_ROW:
@@ -193,7 +195,8 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> 
 
     Of rigid contacts Newton's method finds slip and forces, for softer ones. Then MuJoCo solves, as
     it will in the step itself, until what was predicted is what is found; of rigid ones for as long
-    as the error still falls tenfold. Friction at mid step is known last, and asks for a solution more.
+    as the error still falls tenfold. Friction at mid step is known last, and asks for a solution
+    more.
     """
     start, last, mid_step_due = reals(data.qacc_warmstart, model.nv), math.inf, memory.law.rigid
     mj_fwdActuation(memory.model, memory.data)
@@ -258,7 +261,8 @@ TABLE = np.dtype(
     ],
     align=True,
 )
-"""What the callback looks up. It is never changed, but for `previous`: another one takes its place."""
+"""What the callback looks up. It is never changed, but for `previous`: another one takes its
+place."""
 
 table = np.zeros(1, np.int64)
 """The address of the `TABLE` in force."""
