@@ -1,5 +1,7 @@
 """Shared by all tests."""
 
+import signal
+
 import pytest
 from hypothesis import settings
 
@@ -8,6 +10,10 @@ from compare.commands import waiting
 # Times vary between machines: a deadline would be an assertion on wall time.
 settings.register_profile("dualball", deadline=None, derandomize=True)
 settings.load_profile("dualball")
+
+
+# A shell that starts tests in the background has them ignore Ctrl-C, which some of them press.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True)
