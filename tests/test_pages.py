@@ -25,8 +25,10 @@ PAGES = [
 ]
 LIMITS = {"README.md": 700, "CHANGELOG.md": 1500}
 """Words of a page, at most."""
-ALL = 26_000
+ALL = 24_800
 """Words of all pages that are to be read, at most; records are not."""
+RECORDS = ("mutants.md", "blind.md")
+"""Pages beside those in docs/records that a script writes; a round played blind adds to one."""
 
 
 class Block(NamedTuple):
@@ -179,7 +181,7 @@ def test_commands_run_as_printed(page, at_home):
 def test_pages_stay_short():
     for name, limit in LIMITS.items():
         assert len((ROOT / name).read_text("utf-8").split()) <= limit, name
-    read = [page for page in PAGES if page.suffix == ".md" and page.name != "mutants.md"]
+    read = [page for page in PAGES if page.suffix == ".md" and page.name not in RECORDS]
     words = sum(len(page.read_text("utf-8").split()) for page in [*read, ROOT / "CHANGELOG.md"])
     for notebook in DOCS.glob("notebooks/*.py"):
         said = re.findall(r"^# (?!%)(.*)", notebook.read_text("utf-8"), re.M)
