@@ -22,14 +22,8 @@ NORMALS = slice(1, 28, 14)
 """Where they hold the normal forces."""
 HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
-_COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = (
-    0,
-    slice(1, 4),
-    4,
-    slice(5, 8),
-    slice(8, 11),
-    slice(12, 14),
-)
+_FORCE, _DIST = slice(1, 4), 4
+_NORMAL, _TANGENT, _SLIP = slice(5, 8), slice(8, 11), slice(12, 14)
 
 
 def joint_state(x: npt.ArrayLike, theta: float, p: Parameters) -> tuple[Array, Array]:

@@ -38,20 +38,24 @@ def spec(p: Parameters, settings: ContactModel) -> Any:
         pair.condim = 3 if friction > 0 else 1
         pair.friction = (friction, friction, 0.0, 0.0, 0.0)
         pair.margin = pair.gap = 0.0
-        if isinstance(settings, ContactSettings):  # the law takes none of these
-            time, ratio = settings.solref
-            # As stiffness and damping: of times the engine would cut (d tc)^2 off at 1e-15 s2.
-            pair.solref = -1 / (time * ratio) ** 2, -2 / time
-            pair.solreffriction = (settings.solreffriction, 1.0)
-            pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
     if isinstance(settings, ContactSettings):
-        option.impratio = settings.impratio
-        option.noslip_iterations = settings.noslip_iterations
-        option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
-        option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
-    else:
+        _set_contacts(spec, settings)
+    else:  # the law takes none of these
         option.impratio = IMPRATIO
     return spec
+
+
+def _set_contacts(spec: Any, settings: ContactSettings) -> None:
+    """Give the scene MuJoCo's own contacts."""
+    option, (time, ratio) = spec.option, settings.solref
+    option.impratio, option.noslip_iterations = settings.impratio, settings.noslip_iterations
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    for pair in spec.pairs:
+        # As stiffness and damping: of times the engine would cut (d tc)^2 off at 1e-15 s2.
+        pair.solref = -1 / (time * ratio) ** 2, -2 / time
+        pair.solreffriction = (settings.solreffriction, 1.0)
+        pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
 
 
 def build(p: Parameters, settings: ContactModel, shown: bool = False) -> tuple[Any, str]:

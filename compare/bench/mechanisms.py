@@ -143,8 +143,8 @@ def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float
     v, w = _SPEED - above * G * early - brake * late, a * early - brake * late
     height = _PLANK[2] * UP
     up = 2 * height + BLOCK[2] * UP
-    return *along(WAY, ours + after, v, 0 * t,
-                  up - 0.3 * WAY), *along(WAY, theirs + after, w, 0 * t, height)
+    block = along(WAY, ours + after, v, 0 * t, up - 0.3 * WAY)
+    return *block, *along(WAY, theirs + after, w, 0 * t, height)
 
 
 _LEAN = math.atan(0.9 * 0.5)
@@ -165,8 +165,8 @@ def _stays(t: Array, mu: float = 0.5) -> _Motion:
     a = max(G * (math.sin(_LEAN) - mu * math.cos(_LEAN)), 0.0)
     under, half = 0.1, 0.2
     low, high = under * np.array(normal), (2 * under + half) * np.array(normal)
-    return *along(way, a * t**2 / 2, a * t, 0 * t,
-                  high), *along(way, a * t**2 / 2, a * t, 0 * t, low)
+    s, v = a * t**2 / 2, a * t
+    return *along(way, s, v, 0 * t, high), *along(way, s, v, 0 * t, low)
 
 
 _INCLINE, _DOWNHILL = math.atan(0.3), 0.8
