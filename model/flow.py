@@ -45,11 +45,12 @@ class Flow:
 
     def __call__(self, t: npt.ArrayLike) -> Array:
         """omega_0 in rad s-1 at times t in s, same shape."""
-        t = np.asarray(t, dtype=float)
+        line = self.line(t)
+        if not len(self.waves):
+            return line
         amplitude, frequency, phase = self.waves.T
-        return np.asarray(
-            self.line(t) + np.sin(2 * np.pi * frequency * t[..., None] + phase) @ amplitude
-        )
+        times = np.asarray(t, dtype=float)[..., None]
+        return np.asarray(line + np.sin(2 * np.pi * frequency * times + phase) @ amplitude)
 
     def line(self, t: npt.ArrayLike) -> Array:
         """omega_0 in rad s-1 without the waves."""

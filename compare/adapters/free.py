@@ -125,6 +125,7 @@ class Free(ABC):
         self.scene: Scene
         self.world: Any
         self.timestep = self.now = self.ahead = 0.0
+        self.seen: State | None = None
 
     def build(self, scene: Scene, timestep: float) -> None:
         """Put the scene at its start into the engine; raises `NotImplementedError` for one that it
@@ -133,6 +134,7 @@ class Free(ABC):
         body, under = scene.body.after(self.ahead), scene.under and scene.under.after(self.ahead)
         self.scene, self.timestep = dataclasses.replace(scene, body=body, under=under), timestep
         self.make()
+        self.seen = None
 
     def step(self, n: int) -> None:
         """Take n steps."""
@@ -141,7 +143,7 @@ class Free(ABC):
         half, reach = self.timestep / 2, scene.body.size[0]
         for _ in range(n):
             if scene.forced or radii:
-                position, velocity, spin, *_ = self.read()
+                position, velocity, spin, *_ = self.look()
                 if scene.forced:
                     self.push(scene.force(self.now, position, velocity))
                 for radius in radii:
@@ -151,11 +153,18 @@ class Free(ABC):
                     point[2] = position[2]
                     self.turn(point, normal, np.append(inwards * normal[:2], up))
             self.advance()
+            self.seen = None
             self.now += self.timestep
+
+    def look(self) -> State:
+        """The state as the engine has it, read once a step."""
+        if self.seen is None:
+            self.seen = self.read()
+        return self.seen
 
     def state(self) -> State:
         """The state now: positions are taken back to where velocities are."""
-        parts = [np.array(part, float) for part in self.read()]
+        parts = [np.array(part, float) for part in self.look()]
         for k in range(0, len(parts), 3):
             parts[k] -= self.ahead * parts[k + 1]
         return tuple(parts)
@@ -181,7 +190,7 @@ class Free(ABC):
 
     @abstractmethod
     def read(self) -> State:
-        """The state as the engine has it."""
+        """Read the state as the engine has it."""
 
     def push(self, force: Vector) -> None:
         """Set the force on the centre for the next step, N."""

@@ -65,6 +65,7 @@ class Bodies(Free):
         names = (self.model.geom(k).name.rstrip("0123456789") for k in range(self.model.ngeom))
         self.surfaces = [named.get(name, -1) for name in names]
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+        self.bodies = [self.data.body(name) for name in ("body", "under")[: len(self.scene.bodies)]]
 
     def advance(self) -> None:
         mujoco.mj_step(self.model, self.data)
@@ -73,8 +74,7 @@ class Bodies(Free):
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
             update(self.model, self.data)
         found, rate = [], np.empty(6)
-        for name in ("body", "under")[: len(self.scene.bodies)]:
-            body = self.data.body(name)
+        for body in self.bodies:
             mujoco.mj_objectVelocity(
                 self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body.id, rate, 0
             )
@@ -82,7 +82,7 @@ class Bodies(Free):
         return tuple(found)
 
     def push(self, force: Vector) -> None:
-        self.data.body("body").xfrc_applied[:3] = force
+        self.bodies[0].xfrc_applied[:3] = force
 
     def touches(self) -> list[Touch]:
         shown, force, contact = [], np.empty(6), self.data.contact
@@ -132,6 +132,7 @@ class Lawful(Bodies):
                 self.timestep = model.opt.timestep = self.whole / parts
                 self.ahead, self.now = self.ahead + change, self.now + change
                 self.law.reset()
+                self.seen = None
             super().step(parts)
 
     def advance(self) -> None:
