@@ -216,16 +216,18 @@ def with_changes(
     """A value of a settled state, of which half the step and other starts change so much; `size` is
     its natural size, and it has so many time steps in a coarse one.
 
-    Errors of solving for forces add up from step to step, for a time 1/c. What adds up with one
-    sign is twice as much with half the step, so that it is about twice the change; what adds up at
-    random the change may not show. Both take the place of what `judge_run` allows for them. (The
-    second was added after a round played blind, where two claims were refuted without it.)"""
+    An error of first order in the step is what half of it changes; errors of solving for forces,
+    which add up with one sign from step to step for a time 1/c, are twice as much with half the
+    step, and so minus twice the change. Between the two anything is as likely: in the mean its
+    square is that of the change. What adds up at random the change may not show. Both take the
+    place of what `judge_run` allows for them. (The second was added after a round played blind,
+    where two claims were refuted without it.)"""
     if divisor == 1:
         return value.also(start=change)
     return estimate(
         value.value,
         drift=value.budget["drift"],
-        solver_or_start=2 * change,
+        solver_or_start=change,
         solver_at_random=SOLVED * math.sqrt(divisor / (p.c * coarse_step(p))) * size,
     )
 
