@@ -224,7 +224,7 @@ def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it():
     sure = settling.with_changes(value, 0.0, p, 12.0, 2).uncertainty
     steps = 2 / (p.c * coarse_step(p))
     assert sure == pytest.approx(12.0 * settling.SOLVED * math.sqrt(steps))
-    assert settling.with_changes(value, 3.0, p, 12.0, 2).uncertainty == pytest.approx(6.0)
+    assert settling.with_changes(value, 3.0, p, 12.0, 2).uncertainty == pytest.approx(3.0)
 
 
 def test_first_top_lies_between_samples():
