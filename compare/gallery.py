@@ -133,13 +133,11 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
         for name in engines
     )
     return figure, (
-        f"By how much what was measured differs from what is predicted, in parts of the tolerance: "
-        f"{told} "
-        f"({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each "
-        f"quantity, and in it one for "
-        "each engine. Shaded: within tolerance, three standard uncertainties; darker: within one; "
-        "red: not as "
-        f"predicted. What is less than {_FRAME[0]:g} or more than {_FRAME[1]:g} stands at the edge."
+        "By how much what was measured differs from what is predicted, in parts of the tolerance: "
+        f"{told} ({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each "
+        "quantity, and in it one for each engine. Shaded: within tolerance, three standard "
+        "uncertainties; darker: within one; red: not as predicted. What is less than "
+        f"{_FRAME[0]:g} or more than {_FRAME[1]:g} stands at the edge."
     )
 
 

@@ -86,9 +86,8 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     missing = tuple(replace(each, rows=rows) for each, rows in left_out.most_common())
     try:
         checks = tuple(checks_of(claim, records))
-    except (
-        Exception
-    ) as error:  # a theory that breaks down, in whatever way, loses its claim and no other
+    except Exception as error:
+        # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
     if (

@@ -263,14 +263,12 @@ def assert_tracks(
     if off.doubt > rms * off.scale / 2:
         raise InputError(
             f"samples are too far apart: interpolating {quantity} may be off by {off.doubt:.1e} "
-            f"{unit}, while "
-            f"rms = {rms:g} allows {rms * off.scale:.1e} {unit}"
+            f"{unit}, while rms = {rms:g} allows {rms * off.scale:.1e} {unit}"
         )
     assert off.rms <= rms * off.scale, (
         f"{quantity} of {a.name} does not track {b.name}: rms {off.rms / off.scale:.2e} > {rms:g} "
-        f"of the largest "
-        f"value, {off.scale:.6g} {unit}; farthest off at t = {off.at:g} s, by {off.largest:.3g} "
-        f"{unit}"
+        f"of the largest value, {off.scale:.6g} {unit}; farthest off at t = {off.at:g} s, by "
+        f"{off.largest:.3g} {unit}"
     )
 
 
@@ -349,9 +347,7 @@ def assert_settles(
     k = int(off.argmax())
     assert off[k] <= rtol * scale, (
         f"the ball does not settle in {name}: for the last {SETTLED_PART * lasts:.3g} s omega_c "
-        f"should be within "
-        f"{rtol:g} of {exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t = {t[k]:g} s (on "
-        f"average "
-        f"{w.mean():.8g} rad/s; it swings by {swing:.1e} rad/s)"
+        f"should be within {rtol:g} of {exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t "
+        f"= {t[k]:g} s (on average {w.mean():.8g} rad/s; it swings by {swing:.1e} rad/s)"
         + "".join(f"; it settles in {other}" for other in elsewhere[:1])
     )

@@ -30,10 +30,8 @@ class Dart(Free):
         self.world.setTimeStep(self.timestep)
         self.world.setGravity([0.0, 0.0, -scene.g])
         if self.best:
-            solver, self.cone = (
-                self.world.getConstraintSolver(),
-                engine.constraint.NsgsFrictionSolver(),
-            )
+            solver = self.world.getConstraintSolver()
+            self.cone = engine.constraint.NsgsFrictionSolver()
             self.world.setCollisionDetector(engine.collision.OdeCollisionDetector())
             solver.setBoxedLcpSolver(self.cone)
             solver.setSplitImpulseEnabled(True)
@@ -47,10 +45,8 @@ class Dart(Free):
                 self.wall.setActuatorType(bodies.ActuatorType.VELOCITY)
                 node.setGravityMode(False)
             elif rate := surface.turning or math.hypot(*surface.velocity):
-                turns, slides = (
-                    skeleton.createRevoluteJointAndBodyNodePair,
-                    skeleton.createPrismaticJointAndBodyNodePair,
-                )
+                turns = skeleton.createRevoluteJointAndBodyNodePair
+                slides = skeleton.createPrismaticJointAndBodyNodePair
                 joint, node = turns() if surface.turning else slides()
                 joint.setAxis(
                     [0.0, 0.0, 1.0] if surface.turning else np.array(surface.velocity) / rate

@@ -36,9 +36,8 @@ ROUND = 1e6
 SIZE = 100.0
 """Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
 
-logging.getLogger("drake").setLevel(
-    logging.ERROR
-)  # it warns that half spaces don't meet deformable bodies
+# it warns that half spaces don't meet deformable bodies
+logging.getLogger("drake").setLevel(logging.ERROR)
 
 
 class Drake(Free):
@@ -106,9 +105,8 @@ class Drake(Free):
         gravity."""
         plant, own = self.plant, self.plant.AddModelInstance(surface.name)
         plant.set_gravity_enabled(own, False)
-        mass = self.scene.body.mass * (
-            1.0 if surface.turning else HEAVY
-        )  # the engine's own stiffness is by mass
+        # the engine's own stiffness is by mass
+        mass = self.scene.body.mass * (1.0 if surface.turning else HEAVY)
         inertia = engine.SpatialInertia(mass, np.zeros(3), engine.UnitInertia(ROUND, ROUND, ROUND))
         body = plant.AddRigidBody(surface.name, own, inertia)
         if surface.turning:
@@ -153,18 +151,14 @@ class Drake(Free):
             pose, shape = engine.HalfSpace.MakePose(normal, point), engine.HalfSpace()
         else:
             turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
-            pose, shape = (
-                engine.RigidTransform(turn, point - size / 2 * normal),
-                engine.Box(size, size, size),
-            )
+            pose = engine.RigidTransform(turn, point - size / 2 * normal)
+            shape = engine.Box(size, size, size)
         return self.add(of, pose, shape, name, surface.friction)
 
     def state_slices(self, body: Any) -> tuple[slice, slice]:
         """Slices of the state: orientation and place of a free body, and its spin and velocity."""
-        at, rate = (
-            body.floating_positions_start(),
-            self.plant.num_positions() + body.floating_velocities_start_in_v(),
-        )
+        at = body.floating_positions_start()
+        rate = self.plant.num_positions() + body.floating_velocities_start_in_v()
         return slice(at, at + 7), slice(rate, rate + 6)
 
     def advance(self) -> None:
@@ -183,10 +177,8 @@ class Drake(Free):
         self.force[first + 3 : first + 6] = force
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        self.x[self.wall[0]], self.x[self.wall[1]] = (
-            [*facing(normal), *point],
-            [0.0, 0.0, 0.0, *velocity],
-        )
+        self.x[self.wall[0]] = [*facing(normal), *point]
+        self.x[self.wall[1]] = [0.0, 0.0, 0.0, *velocity]
 
     def touches(self) -> list[Touch]:
         results = self.plant.get_contact_results_output_port().Eval(self.context)
@@ -194,10 +186,9 @@ class Drake(Free):
         for info in (
             results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())
         ):
-            pair, sign = (
-                info.point_pair(),
-                1 if info.bodyB_index() == self.own else -1,
-            )  # it acts on the second body
+            # it acts on the second body
+            pair = info.point_pair()
+            sign = 1 if info.bodyB_index() == self.own else -1
             surface = self.surfaces[pair.id_A if sign > 0 else pair.id_B]
             shown.append(Touch(surface, sign * info.contact_force(), -pair.depth))
         return shown

@@ -125,9 +125,8 @@ class Lawful(Bodies):
             # would see it.
             lands = ((speed < -slow) & (gap + 1.5 * self.whole * speed < 0)).any()
             parts = _PARTS if lands else 1
-            if (
-                change := (self.whole / parts - self.timestep) / 2
-            ):  # positions are half a step ahead of velocities
+            # positions are half a step ahead of velocities
+            if change := (self.whole / parts - self.timestep) / 2:
                 mujoco.mj_integratePos(model, data.qpos, data.qvel, change)
                 self.timestep = model.opt.timestep = self.whole / parts
                 self.ahead, self.now = self.ahead + change, self.now + change
@@ -184,10 +183,8 @@ def rigid(spec: Any, scene: Scene, timestep: float) -> None:
     replaces facets."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
     for joint in spec.joints:
-        joint.solref_friction, joint.solimp_friction = (
-            (-1.0, -_SOLIMP / timestep),
-            (_SOLIMP, _SOLIMP, 1.0, 0.5, 2.0),
-        )
+        joint.solref_friction = (-1.0, -_SOLIMP / timestep)
+        joint.solimp_friction = (_SOLIMP, _SOLIMP, 1.0, 0.5, 2.0)
     for surface in scene.surfaces:
         if not surface.radius:
             continue

@@ -20,8 +20,7 @@ warp.config.quiet = True
 
 _WORST = (
     "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft "
-    "friction creeps; "
-    "nothing is seen of single precision beside that"
+    "friction creeps; nothing is seen of single precision beside that"
 )
 
 
@@ -39,9 +38,8 @@ class Warp(mujoco_free.Bodies):
         mujoco.mj_forward(model, data)
         self.number = model.body("body").id
         with warp.ScopedDevice("cpu"), warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # that the friction of one geom is less than MuJoCo likes: a pair's counts
+            # that the friction of one geom is less than MuJoCo likes: a pair's counts
+            warnings.simplefilter("ignore")
             self.model, self.data = (
                 engine.put_model(model),
                 engine.put_data(model, data, nconmax=32, njmax=128),

@@ -48,11 +48,9 @@ class Newton(Free):
         if hasattr(self.solver, "register_custom_attributes"):
             self.solver.register_custom_attributes(builder)
         for surface, _, point, normal in self.planes():
-            material, own, at = (
-                rough(surface.friction**2 if rooted else 2 * surface.friction),
-                -1,
-                pose(point, normal),
-            )
+            material = rough(surface.friction**2 if rooted else 2 * surface.friction)
+            own = -1
+            at = pose(point, normal)
             if self.goes_along(surface):
                 self.wall = own = builder.add_body(xform=at, mass=1.0, is_kinematic=True)
                 at = warp.transform()
@@ -107,16 +105,14 @@ def pose(point: Array, normal: Array) -> Any:
 
 _CREEPS = (
     "worst with what must not move: it takes a share of the slip out of positions in each of a few "
-    "iterations, so that "
-    "bodies creep at a rate that more iterations lessen"
+    "iterations, so that bodies creep at a rate that more iterations lessen"
 )
 xpbd_defaults = Newton("XPBD", _CREEPS)
 xpbd = Newton("XPBD", _CREEPS, "10 iterations", iterations=10)
 semiimplicit_defaults = Newton(
     "SemiImplicit",
     "worst at long steps and with light bodies: its springs and friction of 1000 N s/m are "
-    "explicit, and explode at "
-    "4 ms, or with the ball in the vessel",
+    "explicit, and explode at 4 ms, or with the ball in the vessel",
 )
 vbd_defaults = Newton(
     "VBD",

@@ -36,9 +36,8 @@ class PyBullet(Free):
         if here["physicsClientId"] < 0:
             raise RuntimeError("PyBullet has no more servers")
         engine.setPhysicsEngineParameter(fixedTimeStep=self.timestep, enableConeFriction=1, **here)
-        if (
-            self.best
-        ):  # the solver to round-off, no overlap left alone, contacts prepared for from 2 cm on
+        # the solver to round-off, no overlap left alone, contacts prepared for from 2 cm on
+        if self.best:
             engine.setPhysicsEngineParameter(
                 numSolverIterations=200, solverResidualThreshold=1e-24, **here
             )
@@ -47,16 +46,14 @@ class PyBullet(Free):
         self.surfaces: dict[int, int] = {}
         for surface, _, point, normal in self.planes():
             shape = engine.createCollisionShape(engine.GEOM_PLANE, planeNormal=[0, 0, 1], **here)
-            self.wall = engine.createMultiBody(
-                0, shape, **here
-            )  # the last one is the one that moves
+            # the last one is the one that moves
+            self.wall = engine.createMultiBody(0, shape, **here)
             self.surfaces[self.wall] = scene.surfaces.index(surface)
             engine.changeDynamics(
                 self.wall, -1, lateralFriction=surface.friction, restitution=0, **here
             )
-            self.turn(
-                point, normal
-            )  # boxes rock on a plane that isn't turned, but has another normal than z
+            # boxes rock on a plane that isn't turned, but has another normal than z
+            self.turn(point, normal)
         size = [each * self.scale for each in body.size]
         kinds: dict[str, tuple[int, dict[str, Any]]] = {
             "sphere": (engine.GEOM_SPHERE, {"radius": size[0]}),
@@ -76,10 +73,8 @@ class PyBullet(Free):
         self, body: int, place: Any, orientation: Any, velocity: Any, spin: Any = (0, 0, 0)
     ) -> None:
         """Set place, orientation (scalar first), velocity and spin of a body or a plane."""
-        (w, *axis), (place, velocity) = (
-            orientation,
-            ([each * self.scale for each in part] for part in (place, velocity)),
-        )
+        (w, *axis) = orientation
+        (place, velocity) = ([each * self.scale for each in part] for part in (place, velocity))
         engine.resetBasePositionAndOrientation(body, place, [*axis, w], **self.here)
         engine.resetBaseVelocity(body, velocity, spin, **self.here)
 

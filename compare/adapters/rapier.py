@@ -42,19 +42,14 @@ class Rapier(Free):
     def make(self) -> None:
         scene = self.scene
         self.world = engine.PhysicsWorld(gravity=(0.0, 0.0, -scene.g))
-        settings, multiply = (
-            self.world.integration_parameters,
-            engine.CoefficientCombineRule.MULTIPLY,
-        )
+        settings = self.world.integration_parameters
+        multiply = engine.CoefficientCombineRule.MULTIPLY
         settings.dt = self.timestep
         if self.best:
-            settings.contact_recycling, settings.num_solver_iterations = (
-                False,
-                self.SMALL // self.small,
-            )
-            if (
-                self.small > 1
-            ):  # what contacts carried before a landing throws the body off the wall after it
+            settings.contact_recycling = False
+            settings.num_solver_iterations = self.SMALL // self.small
+            # what contacts carried before a landing throws the body off the wall after it
+            if self.small > 1:
                 settings.num_internal_pgs_iterations, settings.warmstart_coefficient = 20, 0.0
             settings.length_unit, settings.normalized_max_linear_velocity = 0.01, 1e6
             settings.contact_softness = settings.static_contact_softness = (

@@ -35,11 +35,9 @@ class Sapien(Free):
         config, bodies = physx.PhysxSceneConfig(), physx.PhysxBodyConfig()
         config.gravity = [0.0, 0.0, -scene.g]
         if self.best:
-            (
-                config.enable_tgs,
-                bodies.solver_position_iterations,
-                bodies.solver_velocity_iterations,
-            ) = False, 50, 20
+            config.enable_tgs = False
+            bodies.solver_position_iterations = 50
+            bodies.solver_velocity_iterations = 20
         physx.set_scene_config(config)
         physx.set_body_config(bodies)
         self.world = engine.Scene([physx.PhysxCpuSystem()])
@@ -50,10 +48,8 @@ class Sapien(Free):
             if self.goes_along(surface):  # planes have no velocity
                 own, size = physx.PhysxRigidDynamicComponent(), (WALL * body.size[0],) * 3
                 own.kinematic, self.half = True, size[0]
-            self.wall, self.face = (
-                self.add(own, pose(point, normal), 2 * surface.friction, size),
-                own,
-            )
+            self.wall = self.add(own, pose(point, normal), 2 * surface.friction, size)
+            self.face = own
         self.body = physx.PhysxRigidDynamicComponent()
         self.entity = self.add(
             self.body, engine.Pose(body.position, body.orientation), 0.0, body.size

@@ -128,7 +128,8 @@ def simulate(
         except (
             RuntimeError,
             InterruptedError,
-        ) as error:  # what engines raise where they can't go on
+        ) as error:
+            # what engines raise where they can't go on
             known = isinstance(error, (BreakdownError, InterruptedError))
             said = f"{error}" if known else f"could not go on ({' '.join(str(error).split())[:80]})"
             failure = f"{said} by t = {steps.done * h:g} s"
@@ -199,9 +200,8 @@ class _Steps:
         A, B = block["force_A"], block["force_B"]
         loads = np.stack([A[:, 1], B[:, 0]], axis=-1)
         used = np.stack([np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])], axis=-1)
-        if np.isnan(
-            A
-        ).any():  # a closed contact bears 1 N, and uses all of its friction if it slips
+        # a closed contact bears 1 N, and uses all of its friction if it slips
+        if np.isnan(A).any():
             loads = (gaps < _REACH * p.r) * 1.0
             used = np.array([p.mu, p.eta]) * loads * (slips > 3 * self.band)
         self.classifier.add(Contacts(loads, used, slips, gaps), last)

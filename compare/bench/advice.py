@@ -133,9 +133,8 @@ class AtRest:
         law = c.law()
         speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
         pair = np.unique(c.geoms, axis=0, return_inverse=True)[1].ravel()
-        slides = np.isin(
-            pair, pair[law.slides & ~self.moves]
-        )  # as a whole, if one of its contacts does
+        # as a whole, if one of its contacts does
+        slides = np.isin(pair, pair[law.slides & ~self.moves])
         return {
             "creep": np.where(self.moves | slides, 0, speed / self.creep),
             "depth": np.where(self.moves, 0, law.depth / self.depth),

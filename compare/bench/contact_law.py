@@ -149,10 +149,8 @@ class Contacts:
         low, high, middle = np.clip(self.solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
         width, power = np.maximum(self.solimp[:, 2], 1e-15), np.maximum(self.solimp[:, 4], 1)
         x = np.minimum(depth / width, 1)
-        rising, falling = (
-            x**power / middle ** (power - 1),
-            (1 - x) ** power / (1 - middle) ** (power - 1),
-        )
+        rising = x**power / middle ** (power - 1)
+        falling = (1 - x) ** power / (1 - middle) ** (power - 1)
         d = low + (high - low) * np.where(x <= middle, rising, 1 - falling)  # the impedance
         softness, k = (1 - d) / d * self.softness, spring * d
         if not self.discrete:
@@ -193,12 +191,10 @@ class Contacts:
     @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
     def law(self) -> Law:
         """What the contacts do under their loads."""
-        load, mu, frictional, slides = (
-            self.force[:, 0],
-            self.friction,
-            self._frictional,
-            self.cone >= CONE,
-        )
+        load = self.force[:, 0]
+        mu = self.friction
+        frictional = self._frictional
+        slides = self.cone >= CONE
         _, b, b_f = self._springs
         depth = self._depth(slides)
         softness, k, damping = self._rows(depth)
@@ -233,9 +229,8 @@ class Contacts:
             * (k_more * (depth + shift) / harder - k_less * (depth - shift) / softer)
             / (2 * shift)
         )
-        if (
-            self.noslip
-        ):  # it corrects friction alone, after normal forces were found beside friction at no creep
+        # it corrects friction alone, after normal forces were found beside friction at no creep
+        if self.noslip:
             creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
             along, soft = self.rows[:, 1:][sticks], 1 / sideways[sticks]
             lacking = np.linalg.solve(
@@ -243,9 +238,8 @@ class Contacts:
             )
             depth = depth - self.rows[:, 0] @ (along.T @ lacking) / k
         creep = np.where(frictional, creep, 0)
-        criterion = np.where(
-            (self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1
-        )  # one row, or all edges of a pyramid
+        # one row, or all edges of a pyramid
+        criterion = np.where((self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1)
         sideways = np.where(frictional & ~slides[:, None], sideways, 0)
         return Law(
             depth=depth - self.margin,
@@ -291,9 +285,8 @@ class Contacts:
         mass, damping, stiffness = dataclasses.replace(self, timestep=timestep).matrices()
         damping, stiffness = timestep * damping, timestep**2 * stiffness
         forms = [4 * mass - 2 * damping - stiffness]
-        if (
-            self.integrator == mujoco.mjtIntegrator.mjINT_RK4
-        ):  # its region ends at -2.785 and 2.83 i
+        # its region ends at -2.785 and 2.83 i
+        if self.integrator == mujoco.mjtIntegrator.mjINT_RK4:
             forms = [2.785**2 * mass - 2.785 * damping + stiffness, 8 * mass - stiffness]
         return all((np.linalg.eigvalsh(form) > 0).all() for form in forms)
 
@@ -327,13 +320,10 @@ class Law:
 
 def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     """The contacts that carry more than a faint load at a state, and their numbers in `data`."""
-    twin = copy.copy(
-        model
-    )  # in it each row is a direction of a contact, whatever the cone and the integrator
-    twin.opt.cone, twin.opt.integrator = (
-        mujoco.mjtCone.mjCONE_ELLIPTIC,
-        mujoco.mjtIntegrator.mjINT_EULER,
-    )
+    # in it each row is a direction of a contact, whatever the cone and the integrator
+    twin = copy.copy(model)
+    twin.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    twin.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     twin.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     state = mujoco.MjData(twin)
     mujoco.mj_copyData(state, twin, data)

@@ -194,9 +194,8 @@ LEGEND = (
     "tenth of a second, or a second where speeds still change.",
     "Cone: share of the friction that a contact can bear which it needs; beyond 100 % it slides. "
     "Short: share of Coulomb's friction that the pyramid lacks in the direction of the load or "
-    "slip. "
-    "Hover: slip speed from which a sliding contact is lost again and again. Step: largest time "
-    "step at which small motions die out; “any” if it is a second or more.",
+    "slip. Hover: slip speed from which a sliding contact is lost again and again. Step: largest "
+    "time step at which small motions die out; “any” if it is a second or more.",
     f"–: it slides, moves on, or has no such friction. A contact that bears less than {FAINT:.1%} "
     "of the weight of its lighter body counts as none. #2: a geom without a name, by its number.",
 )

@@ -48,9 +48,16 @@ LEAST = 1e-8
 """Smaller errors are drawn here."""
 FEW = 3
 """So many engines have room for their errors beside their marks."""
-ENTRY_MARKS, ENTRY_COLOURS = (
-    "osv^DPX*<>phd",
-    ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
+ENTRY_MARKS = "osv^DPX*<>phd"
+ENTRY_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#000000",
+    "#8C564B",
 )
 
 

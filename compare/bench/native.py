@@ -109,8 +109,7 @@ def read(path: Path) -> Native:
     if not floors + walls:
         raise InputError(
             f"{path}: the ball has no contacts: it needs a <pair> with something, or a geom whose "
-            f"contype and "
-            "conaffinity meet its own, and contacts switched on"
+            "contype and conaffinity meet its own, and contacts switched on"
         )
     missing, other = ("floor", "wall") if walls else ("wall", "floor")
     note = (
@@ -134,9 +133,8 @@ def _contacts(model: Any, ball: int) -> tuple[list[Pair], list[Pair]]:
     model.geom_margin[ball] += _FAR
     model.pair_margin[:] += _FAR
     model.opt.o_margin += _FAR
-    model.opt.disableflags |= (
-        mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-    )  # which knows of the margins in the file alone
+    # which knows of the margins in the file alone
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     pairs: tuple[list[Pair], list[Pair]] = [], []

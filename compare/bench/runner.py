@@ -156,10 +156,8 @@ class EngineProcess:
     """A process with an engine in it."""
 
     def __init__(self, engine: Any, limit: float = LIMIT) -> None:
-        self._engine, self._limit = (
-            engine.__name__ if hasattr(engine, "__spec__") else engine,
-            limit,
-        )
+        self._engine = engine.__name__ if hasattr(engine, "__spec__") else engine
+        self._limit = limit
         self.about = self._start()
 
     def _start(self) -> About:
@@ -345,9 +343,8 @@ def _attempt(engine: Any, case: ContactCase, step: float) -> Any:
         engine.build(case, step)
         for k, t in enumerate(case.times.tolist()):
             near = math.floor(t / step + 1e-6)
-            for at in (
-                (near, near + 1) if t / step - near > 1e-6 else (near,)
-            ):  # between two steps, along a line
+            # between two steps, along a line
+            for at in (near, near + 1) if t / step - near > 1e-6 else (near,):
                 begin = time.process_time()
                 if at > done:
                     engine.step(at - done)

@@ -186,16 +186,13 @@ def settle(
     too_much = list[float]()
     while data.time < begin + limit and calm < 2:
         start, velocity = data.time, mean_velocities(model, data, step)
-        speed, change = (
-            np.hypot.reduce(velocity * scale, 1),
-            np.hypot.reduce((velocity - last) * scale, 1),
-        )
+        speed = np.hypot.reduce(velocity * scale, 1)
+        change = np.hypot.reduce((velocity - last) * scale, 1)
         turned, last = np.hypot.reduce(velocity[:, 3:], 1) * (data.time - start), velocity
         restless = (change > np.minimum(RESTLESS * speed, JOLT) + NOISE) | (turned > TURNING)
         restless[0] = False  # the world
-        calm = (
-            calm + 1 if (change <= STEADY * speed + STILL).all() else 0
-        )  # a speed may pass through a maximum
+        # a speed may pass through a maximum
+        calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0
         too_much.append(math.log(max(1.0, (change / (STEADY * speed + STILL)).max())))
         passed = data.time - begin
         tell(min(1.0, passed / min(limit, time_to_settle(too_much, passed))))
@@ -309,11 +306,9 @@ def measured_slip(
     """How deep each contact is, and how fast its two bodies slip past each other and turn, in the
     mean of a window."""
     found = data.contact
-    depth, drift, frames = (
-        -found.dist[number],
-        found.surfacevel[number, :2],
-        found.frame[number].reshape(-1, 3, 3),
-    )
+    depth = -found.dist[number]
+    drift = found.surfacevel[number, :2]
+    frames = found.frame[number].reshape(-1, 3, 3)
     bodies = model.geom_bodyid[c.geoms]
     lever = found.pos[number][:, None] - data.xipos[bodies]
     velocity = mean_velocities(model, data, step, time)[bodies]

@@ -299,9 +299,8 @@ class Campaign:
             while fresh and len(pending) < 2 * self.fleet.count:
                 batch = fresh.popleft()
                 pending[self.fleet.submit(run_batch, batch, self._storing, self.limit)] = batch
-            if not any(
-                future.done() for future in pending
-            ):  # `wait` waits for cancelled ones that nobody told of it
+            # `wait` waits for cancelled ones that nobody told of it
+            if not any(future.done() for future in pending):
                 wait(pending, return_when=FIRST_COMPLETED)
             for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)

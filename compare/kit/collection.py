@@ -73,9 +73,8 @@ def collect(
     files = []
     for file in sorted(directory.rglob("*.h5")):
         if output.exists() and file.samefile(output):
-            with reading(
-                output
-            ) as before:  # what is to be overwritten must be the collection of the last time
+            # what is to be overwritten must be the collection of the last time
+            with reading(output) as before:
                 if before.attrs.get("schema") != SCHEMA:
                     raise StorageError("it holds runs to be gathered, and can't be the output, too")
         else:
@@ -114,9 +113,8 @@ def collect(
     shape = [len(values) for values in axes.values()]
     if axes and math.prod(shape) == len(rows):
         places = [np.searchsorted(values, collected[name]) for name, values in axes.items()]
-        if np.array_equal(
-            np.ravel_multi_index(places, shape), np.arange(len(rows))
-        ):  # each point of a grid once
+        # each point of a grid once
+        if np.array_equal(np.ravel_multi_index(places, shape), np.arange(len(rows))):
             dimensions = coordinates
             collected = axes | {
                 name: v.reshape(shape) for name, v in collected.items() if name not in axes

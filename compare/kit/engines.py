@@ -154,10 +154,8 @@ def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
 
 def _theory(method: str, task: Any, progress: Callable[[float], None]) -> Trajectory:
     """A run by a method of theory, as far as it came."""
-    run, settings = (
-        (task.parameters, task.x0, task.t_end, task.fluid),
-        replace(task.settings, method=method),
-    )
+    run = (task.parameters, task.x0, task.t_end, task.fluid)
+    settings = replace(task.settings, method=method)
     try:
         return analytic.simulate(
             *run, settings, sample_interval=task.sample_interval, progress=progress

@@ -88,9 +88,8 @@ class Sampling:
     unsteady_lasts: float = 48.0  # time after a jump in units of 1/c
     unsteady_divisors: tuple[int, int] = (2, 4)  # its time steps in a coarse one
     unsteady_ramps: tuple[int, int] = (1, 2)  # those of ramps
-    unsteady_rates: tuple[float, ...] = (
-        1e-2,
-    )  # of ramps, in c times the range of flows in which the ball slips
+    # of ramps, in c times the range of flows in which the ball slips
+    unsteady_rates: tuple[float, ...] = (1e-2,)
     pulsation_octaves: tuple[int, ...] = (3, 6)  # of the frequencies, above c/(4 pi)
     pulsation_steps: int = 512  # least number of time steps in a period
     pulsation_samples: int = 256  # in a period
@@ -112,10 +111,11 @@ class Sampling:
     field_starts: int = 4  # random starts for every case and set
     field_kept: int = 4  # most states measured for every case and set
     rates_divisors: tuple[int, int] = (8, 16)  # the two time steps, in parts of the coarse step
+    # in SR: with shorter ones an almost unloaded floor carries more or none
     rates_leaning: tuple[int, int] = (
         8,
         16,
-    )  # in SR: with shorter ones an almost unloaded floor carries more or none
+    )
     rates_more: float = 1  # multiples of the numbers of states in rates.STATES
     laws_divisors: tuple[int, int] = (4, 8)  # the two time steps, in parts of the coarse step
     motions_pieces: int = 6  # of a motion

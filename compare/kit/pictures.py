@@ -63,9 +63,8 @@ def svg(figure: Figure) -> str:
     renderer: Any = RendererSVG
     for second in (each for axes in figure.axes for each in axes.child_axes):
         second.draw(renderer(1, 1, io.StringIO()))  # it knows its limits only once it was drawn
-    canvas: Any = FigureCanvasSVG(
-        figure
-    )  # draws once; `Figure.savefig` would do so twice, for the layout
+    # draws once; `Figure.savefig` would do so twice, for the layout
+    canvas: Any = FigureCanvasSVG(figure)
     canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
     root = ElementTree.fromstring(re.sub(rb">\s+<", b"><", out.getvalue()))
     for group in root.iter(f"{_SVG}g"):
@@ -95,17 +94,15 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
         letter = r'<path id="(\w+-[\w-]+)"[^>]*/>'
         letters |= {found[1]: found[0] for found in re.finditer(letter, picture)}
         text = re.sub(letter, "", picture).replace("<defs></defs>", "")
-        text = re.sub(
-            r"<style.*?</style>", "", text
-        )  # for all lines of a picture: pages have it, too
+        # for all lines of a picture: pages have it, too
+        text = re.sub(r"<style.*?</style>", "", text)
         text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace(
             "xlink:href", "href"
         )
         start = re.match(r'<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', text)
         assert start
-        least = 0.64 * float(
-            start[2]
-        )  # letters of 10 points are at least 6.4 pixels high on a phone
+        # letters of 10 points are at least 6.4 pixels high on a phone
+        least = 0.64 * float(start[2])
         made[name] = (
             f'<svg {start[1]} role="img" style="--least:{least:.0f}px">' + text[start.end() :]
         )

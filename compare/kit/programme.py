@@ -185,9 +185,8 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
                         broken[name] = error
                         yield known[name], error
         except BaseException:
-            workers.close(
-                at_once=True
-            )  # else the threads would wait for runs that nobody wants any more
+            # else the threads would wait for runs that nobody wants any more
+            workers.close(at_once=True)
             raise
 
 

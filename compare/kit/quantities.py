@@ -105,11 +105,12 @@ _RATES: tuple[tuple[str, str, str, Scale], ...] = (
 )
 """Variables with a rate of change: name, symbol, unit, and the scale of the rate."""
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
+# determined where both contacts roll
 _FORCES |= {
     "Ax-By": "A_x − B_y",
     "Ay+By": "A_y + B_y",
     "Bx+By": "B_x + B_y",
-}  # determined where both contacts roll
+}
 _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),

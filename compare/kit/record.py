@@ -62,10 +62,11 @@ class Measurement:
 
     def __post_init__(self) -> None:
         quantity(self.quantity)
+        # whole numbers and numpy's come back from a file as floats
         for name in (
             "value",
             "uncertainty",
-        ):  # whole numbers and numpy's come back from a file as floats
+        ):
             object.__setattr__(self, name, float(getattr(self, name)))
 
     def at(self, name: str) -> float:

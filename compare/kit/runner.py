@@ -58,9 +58,8 @@ class Runner:
         One that goes on from another begins on floor and wall, into which contacts may have let it
         sink."""
         x = np.array(x0, float)
-        x[[0, 6][: len(x) // 4]] = np.maximum(
-            x[[0, 6][: len(x) // 4]], 0.0
-        )  # y, and h where it is given
+        # y, and h where it is given
+        x[[0, 6][: len(x) // 4]] = np.maximum(x[[0, 6][: len(x) // 4]], 0.0)
         return Task(
             engine=self.engine.name,
             parameters=p,

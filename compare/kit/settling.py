@@ -97,10 +97,8 @@ def settle(
     goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land."""
     span, loose = criteria.span, math.inf if runner.engine.relative_tolerance else criteria.loose
-    rounds, steps = (
-        criteria.rounds or runner.sampling.settling_rounds,
-        runner.sampling.settling_steps,
-    )
+    rounds = criteria.rounds or runner.sampling.settling_rounds
+    steps = runner.sampling.settling_steps
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
     states: dict[int, SteadyState] = {}
     todo = dict(enumerate(starts))
@@ -178,9 +176,8 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
         }
         swings = max(float(np.ptp(series[q][-length:])) / quantity(q).size(p) for q in worst)
         drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolution for q in worst)
-        solving = max(
-            COVERAGE * solved / quantity(q).resolution for q in worst
-        )  # the same however long a run is
+        # the same however long a run is
+        solving = max(COVERAGE * solved / quantity(q).resolution for q in worst)
         excess, failure = max(drifting, swings / 1e-3), ""
         if counts.max() < 0.98 * length and loose < math.inf:
             excess = math.inf

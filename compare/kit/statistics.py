@@ -311,9 +311,8 @@ def exponents(
 
     def rates_at(lag: int) -> npt.NDArray[np.complex128]:
         values = np.linalg.eigvals(at(lag)).astype(complex)
-        logarithms = np.log(
-            np.where(values == 0, np.finfo(float).eps, values)
-        )  # a zero is a decay to round-off
+        # a zero is a decay to round-off
+        logarithms = np.log(np.where(values == 0, np.finfo(float).eps, values))
         return np.asarray(logarithms / (lag * interval))
 
     lag, rates = 1, rates_at(1)

@@ -106,11 +106,12 @@ def processes(count: int) -> Workers:
         return Workers(1, _Here, lambda executor, at_once: None, ())
 
     def start() -> Executor:
+        # inherited by the workers; numpy reads it when they import it
         for library in (
             "OMP",
             "OPENBLAS",
             "MKL",
-        ):  # inherited by the workers; numpy reads it when they import it
+        ):
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
         resource_tracker.ensure_running()  # it lets signals through
         with _without_signals():  # a semaphore that is half made would be left
@@ -131,9 +132,8 @@ class _Pool(ProcessPoolExecutor):
 
     def __init__(self, count: int) -> None:
         context = get_context("spawn")
-        self._end, self.leash = context.Pipe(
-            duplex=False
-        )  # ours must stay open until all workers have started
+        # ours must stay open until all workers have started
+        self._end, self.leash = context.Pipe(duplex=False)
         super().__init__(
             count, mp_context=context, initializer=_follow_parent, initargs=(self._end,)
         )
@@ -196,9 +196,8 @@ def _follow_parent(end: Connection) -> None:
         leave(1)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(
-        signal.SIGTERM, lambda number, frame: leave(1)
-    )  # by the pool, where another worker died
+    # by the pool, where another worker died
+    signal.signal(signal.SIGTERM, lambda number, frame: leave(1))
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     threading.Thread(target=wait_for_parent, daemon=True).start()

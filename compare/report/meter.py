@@ -65,11 +65,10 @@ def sentences(made: Design) -> list[str]:
     said.append(f"Best: {made.material}, {_values_as_text(chosen.values)}.")
     if chosen.margin:
         said.append(
-            "Rolling at both points is the ball's only lasting motion up to at worst "
-            f"ω₀ = {rounded(chosen.worst.omega_0, off)} rad/s, {rounded(chosen.margin, off)} times "
-            f"the fastest flow, "
-            f"{request.fastest:g} rad/s ({rounded(chosen.limit.omega_0, off)} nominally): there "
-            f"{chosen.worst.end.value}."
+            "Rolling at both points is the ball's only lasting motion up to at worst ω₀ = "
+            f"{rounded(chosen.worst.omega_0, off)} rad/s, {rounded(chosen.margin, off)} times the "
+            f"fastest flow, {request.fastest:g} rad/s ({rounded(chosen.limit.omega_0, off)} "
+            f"nominally): there {chosen.worst.end.value}."
         )
     else:
         said.append(f"It has no operating range: {chosen.worst.end.value}.")
@@ -81,8 +80,7 @@ def sentences(made: Design) -> list[str]:
     if chosen.margin:
         said.append(
             "The inertia of the fluid, which the model leaves out, would make the limit at worst "
-            "about "
-            f"{rounded(made.with_inertia, off)} rad/s."
+            f"about {rounded(made.with_inertia, off)} rad/s."
         )
     if math.isfinite(chosen.response):
         said.append(

@@ -71,9 +71,8 @@ def render(
             "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],
             "repeat": f"dualball validate --claim {claim.id}{option} -o {directory.resolve().name}",
         }
-        shown = (
-            dict.fromkeys(own, claim.id) | shown
-        )  # a figure of several claims stands beside the first
+        # a figure of several claims stands beside the first
+        shown = dict.fromkeys(own, claim.id) | shown
         sections.setdefault(claim.section, []).append(row)
     first = "characteristic"  # a meter's reading by theory and every engine: what all is about
     apart = [figures[name] for name in sorted(free, key=lambda name: name != first)]
@@ -158,9 +157,8 @@ def _opening_sentence(ran: Sequence[Verdict]) -> str:
         return "Its closed-form theory by Antali and Stépán is held against simulation."
     return (
         "In stationary states the angular velocity ω_c of its orbit, predicted in closed form by "
-        "Antali and Stépán, is "
-        f"{len(orbits)} of the numbers below; the largest relative deviation of these is "
-        f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
+        f"Antali and Stépán, is {len(orbits)} of the numbers below; the largest relative deviation "
+        f"of these is {max(abs(check.deviation / check.scale) for check in orbits):.1e}."
     )
 
 
@@ -183,9 +181,10 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
     """Columns of the page's searchable table: a row for each check, and each measurement on which
     no claim bears."""
 
+    # the same for a copy that another process has judged
     def identity(
         m: Measurement,
-    ) -> tuple[Any, ...]:  # the same for a copy that another process has judged
+    ) -> tuple[Any, ...]:
         conditions = tuple(sorted(m.conditions.items()))
         return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, conditions
 

@@ -163,10 +163,8 @@ def engine_sentence(said: EngineVerdict) -> str:
     count = len(said.checks)
     numbers = f" on {count} number{'s' if count > 1 else ''}" if count else ""
     errors = f"; would notice {found}" if (found := noticed_errors(said.resolving_power)) else ""
-    off, why = (
-        at if math.isfinite(said.farthest) else "",
-        f"; {said.reason}" if said.reason else "",
-    )
+    off = at if math.isfinite(said.farthest) else ""
+    why = f"; {said.reason}" if said.reason else ""
     return f"{said.outcome}{numbers}{order}{errors}{off}{left_out}{why}"
 
 

@@ -51,9 +51,8 @@ class Basins:
     attractors: npt.NDArray[np.int64]
     """Indices of `ATTRACTORS`, by the event-driven simulation, shape (m, n)."""
     coarse: int  # MuJoCo has computed every `coarse`-th point along both axes; 0 for none
-    mujoco: npt.NDArray[
-        np.int64
-    ]  # its attractors, shape (m / coarse, n / coarse) rounded up, and its time step in s
+    # its attractors, shape (m / coarse, n / coarse) rounded up, and its time step in s
+    mujoco: npt.NDArray[np.int64]
     timestep: float
 
     def share(self, attractor: str) -> tuple[int, int]:
@@ -68,9 +67,8 @@ class Basins:
         distance = np.zeros(self.attractors.shape)
         for attractor in np.unique(self.attractors):
             own = np.pad(self.attractors == attractor, 1, mode="edge")
-            distance += distance_transform_cdt(own, metric="chessboard")[
-                1:-1, 1:-1
-            ]  # 0 outside its basin
+            # 0 outside its basin
+            distance += distance_transform_cdt(own, metric="chessboard")[1:-1, 1:-1]
         coarse = np.s_[:: self.coarse, :: self.coarse]
         return np.asarray(distance[coarse][self.attractors[coarse] != self.mujoco])
 

@@ -114,12 +114,9 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
     return figure, style.caption(
         p,
         "Stationary motions as in Fig. 13 (left) and Figs. 9 and 10 (right), and the hopping ball "
-        "(purple): its mean "
-        "over a period, shaded from least to greatest. Hops begin with no height at ω₀₂, where NS, "
-        "NR, SR and the "
-        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} "
-        f"here. Dashed: "
-        f"unstable. r/R = {p.r / p.R:.3g},",
+        "(purple): its mean over a period, shaded from least to greatest. Hops begin with no "
+        "height at ω₀₂, where NS, NR, SR and the unstable SS meet; the largest |multiplier| is "
+        f"{factors.min():.3f} … {factors.max():.3f} here. Dashed: unstable. r/R = {p.r / p.R:.3g},",
         states=of.states,
     )
 
@@ -144,10 +141,9 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     named = style.named(of.p, "mu", "eta", "j", "kappa", "omega_0")
     return figure, (
         f"The hopping ball over one period of {orbit.period:.5g} s: height, and the orbit in two "
-        f"planes of the state "
-        f"space, coloured by case: {', '.join(case.name for case in dict.fromkeys(cycle.cases))}; "
-        f"a gap at the impact. "
-        f"It rises to {1e3 * cycle.y.max():.3g} mm. Largest |Floquet multiplier| "
+        "planes of the state space, coloured by case: "
+        f"{', '.join(case.name for case in dict.fromkeys(cycle.cases))}; a gap at the impact. It "
+        f"rises to {1e3 * cycle.y.max():.3g} mm. Largest |Floquet multiplier| "
         f"{abs(orbit.multipliers[0]):.4g}; {named} rad/s."
     )
 
@@ -175,10 +171,8 @@ def _wall_branch(p: Parameters) -> tuple[list[_Hop], list[tuple[Bifurcation, _Ho
         )
 
     branch = orbit_branch.follow(_orbit_or_gap(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
-    rows, places = (
-        [hop(orbit, orbit.p.eta) for orbit in branch.orbits],
-        list[tuple[Bifurcation, _Hop]](),
-    )
+    rows = [hop(orbit, orbit.p.eta) for orbit in branch.orbits]
+    places = list[tuple[Bifurcation, _Hop]]()
     for place in branch.places:
         if place.kind is Bifurcation.BIRTH:
             at, (one, two) = (
@@ -239,13 +233,11 @@ def draw_walls(of: Diagram) -> tuple[Figure, str]:
         if kind is not _UNNAMED
     )
     return figure, (
-        f"Height and mean ω_c of the hopping ball against the friction of the wall, from "
-        f"{LEAST_WALL:g} to "
-        f"{MOST_WALL:g} times its own. Named along the branch: {told or 'nothing'}. At a birth "
-        f"hops have no height; at "
-        "a torus bifurcation they lose stability, in a fold the branch turns back. Dots without "
-        "names: the sequence of "
-        f"cases changes. Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} "
+        "Height and mean ω_c of the hopping ball against the friction of the wall, from "
+        f"{LEAST_WALL:g} to {MOST_WALL:g} times its own. Named along the branch: "
+        f"{told or 'nothing'}. At a birth hops have no height; at a torus bifurcation they lose "
+        "stability, in a fold the branch turns back. Dots without names: the sequence of cases "
+        f"changes. Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} "
         f"rad/s.{mark}"
     )
 

@@ -224,9 +224,8 @@ def followed(
     def task(q: Parameters, x: Array, lasts: float, divisor: int) -> Task:
         return runner.task(q, x, lasts, coarse_step(q) / divisor, samples=round(lasts / SAMPLE))
 
-    steady = [
-        np.array([TOP.stacked()] * 2)
-    ]  # fixed points of the map from hop to hop, with both steps (2, 8)
+    # fixed points of the map from hop to hop, with both steps (2, 8)
+    steady = [np.array([TOP.stacked()] * 2)]
     factors, tasks = [], []
     for k, q in enumerate(walls):
         ahead = steady[-1]
@@ -284,9 +283,8 @@ def rebounding(
         (run,) = runner.campaign.run([task(x, MEASURED, e)])
         if hops(run):
             last = tops(run, 0.0, MEASURED)
-            x = last.x[-8:].mean(
-                axis=0
-            )  # the hops swing about their mean, and attract from nearby only
+            # the hops swing about their mean, and attract from nearby only
+            x = last.x[-8:].mean(axis=0)
         elif not e:
             yield Missing("rebounding", SET, "the ball does not hop")
             return

@@ -136,9 +136,8 @@ def _at_event(m: Measurement) -> Estimate:
             "landing_speed": -impulse / m.parameters.m,
         }
         value = values[m.quantity]
-    return Estimate(
-        value, math.hypot(unsure, 100 * RTOL * value)
-    )  # errors of 100 steps may have the same sign
+    # errors of 100 steps may have the same sign
+    return Estimate(value, math.hypot(unsure, 100 * RTOL * value))
 
 
 OFF = 0.05
@@ -203,10 +202,8 @@ def _loop_reading_of_design(m: Measurement) -> float:
     return float(low if m.text("side") == "up" else high)
 
 
-_ENDS_OF_RANGES, _DESIGN = (
-    (("omega_01", slips_first), ("omega_02", lifts_first)),
-    "analytic.flowmeter.design",
-)
+_ENDS_OF_RANGES = (("omega_01", slips_first), ("omega_02", lifts_first))
+_DESIGN = "analytic.flowmeter.design"
 _WITHIN_TOLERANCES: tuple[Callable[[Measurement], float], ...] = (
     _worst,
     *(partial(_end_of_spread, end=k) for k in (0, 1)),
@@ -244,8 +241,7 @@ CLAIMS = (
         "operating-range",
         "Section 5.3",
         "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, "
-        "from rest the ball "
-        "slips (η < j), and on the wall it stays (η > j).",
+        "from rest the ball slips (η < j), and on the wall it stays (η > j).",
         # Slipping on the floor no ball sinks.
         Criterion(
             "settled", "case", _only_rolling, when=all_of(from_floor, _does_not_sink, slips_first)
@@ -302,8 +298,7 @@ CLAIMS = (
         "fig-13-right",
         "Fig. 13, right; section 5.3",
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and "
-        "ends slipping or "
-        "rolling at both points.",
+        "ends slipping or rolling at both points.",
         Criterion("unloading", "case", _end_case, when=given(start=UNLOADED), by=_SIMULATED),
         *criteria(
             "unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED
@@ -323,9 +318,8 @@ CLAIMS = (
         "design-limit",
         "extension",
         "The operating range of a meter ends where its design says; with friction 5 % off its "
-        "nominal value, at the "
-        "lowest or the highest limit of that tolerance. ω₀₂ follows the wall's friction by the "
-        "design's sensitivity.",
+        "nominal value, at the lowest or the highest limit of that tolerance. ω₀₂ follows the "
+        "wall's friction by the design's sensitivity.",
         *(
             Criterion("thresholds", end, _exact, when=all_of(first, _stokes), by=_DESIGN)
             for end, first in _ENDS_OF_RANGES
@@ -343,8 +337,7 @@ CLAIMS = (
         "design-reading",
         "extension, Fig. 13",
         "Where a flow has several stable readings, the meter shows the lowest while the flow rises "
-        "and the highest "
-        "while it falls, as its design says.",
+        "and the highest while it falls, as its design says.",
         Criterion(
             "hysteresis",
             "omega_c",

@@ -78,12 +78,10 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
     states = [m for curve in curves for m in curve.states]
     return figure, (
         f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: "
-        f"closed-form theory, "
-        "dashed where unstable; of cases that lie on one line the colours take turns. Settled "
-        "states were measured "
-        "from rest, going round with the fluid, and high up on the wall. Below: relative deviation "
-        "from the nearest "
-        f"attracting solution; what is below 1e-16 is drawn there.{style.marks(states)}"
+        "closed-form theory, dashed where unstable; of cases that lie on one line the colours take "
+        "turns. Settled states were measured from rest, going round with the fluid, and high up on "
+        "the wall. Below: relative deviation from the nearest attracting solution; what is below "
+        f"1e-16 is drawn there.{style.marks(states)}"
     )
 
 
@@ -98,8 +96,7 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     if rises:
         said = (
             "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where "
-            "the flow came from "
-            "(arrows). Dashed: unstable."
+            "the flow came from (arrows). Dashed: unstable."
         )
         _jumps(axes, p, t)
         for side, (mark, text) in _WAYS.items():
@@ -113,10 +110,8 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     else:
         said = (
             "RR, SR and NR lie on one line, in which their colours take turns; between ω₀₂ and ω₀₃ "
-            "SR is on it, too, "
-            "and unstable. "
-            "Black dot: where a ball that is carried by the wall drops when the flow falls, see "
-            "the figure of its fall."
+            "SR is on it, too, and unstable. Black dot: where a ball that is carried by the wall "
+            "drops when the flow falls, see the figure of its fall."
         )
         axes.plot([t.omega_02], [t.omega_02], **style.POINT)
         style.points(axes, [m for m in of.states if m.text("case") in ("RR", "SR", "NR")], ms=4)
@@ -279,14 +274,10 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
     return figure, style.caption(
         of.p,
         "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the "
-        "wall (NS), sinks, "
-        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the "
-        "impact at t = 0, "
-        "magnified in time and height (dots: samples): it stops the sinking at once; a hop would "
-        "show as a gap, "
-        "a depth as a negative one. "
-        f"Background: the case, by name above; engine: "
-        f"{of.motions[-1].engine if of.motions else EVENT.name}.",
+        "wall (NS), sinks, hits the floor, slips at both points (SS), at the floor (SR), and rolls "
+        "(RR). Right: the impact at t = 0, magnified in time and height (dots: samples): it stops "
+        "the sinking at once; a hop would show as a gap, a depth as a negative one. Background: "
+        f"the case, by name above; engine: {of.motions[-1].engine if of.motions else EVENT.name}.",
     )
 
 
@@ -359,9 +350,8 @@ def draw_readings(made: Design) -> tuple[Figure, str]:
     style.legend(axes, loc="lower right")
     return figure, (
         "Angular velocity of the ball's orbit, against that of the fluid. Where the lines part, "
-        "the reading depends on "
-        "whether the flow rose or fell. Grey: from the lowest to the highest reading within the "
-        "tolerances."
+        "the reading depends on whether the flow rose or fell. Grey: from the lowest to the "
+        "highest reading within the tolerances."
     )
 
 
@@ -412,10 +402,8 @@ def draw_friction(made: Design) -> tuple[Figure, str]:
     axes.set(xlabel="wall friction $\\eta$", ylabel="floor friction $\\mu$")
     return figure, (
         "How far the operating range reaches over both frictions, with ball, vessel and fluid as "
-        "chosen. Dot: the "
-        "choice, with its tolerances; white line: the fastest flow to measure; dotted: η = j, left "
-        "of "
-        "which slip limits the range, and right of which unloading does."
+        "chosen. Dot: the choice, with its tolerances; white line: the fastest flow to measure; "
+        "dotted: η = j, left of which slip limits the range, and right of which unloading does."
     )
 
 

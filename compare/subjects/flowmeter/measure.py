@@ -108,10 +108,8 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
         few = np.linspace(0, len(alike) - 1, most).round() if case is Case.SS else [len(alike) - 1]
         for k in sorted({int(n) for n in few if alike}):
             omega_0, values = alike[k]
-            q, moving = (
-                values["omega_c"].parameters,
-                ("v_y", "omega_c", "slip_x", "slip_y", "slip_z"),
-            )
+            q = values["omega_c"].parameters
+            moving = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
             x0 = (
                 settling.safe_height(q) * (case is Case.NR),
                 *(values[each].value for each in moving),
@@ -186,10 +184,8 @@ def hysteresis(
     for loop in loops.values():  # a run through all levels, each held for a time
         p, flows = loop[0].p, [level.p.omega_0 for level in loop]
         step, hold = coarse_step(p), settling.duration(p, runner.sampling.hysteresis_hold)
-        samples, flow = (
-            round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows),
-            Flow.staircase(flows, hold),
-        )
+        samples = round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows)
+        flow = Flow.staircase(flows, hold)
         tasks.append(
             runner.task(
                 p, State(omega_c=flows[0]), hold * len(flows), step, flow=flow, samples=samples
@@ -259,12 +255,10 @@ class Shown:
     event: str
 
 
-LANDING, UNLOADED, UPWARDS, BY_SPIN = (
-    "unloading until it lands",
-    "unloading",
-    "push upwards",
-    "push by spin",
-)
+LANDING = "unloading until it lands"
+UNLOADED = "unloading"
+UPWARDS = "push upwards"
+BY_SPIN = "push by spin"
 """Names of the pairs."""
 
 
@@ -359,10 +353,8 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
     # A ball slips some 0.5/c later, and then falls: it lands at 0.3 to 0.7 of this time on sets of
     # many kinds.
     lands = 1.2 + 7 * p.c * time_unit(p)
-    t_end, step = (
-        settling.rounded_duration(p, lands if name == LANDING else 6.0),
-        coarse_step(p) / fine,
-    )
+    t_end = settling.rounded_duration(p, lands if name == LANDING else 6.0)
+    step = coarse_step(p) / fine
 
     def read(run: Trajectory) -> tuple[Case, dict[Shown, Estimate]]:
         numbers = {}
@@ -370,9 +362,8 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
             numbers = _landed(run)
         elif name == UPWARDS:  # it falls on the floor soon after
             numbers = {Shown(name, "lift", "first top"): first_top(run)}
-        elif (
-            name == BY_SPIN
-        ):  # it leaves the floor at a whole step, up to one late or early, which changes its height
+        elif name == BY_SPIN:
+            # it leaves the floor at a whole step, up to one late or early, which changes its height
             late = step / 2 * float(run.v_y.max())
             numbers = {Shown(name, "lift", "end"): estimate(run.y[-1], sampling=uniform(late))}
         return settling.physical_case(settled_case(run)), numbers

@@ -125,10 +125,9 @@ LAW_CLAIMS = (
         "table-3",
         "Table 3, (12)-(17)",
         "A contact that rolls doesn't slip, and one that is closed has no gap; where it slips, "
-        "friction is mu or eta "
-        "times the normal force and opposes the slip. (That contacts press, and that friction "
-        "stays within its limit, "
-        "(12) and (13), is built into any solver of friction cones: it is not counted.)",
+        "friction is mu or eta times the normal force and opposes the slip. (That contacts press, "
+        "and that friction stays within its limit, (12) and (13), is built into any solver of "
+        "friction cones: it is not counted.)",
         Criterion("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
         *(
             Criterion(
@@ -152,8 +151,7 @@ LAW_CLAIMS = (
         "cases",
         "Fig. 2, Table 3",
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes "
-        "through them as the "
-        "equations of motion say.",
+        "through them as the equations of motion say.",
         Criterion("motions", "case", lambda m: float(_motion_either(m).case[-1]), by=_RUN),
         *criteria("motions", [f"end_{name}" for name in VARIABLES[TURNING]], _end_in_case, by=_RUN),
     ),
@@ -184,8 +182,7 @@ LAW_CLAIMS = (
         "sliding",
         "(20), (23)-(29)",
         "A ball that slips or rolls at one contact or both moves on from case to case as the "
-        "equations say, also while "
-        "the flow rises or falls.",
+        "equations say, also while the flow rises or falls.",
         *_end_states("slips", "rolls", "sinks"),
     ),
     claim(
@@ -210,8 +207,7 @@ LAW_CLAIMS = (
         "definition-1-2",
         "Definitions 1 and 2, (82)",
         "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall "
-        "and roll on beyond "
-        "ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
+        "and roll on beyond ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
         # Where slip lasts, theory's motion ends slipping at both points, or lifted.
         Criterion(
             "runs",
@@ -226,8 +222,7 @@ LAW_CLAIMS = (
         "fluid-torque",
         "extension",
         "A fluid that brakes the spin of a ball makes it roll slower than the fluid goes round, at "
-        "first order in the "
-        "torque.",
+        "first order in the torque.",
         Criterion("torque", "case", _braked_rolls, by=_TORQUE),
         Criterion(
             "torque", "omega_c", lambda m: real_fluid.rolling(m.parameters).omega_c, by=_TORQUE

@@ -18,12 +18,10 @@ from model import Case
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
 
-_NR_NS, _RR_RS, _RR_SR, _RR_SS = (
-    (Case.NR, Case.NS),
-    (Case.RR, Case.RS),
-    (Case.RR, Case.SR),
-    (Case.RR, Case.SS),
-)
+_NR_NS = (Case.NR, Case.NS)
+_RR_RS = (Case.RR, Case.RS)
+_RR_SR = (Case.RR, Case.SR)
+_RR_SS = (Case.RR, Case.SS)
 
 
 def _state(m: Measurement) -> Array:
@@ -141,9 +139,8 @@ CLAIMS = (
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
             f"Out of {arrow[0].name} a slight slip in any direction that {arrow[1].name} allows "
-            f"grows at the rate γ "
-            "while forces admit it; else the ball passes into another case, as the equations of "
-            "motion say.",
+            "grows at the rate γ while forces admit it; else the ball passes into another case, as "
+            "the equations of motion say.",
             *(
                 Criterion("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
                 for gamma, by in (
@@ -314,8 +311,7 @@ CLAIMS = (
             f"lift-{inner.name}-{outer.name}",
             "Fig. 6, dotted",
             f"Out of {inner.name} the ball never lifts off the floor: whatever its orbit, the "
-            "floor "
-            "carries its weight."
+            "floor carries its weight."
             if inner is Case.RS
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in "
             f"{outer.name}, would "

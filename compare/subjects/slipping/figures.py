@@ -74,11 +74,9 @@ def draw(of: Diagram) -> tuple[Figure, str]:
     grows = "below ω₀₂: the slip grows, and the ball keeps slipping (NS)"
     return figure, (
         f"The stationary orbit on the wall (NR), pushed by a slip of {PUSHED:g} rad/s in the "
-        f"direction β = {BETA:g}, "
-        f"{dies if stops else grows}. Left: the slip over time. Right: its path in the plane "
-        f"orthogonal to NR, from "
-        "the cross; dotted: the straight line. Event-driven simulation; "
-        f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}."
+        f"direction β = {BETA:g}, {dies if stops else grows}. Left: the slip over time. Right: its "
+        "path in the plane orthogonal to NR, from the cross; dotted: the straight line. "
+        f"Event-driven simulation; {style.named(p)}, Ω₀ = {p.Omega_0:.3g}."
     )
 
 

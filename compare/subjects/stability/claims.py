@@ -137,8 +137,7 @@ CLAIMS = (
         "prop-2",
         "Prop. 2, (24), (33)",
         "In a fluid at rest a ball that spins next to the wall keeps its spin, whatever it is (a "
-        "zero eigenvalue); "
-        "going round dies out at the rate c/(1 + j).",
+        "zero eigenvalue); going round dies out at the rate c/(1 + j).",
         *_criteria(Case.RS),
     ),
     claim(
@@ -171,16 +170,14 @@ CLAIMS = (
         "prop-5-rate",
         "Prop. 5, (27), (46)",
         "Carried by the wall alone the ball keeps any height (a zero eigenvalue); it swings about "
-        "it with a pair "
-        "of eigenvalues, and ω_c dies out at c/(1 + j).",
+        "it with a pair of eigenvalues, and ω_c dies out at c/(1 + j).",
         *_criteria(Case.NR),
     ),
     claim(
         "prop-6-rate",
         "Prop. 6, (28), (48), (49)",
         "The ball that sinks along the wall has a pair of eigenvalues ± iω₀, which never dies out, "
-        "a zero for the "
-        "cyclic y, and else decay only.",
+        "a zero for the cyclic y, and else decay only.",
         *_criteria(Case.NS),
     ),
 )

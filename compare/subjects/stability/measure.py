@@ -227,18 +227,18 @@ def chosen_states(
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
         values.setdefault((m.parameters, physical_case(m.case())), {})[m.quantity] = m.value
     states = []
+    # on the wall alone it is high up, and just touching the floor
     for (
         q,
         case,
-    ), value in values.items():  # on the wall alone it is high up, and just touching the floor
+    ), value in values.items():
         x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
         raised = x._replace(y=safe_height(q)) if case.A is Contact.N else x
         states.append(Pushed(Start(name, q, "settled", raised.stacked()), case))
         if case is Case.NR:
             states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.SR))
-    if (
-        p.drag == QUADRATIC
-    ):  # no ball settles to going round with the fluid, but one that starts so goes on so
+    # no ball settles to going round with the fluid, but one that starts so goes on so
+    if p.drag == QUADRATIC:
         q, x = p.replace(omega_0=0.5 / unit), State(omega_c=0.5 / unit)
         states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.RR))
     for case, most in STATES.items():

@@ -57,9 +57,8 @@ def rolling(m: Measurement) -> float:
     limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
-    if case_of(m) is Case.RR or (
-        _exists(Case.RR, m) and m.parameters.mu < 1
-    ):  # beyond, forces may hold it
+    # beyond, forces may hold it
+    if case_of(m) is Case.RR or (_exists(Case.RR, m) and m.parameters.mu < 1):
         raise LookupError("RR has ended")
     return case(m)
 
@@ -205,9 +204,8 @@ CLAIMS = (
         "prop-1",
         "Prop. 1, (30)-(32)",
         "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of "
-        "its forces "
-        "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or "
-        "ω₀₃ (η > j).",
+        "its forces (31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η "
+        "< j) or ω₀₃ (η > j).",
         *_value_criteria((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
         _case_criterion(_ROLLS),
         _rolling_criterion(),
@@ -232,9 +230,8 @@ CLAIMS = (
         "prop-3-5",
         "Props. 3 and 5, (35), (36), (46), (47)",
         "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - "
-        "ω₀R/r, at any height; "
-        "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same "
-        "state as NR.",
+        "ω₀R/r, at any height; B_x = mRω₀², B_y = mg. Where it touches a floor that carries "
+        "nothing, SR has the same state as NR.",
         *_value_criteria(_STATE, _LIFTED, "(46), (47)"),
         *_value_criteria(_STATE, _LEANS, "(35), (36)", Case.SR),
         _case_criterion(_LIFTED),
@@ -254,8 +251,7 @@ CLAIMS = (
         "eq-40",
         "(40), (44)",
         "A ball that has settled slipping at both points slips inwards at the floor and up the "
-        "wall, cos α > 0, and "
-        "backwards, sin α < 0: there is no such motion with cos α < 0.",
+        "wall, cos α > 0, and backwards, sin α < 0: there is no such motion with cos α < 0.",
         *(
             Criterion("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
             for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
@@ -272,8 +268,7 @@ CLAIMS = (
         "eq-42",
         "(42), (43)",
         "Slipping at both points, the normal forces at floor and wall are the closed forms in α, "
-        "and friction holds "
-        "the ball back along its orbit.",
+        "and friction holds the ball back along its orbit.",
         *criteria(
             "settled",
             ("force_Ay", "force_Bx", "force_Az"),
@@ -286,8 +281,7 @@ CLAIMS = (
         "prop-6",
         "Prop. 6, (49), (50)",
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, "
-        "going round "
-        "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
+        "going round with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
         *_value_criteria(_STATE, _SINKS, "(49), (50)"),
         Criterion(
             "settled",
@@ -323,8 +317,7 @@ DIAGRAMS = (
         "fig-10",
         "Fig. 10",
         "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall "
-        "lie on the curves "
-        "of Fig. 10.",
+        "lie on the curves of Fig. 10.",
         *_value_criteria(("wall_spin",), all_of(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
         *_value_criteria(("wall_spin",), all_of(slips_first, _LEANS), "(91)", Case.SR),
     ),
@@ -341,9 +334,8 @@ DIAGRAMS = (
             figure,
             f"Fig. {figure[-1]}",
             f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball "
-            f"settles in every case "
-            "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor "
-            "counts as NR).",
+            "settles in every case whose stationary state attracts, or sinks, and in no other (SR "
+            "on an unloaded floor counts as NR).",
             Criterion(
                 "plane",
                 "cases",
@@ -368,9 +360,8 @@ DIAGRAMS = (
         "regions",
         "Figs. 7 and 8, (84)-(90)",
         "In every region of Figs. 7 and 8 the stationary states of its label exist: balls settle "
-        "in the attracting "
-        "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the "
-        "floor.",
+        "in the attracting ones and in NS, SS beyond the fold divides two basins, and in SR a ball "
+        "leans on the floor.",
         Criterion("plane", "cases", _cases_in_region, by="analytic.bifurcation.diagram.case_map"),
         Criterion("edge", "edge_omega_c", _omega_c_beyond_fold, by="case_map, analytic.solution"),
         Criterion("rates", "slowest_decay", _decay_leaning, when=given(case="SR"), by="case_map"),

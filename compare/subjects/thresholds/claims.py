@@ -113,8 +113,7 @@ CLAIMS = (
         "table-5-NT1",
         "Table 5, NT1",
         "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in "
-        "it; above, it "
-        "leaves it.",
+        "it; above, it leaves it.",
         _threshold("omega_03"),
         Criterion(
             "thresholds",
@@ -150,8 +149,7 @@ CLAIMS = (
         "eta-critical",
         "(87), Fig. 7",
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the "
-        "state carried by "
-        "the wall at ω₀₂, without a jump.",
+        "state carried by the wall at ω₀₂, without a jump.",
         Criterion(
             "thresholds",
             "folds",

@@ -88,10 +88,8 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
     fixed = style.named(p, "j", "kappa") if equal else style.named(p, "mu", "j", "kappa")
     caption = (
         f"Which stationary solutions exist over ω₀ and {'η = μ' if equal else 'η'}, for {fixed}. "
-        f"Lines: the "
-        "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two "
-        "stable motions (SS, "
-        "and SR or NR)."
+        "Lines: the thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; "
+        "hatched: two stable motions (SS, and SR or NR)."
     )
     if plane.checks:
         caption += f" Marks: the {len(plane.checks)} points at which runs were started; they ended "
@@ -106,9 +104,8 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
     thresholds."""
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if equal else np.full(eta.shape, p.mu)
-    doubles = [
-        each for each in bifurcation.double_points(p, equal) if each.eta > 0.01
-    ]  # lower ones set no scale
+    # lower ones set no scale
+    doubles = [each for each in bifurcation.double_points(p, equal) if each.eta > 0.01]
     fastest = 1.15 * max(
         [2.2 * float(np.sqrt(p.g / p.R)), highest, *(point.omega_0 for point in doubles)]
     )
@@ -277,10 +274,8 @@ def _draw_branches(
     curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
     guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
     omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
-    bottom, top = (
-        t.omega_02 - 0.5 * (omega_04 - t.omega_02),
-        omega_04 + 0.35 * (omega_04 - t.omega_02),
-    )
+    bottom = t.omega_02 - 0.5 * (omega_04 - t.omega_02)
+    top = omega_04 + 0.35 * (omega_04 - t.omega_02)
     draw(Case.RR, bottom, t.omega_03, "RR", (0.5, (-5, 5)))
     draw(Case.RR, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
     slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))

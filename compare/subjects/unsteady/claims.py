@@ -92,10 +92,9 @@ CLAIMS = (
         "pulsation-slip",
         "(23), (66), (67), (73), (82)",
         "In a pulsating flow a rolling ball begins to slip once rolling needs more friction than "
-        "floor and wall can "
-        "give: not below the amplitude at which slip first lasts, and not above the one up to "
-        "which forces allow "
-        "rolling. Mostly the two are the same; in between Coulomb's law allows both.",
+        "floor and wall can give: not below the amplitude at which slip first lasts, and not above "
+        "the one up to which forces allow rolling. Mostly the two are the same; in between "
+        "Coulomb's law allows both.",
         _onset_criterion("slip-stability", Relation.AT_LEAST),
         _onset_criterion("infeasible", Relation.AT_MOST),
     ),
@@ -103,10 +102,8 @@ CLAIMS = (
         "pulsation-limits",
         "(66), (67), (82)",
         "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃, or falls to rest; "
-        "in a fast one ω_c "
-        "hardly changes, and the ball slips when the drag of the fluid alone is too strong. No "
-        "pulsation needs a "
-        "larger amplitude than a fast one.",
+        "in a fast one ω_c hardly changes, and the ball slips when the drag of the fluid alone is "
+        "too strong. No pulsation needs a larger amplitude than a fast one.",
         *(
             Criterion(
                 "thresholds",
@@ -156,9 +153,8 @@ CLAIMS = (
         "pulsation-mean",
         "(20), (23), (24), (26), Definitions 1-3",
         "A pulsation that makes the ball slip at both points makes its mean reading low: on "
-        "average "
-        "its spin about the tangent takes drag. One that makes it slip at the wall alone does not "
-        "change the mean, under Stokes' law.",
+        "average its spin about the tangent takes drag. One that makes it slip at the wall alone "
+        "does not change the mean, under Stokes' law.",
         Criterion("pulsation", "mean_error", _mean_error, when=given(slips=_BOTH), by=_MEAN),
         Criterion(
             "pulsation",

@@ -107,12 +107,9 @@ def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
     return figure, style.caption(
         p,
         f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase "
-        f"lag of ω_c, "
-        f"where it rolls at both points (RR){both}. "
-        "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits "
-        "for slow and fast "
-        "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: "
-        "computed).",
+        f"lag of ω_c, where it rolls at both points (RR){both}. Right: the amplitude of the flow "
+        "at which a rolling ball begins to slip, with its limits for slow and fast pulsations; and "
+        "the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
         states=of.states,
     )
 
@@ -148,17 +145,13 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="mujoco")
     jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$ / final change")
     style.legend(jump)
-    (low, fold), measured = (
-        _ends_of_slipping(of.p),
-        [m for m in of.states if m.quantity == "ramp_end"],
-    )
+    (low, fold) = _ends_of_slipping(of.p)
+    measured = [m for m in of.states if m.quantity == "ramp_end"]
     p = measured[0].parameters if measured else flows[-1]
     slipping(ramp, of.p, lambda slip_x, omega_c: omega_c)
-    rates, passed, start = (
-        np.array([0.002, 0.01, 0.04]) * p.c * (fold - low),
-        [],
-        analytic.solution(p, Case.SS),
-    )
+    rates = np.array([0.002, 0.01, 0.04]) * p.c * (fold - low)
+    passed = []
+    start = analytic.solution(p, Case.SS)
     last = _slipping(of.p, RAMP[1]).omega_0
     for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
         lasts = (last - p.omega_0) / rate
@@ -204,13 +197,10 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
     return figure, style.caption(
         of.p,
         "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls "
-        "approaches its "
-        f"new reading slowly, one that slips at both points swings.{dots} Middle: ramps of the "
-        f"flow past the fold "
-        "ω₀₄; the faster the ramp, the later the ball catches up; dashed: SS where it is unstable. "
-        "Right: by how much the flow has passed ω₀₄ when the ball's lag has halved; dashed: the "
-        "law of slow ramps, "
-        "2.338 (ρ²/(ab))^(1/3).",
+        f"approaches its new reading slowly, one that slips at both points swings.{dots} Middle: "
+        "ramps of the flow past the fold ω₀₄; the faster the ramp, the later the ball catches up; "
+        "dashed: SS where it is unstable. Right: by how much the flow has passed ω₀₄ when the "
+        "ball's lag has halved; dashed: the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
         states=measured,
     )
 

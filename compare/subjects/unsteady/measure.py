@@ -244,10 +244,8 @@ def _settled_rounds(
 ) -> list[list[Round] | str]:
     """Run pulsations until they are settled: of each the last two rounds, the second with half the
     step, or its error. A ball that slips goes on with the rest of its last state."""
-    states, seen = (
-        [each.start(a) for each, a in driven],
-        list[list[Round] | str]([[]] * len(driven)),
-    )
+    states = [each.start(a) for each, a in driven]
+    seen = list[list[Round] | str]([[]] * len(driven))
     for n in range(ROUNDS):
         last = n == ROUNDS - 1
         timing = Timing(
@@ -296,11 +294,9 @@ def _as_followed(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsat
             if rolls_on(seen[-1].run)
             else "a ball slips in a pulsation half as large as in a slow one"
         )
-        new, change, tasks = (
-            each.with_omega_c(seen[-1].omega_c),
-            abs(ratio - first),
-            tuple(task for task, *_ in seen),
-        )
+        new = each.with_omega_c(seen[-1].omega_c)
+        change = abs(ratio - first)
+        tasks = tuple(task for task, *_ in seen)
         followed.append(replace(new, ratio=ratio, uncertainty=change, failure=failure, tasks=tasks))
     return followed
 
@@ -308,10 +304,8 @@ def _as_followed(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsat
 def _raised(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """Pulsations of the largest of rising amplitudes at which the ball still rolls, if drag isn't
     Stokes'."""
-    raised, todo = (
-        list(pulsations),
-        [k for k, each in enumerate(pulsations) if each.p.drag != STOKES],
-    )
+    raised = list(pulsations)
+    todo = [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
     for _ in range(12):
         higher = [
             replace(
@@ -346,10 +340,8 @@ def _search(runner: Runner, each: Pulsation) -> Search:
         largest = each.reach / abs(each.ratio)
         first, size = Bracket(0.0, largest), largest / 2
     else:
-        first, size = (
-            Bracket(0.99 * each.amplitude, RAISED * each.amplitude),
-            each.amplitude,
-        )
+        first = Bracket(0.99 * each.amplitude, RAISED * each.amplitude)
+        size = each.amplitude
     return Search(first, task, rolls_on, runner.sampling.pulsation_width * size)
 
 
@@ -431,13 +423,11 @@ def jumps(
 ) -> Iterator[Measurement | Missing]:
     """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at
     which a ramp ends it."""
-    flows: dict[
-        str, tuple[float, float, float]
-    ] = {}  # where slipping begins, the wall carries the ball, a jump ends
-    pairs, starts = (
-        list[StepPair](),
-        list[Start](),
-    )  # from rest, to settle slipping before a jump or a ramp
+    # where slipping begins, the wall carries the ball, a jump ends
+    flows: dict[str, tuple[float, float, float]] = {}
+    # from rest, to settle slipping before a jump or a ramp
+    pairs = list[StepPair]()
+    starts = list[Start]()
     for name, p in sets.items():
         begins, holds, ends = (_threshold(records, name, f"omega_0{n}") for n in (1, 2, 4))
         if begins is None or holds is None:
@@ -503,9 +493,8 @@ def _jump(runner: Runner, start: Start, size: float) -> StepPair:
     is named by."""
     p, t_end = start.p, rounded_duration(start.p, runner.sampling.unsteady_lasts)
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
-    samples = max(
-        4000, round(t_end / (4 * coarse_step(p)))
-    )  # drag may be weak, and peaks come soon
+    # drag may be weak, and peaks come soon
+    samples = max(4000, round(t_end / (4 * coarse_step(p))))
     divisors, at = runner.sampling.unsteady_divisors, {"case": start.name}
     return StepPair(
         start.set,

@@ -76,10 +76,8 @@ def field(
     runner: Runner, sets: Mapping[str, Parameters], records: Records
 ) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
-    divisors, pairs = (
-        (STEP_RATIO * runner.sampling.halves[0], STEP_RATIO * runner.sampling.halves[1]),
-        [],
-    )
+    divisors = (STEP_RATIO * runner.sampling.halves[0], STEP_RATIO * runner.sampling.halves[1])
+    pairs = []
     for name, p in sets.items():
         rng = np.random.default_rng([STATES_SEED, *name.encode()])
         for case, k in product(Case, range(runner.sampling.field_starts)):
@@ -94,9 +92,8 @@ def field(
             q = p.replace(omega_0=omega_0)
             t_end = (WINDOW_CENTRES[-1] + HALF_WINDOW + AROUND_WINDOW) * coarse_step(q) / STEP_RATIO
             pairs.append(StepPair(name, q, f"from {case.name}", x, t_end, divisors, rows=0))
-            if (
-                p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2
-            ):  # Reynolds numbers as in water
+            # Reynolds numbers as in water
+            if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2:
                 _, v_y, omega_c, *_, h, v_h = x
                 speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
                 fast = q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * unit))
@@ -109,11 +106,9 @@ def field(
             results.append(result)
     kept = Counter[tuple[str, float, Case]]()
     for centre, result in product(WINDOW_CENTRES, results):
-        set, p, case = (
-            result.pair.set,
-            result.pair.p,
-            Case(int(result.coarse.case[centre * runner.sampling.halves[0]])),
-        )
+        set = result.pair.set
+        p = result.pair.p
+        case = Case(int(result.coarse.case[centre * runner.sampling.halves[0]]))
         enough = kept[set, p.nu_f, case] >= runner.sampling.field_kept
         if not enough and (found := _values(runner, case, result, centre)):
             kept[set, p.nu_f, case] += 1
@@ -140,11 +135,9 @@ def _values(
     polynomials change, see `pairs.unlike`."""
     p, read = result.pair.p, []
     for run, times in zip((result.coarse, result.fine), runner.sampling.halves, strict=True):
-        near, half, middle = (
-            (HALF_WINDOW + AROUND_WINDOW) * times,
-            HALF_WINDOW * times,
-            centre * times,
-        )
+        near = (HALF_WINDOW + AROUND_WINDOW) * times
+        half = HALF_WINDOW * times
+        middle = centre * times
         window = slice(middle - half, middle + half + 1)
         if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(
             case, run, window
@@ -160,9 +153,8 @@ def _values(
             np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1)
         )
     (one, _), (two, lower) = read
-    rows = np.stack(
-        [two + (two - one) * EXTRAPOLATION, two, lower]
-    )  # (3, 22): state, rates, forces at A and B
+    # (3, 22): state, rates, forces at A and B
+    rows = np.stack([two + (two - one) * EXTRAPOLATION, two, lower])
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
     moving, held = MOVING[case], [_forces(case, row) for row in rows[:, 16:]]

@@ -107,9 +107,8 @@ def measure(
                 yield stray
             else:
                 left[push.start.set, push.inner, push.outer] += 1
-        if (
-            len(grown) == 2
-        ):  # the share of the side of negative slip with which the two growth rates cancel
+        # the share of the side of negative slip with which the two growth rates cancel
+        if len(grown) == 2:
             plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
             both = plus.value + minus.value
             share = estimate(
@@ -280,9 +279,8 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
             if inner is Case.RS:
                 fast = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0)
                 x = x._replace(slip_y=fast * start_unit(p, x.stacked()))
-            if (
-                inner is Case.SR
-            ):  # the faster the ball spins about its radial axis, the faster slip_z sets in
+            # the faster the ball spins about its radial axis, the faster slip_z sets in
+            if inner is Case.SR:
                 x = x._replace(slip_x=-rng.uniform(2.0, 3.0) * p.R / p.r * x.omega_c)
             free = [k for k in SLIPS[outer] if k != {Case.RS: 1, Case.SR: 0}.get(inner)]
             n = np.zeros(3)

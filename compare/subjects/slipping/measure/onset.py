@@ -70,9 +70,8 @@ def bounds(
         ]
         for name, end in ends.items()
     ]
-    hangs = set[
-        str
-    ]()  # sets whose wall alone carries the ball: there it is pushed out of settled states
+    # sets whose wall alone carries the ball: there it is pushed out of settled states
+    hangs = set[str]()
     for name, states in zip(ends, settle_groups(runner, starts), strict=True):
         if not any(state.failure or state.case is not Case.NR for state in states):
             hangs.add(name)
@@ -93,11 +92,9 @@ def bounds(
         runner, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)]
     )
     for line, seen, more in zip(lines, first, around, strict=True):
-        push, square, tasks = (
-            line.pushes[0],
-            "_square" if line.power == 2 else "",
-            [*seen.tasks, *more.tasks],
-        )
+        push = line.pushes[0]
+        square = "_square" if line.power == 2 else ""
+        tasks = [*seen.tasks, *more.tasks]
         name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
         if np.isnan(seen.points[1]).any():
             yield from seen.strays or [
@@ -176,9 +173,8 @@ class Growths:
     # didn't last
     points: Array
     tasks: list[Task]
-    strays: list[
-        Measurement | Missing
-    ]  # what became of slips that didn't last, and of runs that broke down
+    # what became of slips that didn't last, and of runs that broke down
+    strays: list[Measurement | Missing]
 
 
 def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
@@ -327,9 +323,8 @@ class Arrow:
         """Parameters with the flow, and the state (8,), of a ball that goes round with omega_c."""
         unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
-        leads = (
-            1.0 if self.inner is Case.RR else LEAD
-        )  # a ball that rolls at both points can hardly lag
+        # a ball that rolls at both points can hardly lag
+        leads = 1.0 if self.inner is Case.RR else LEAD
         return self.p.replace(omega_0=leads * omega_c), np.array(
             [0.0, 0.0, omega_c, *slips, 0.0, 0.0]
         )

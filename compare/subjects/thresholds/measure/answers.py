@@ -111,9 +111,8 @@ def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
     if settled_case(run).A is Contact.N or settled_case(run) is Case.SR or not presses(run):
         return False
     middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
-    slowing = (
-        last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0
-    )  # round-off: at rest
+    # round-off: at rest
+    slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0
     return False if slowing > 1 else True if slowing < slowed else None
 
 

@@ -231,9 +231,8 @@ class Edge:
     line: Array  # direction of the line; its length is the distance of the attractors
     missed: int = 0  # how many lines since the last crossing were too short
     bracket: Bracket | None = None
-    moves: tuple[
-        Array, ...
-    ] = ()  # by how much each of the last crossings differs from that of the line before
+    # by how much each of the last crossings differs from that of the line before
+    moves: tuple[Array, ...] = ()
 
     @property
     def crossing(self) -> Array:
@@ -294,9 +293,8 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
         before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)
     ):
         return (last - first) * (slipping - lifted) > 0
-    end = last + now * abs(now) / max(
-        abs(before) - abs(now), abs(now), 1e-300
-    )  # by a geometric series
+    # by a geometric series
+    end = last + now * abs(now) / max(abs(before) - abs(now), abs(now), 1e-300)
     rests = [abs(end - each) < ARRIVED * way for each in (slipping, lifted)]
     return rests[0] if any(rests) else None
 
@@ -348,10 +346,8 @@ def _edge_rows(runner: Runner, edge: Edge) -> Iterator[Measurement | Missing]:
         )
         return
     x, sure = State.of(edge.crossing), State.of(_uncertainty(edge))
-    roll, values = (
-        edge.p.R / edge.p.r,
-        {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")},
-    )
+    roll = edge.p.R / edge.p.r
+    values = {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
     values["wall_spin"] = x.slip_x + roll * x.omega_c
     slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
     for name, value in values.items():

@@ -192,10 +192,8 @@ class Findings:
         states beside it."""
         if kind in self.states:
             states = self.states[kind]
-            place, tasks = (
-                extrapolated(states, what, extrapolated_zero),
-                [state.task for state in states],
-            )
+            place = extrapolated(states, what, extrapolated_zero)
+            tasks = [state.task for state in states]
             yield self.row(quantity, place, tasks, side=side, by=f"{by} → 0")
 
 
