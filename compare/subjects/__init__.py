@@ -13,6 +13,7 @@ from types import ModuleType
 NAMES = (
     "stationary",
     "thresholds",
+    "regions",
     "stability",
     "flowmeter",
     "motion",

@@ -31,10 +31,10 @@ from compare.kit.statistics import (
 from compare.kit.step_pairs import of_no_step, unlike
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
-from compare.subjects.motion.measure import laws, motions
-from compare.subjects.slipping.measure import growth, onset
+from compare.subjects.motion import measure as moving
+from compare.subjects.slipping import measure as slipping
 from compare.subjects.stationary import measure as settled
-from compare.subjects.thresholds.measure import answers, thresholds
+from compare.subjects.thresholds import measure as thresholds
 from compare.subjects.unsteady import measure as unsteady
 from model import Case, Parameters, State
 from tests.measured import measured, motion
@@ -45,13 +45,13 @@ QUICK = sets(Level.QUICK)
 SETS, WALL, THICK = {"reference": P}, {"rough-wall": QUICK["rough-wall"]}, P.replace(c=10.0)
 ROUGH, SAMPLES = QUICK["high-wall-friction"], 50
 PROTOCOLS = {
-    "field": lambda runner: motions.field(runner, SETS, Records()),
-    "growth": lambda runner: growth.measure(runner, SETS, Records()),
-    "bounds": lambda runner: onset.bounds(
+    "field": lambda runner: moving.field(runner, SETS, Records()),
+    "growth": lambda runner: slipping.measure(runner, SETS, Records()),
+    "bounds": lambda runner: slipping.bounds(
         runner, SETS, known("reference", P, "omega_01", "omega_02")
     ),
-    "lift": lambda runner: onset.lift(runner, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
-    "impacts": lambda runner: motions.impacts(runner, SETS, Records()),
+    "lift": lambda runner: slipping.lift(runner, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
+    "impacts": lambda runner: moving.impacts(runner, SETS, Records()),
     "pulsation": lambda runner: unsteady.pulsation(
         runner,
         WALL,
@@ -94,8 +94,8 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name,
 @pytest.mark.parametrize(
     ("measure", "p", "said"),
     [
-        (growth.measure, P.replace(eta=0.0), growth.FRICTIONLESS),
-        (onset.bounds, P.replace(eta=0.0), growth.FRICTIONLESS),
+        (slipping.measure, P.replace(eta=0.0), slipping.FRICTIONLESS),
+        (slipping.bounds, P.replace(eta=0.0), slipping.FRICTIONLESS),
         (
             unsteady.pulsation,
             ROUGH,
@@ -126,11 +126,11 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share, turns)
     """It doesn't change, yet a 1e-4 of it turns its friction so far that the rates are others."""
     time = np.linspace(0.0, 1e-3, 5)
     # A sphere's contact point feels friction f as an acceleration f/m (1 + 1/j).
-    friction = P.m * motions.MOST_TURN / (time[-1] * (1 + 1 / P.j)) * share
+    friction = P.m * moving.MOST_TURN / (time[-1] * (1 + 1 / P.j)) * share
     x = np.tile([0, 0, 1.0, 0, 1.0 / P.r, 0, 0, 0], (5, 1))
     forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / P.eta)}
     run = SimpleNamespace(header=SimpleNamespace(parameters=P), time=time, x=x, **forces)
-    assert motions.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
+    assert moving.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
 
 
 @pytest.mark.slow
@@ -167,7 +167,7 @@ def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
     }
 
     def found(law, contact, **changes):
-        of = laws.deviations([motion(ROUGH, np.linspace(0.0, 1.0, SAMPLES), **right | changes)])
+        of = moving.deviations([motion(ROUGH, np.linspace(0.0, 1.0, SAMPLES), **right | changes)])
         return next(
             value
             for (_, name, point), value in of.items()
@@ -176,8 +176,8 @@ def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
 
     ratio, law, rolls = "friction over normal force", "(14), (15)", "where it rolls it doesn't slip"
     for contact, coefficient in (("A", ROUGH.mu), ("B", ROUGH.eta)):
-        assert found(law, contact) <= laws.ROUNDING
-        assert found(ratio, contact) == pytest.approx(coefficient, rel=laws.ROUNDING)
+        assert found(law, contact) <= moving.ROUNDING
+        assert found(ratio, contact) == pytest.approx(coefficient, rel=moving.ROUNDING)
         assert np.isnan(found(rolls, contact))  # nothing rolls: that law has no samples
     assert found(ratio, "B", force_B=B * [1.0, 1.01, 1.01]) == pytest.approx(1.01 * ROUGH.eta)
     assert found(ratio, "A", force_A=A * [0.99, 1.0, 0.99]) == pytest.approx(0.99 * ROUGH.mu)
@@ -404,7 +404,7 @@ def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(et
     p = P.replace(eta=eta * P.j)
     p = p.replace(omega_0=1.002 * getattr(analytic.thresholds(p), end))
     run = analytic.simulate(p, State(omega_c=p.omega_0), 2.0)
-    assert answers.lifts(Bracket(0.0, 1.0, (None, run))) is lost
+    assert thresholds.lifts(Bracket(0.0, 1.0, (None, run))) is lost
     assert run.force_A[-1, 1] < settling.PRESSES * p.m * p.g
 
 

@@ -17,9 +17,7 @@ from compare.claim import Criterion, Text, claim, criteria, given
 from compare.judge import RTOL, simulated, theory
 from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
-from compare.subjects.motion.measure.laws import FLUIDS
-from compare.subjects.motion.measure.motions import LANDED
-from compare.subjects.motion.measure.runs import late_ramp
+from compare.subjects.motion.measure import FLUIDS, LANDED, late_ramp
 from model import Case, Trajectory
 from model.cases import TRAITS
 from model.drag import STOKES

@@ -1,28 +1,48 @@
-"""The equations of motion themselves, in all nine cases, by the engine's own contacts; and
-landings.
+"""The equations of motion in all nine cases, the laws of contact and friction, changes of case,
+landings, and whole motions to their ends.
 
-For `field`, balls start at random states of every case and move freely for a few hundredths of a
-second. In short windows during which the case does not change, polynomials through the samples give
-the state, its rate of change and the contact forces at the centre of the window.
-
-For `motions`, motions from fixed starts are cut into short pieces, each of which begins and ends
-away from changes of case, at which friction builds up or dies out. For `impacts`, a landing is
-looked at a few steps after the contact has closed, at the same moment with two time steps."""
+* `laws`: what holds at every instant. Contacts roll and rub as Table 3 and (14)-(17) say, while
+  balls go through the cases of Fig. 2 and the flow rises and falls; each law is measured at its
+  worst over all samples of a set but those next to a change of case, when friction takes a few
+  steps to build up. (12) and (13) are not measured: what solves for forces in a friction cone can't
+  violate them. And the fluid's drag.
+* `field`: balls start at random states of every case and move freely for a few hundredths of a
+  second. In short windows during which the case does not change, polynomials through the samples
+  give the state, its rate of change and the contact forces at the centre of the window.
+* `motions`: motions from fixed starts are cut into short pieces, each of which begins and ends away
+  from changes of case, at which friction builds up or dies out.
+* `impacts`: a landing is looked at a few steps after the contact has closed, at the same moment
+  with two time steps.
+* `whole_runs`: whole motions from given starts with two time steps; what the step changes is the
+  uncertainty of the finer run.
+  Thrown: the ball flies past the axis of the vessel without touching anything, long enough for drag
+  to show; by the quadratic law with another drag coefficient, too.
+  Pulled off: beside the wall, with a slip on the floor that drives it away from there; its wall
+  contact carries nothing, or almost nothing, and opens.
+  Slips, rolls, sinks: at one contact, at both, or off the wall, for a while, through whatever cases
+  follow; at both points also in a flow that is steady at first, and then rises or falls.
+  Smooth wall: the ball goes round with the fluid, rolls on the floor and spins against a wall
+  without friction, in faster and faster flows. Does the floor hold it?
+  Rough floor, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster
+  flows. It may jam between floor and wall, or the slip may last.
+* `torque`: a ball whose spin a real fluid brakes settles."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
+from compare.kit.programme import Protocol
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
-from compare.kit.settling import PRESSES
+from compare.kit.settling import PRESSES, settled_readings
 from compare.kit.statistics import Estimate, estimate, uniform
 from compare.kit.step_pairs import (
     DOUBT,
@@ -41,11 +61,180 @@ from compare.kit.step_pairs import (
     unlike,
 )
 from compare.kit.tasks import Task
-from model import Case, Contact, Parameters, State, Trajectory
+from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
-from model.drag import STOKES
+from model.drag import QUADRATIC, STOKES
 from model.kinematics import SLIP_XYZ, TURNING, VARIABLES, slip_velocities, state_units
+
+RUN_LENGTH = 768
+"""Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
+ROUNDING = 100 * float(np.finfo(float).eps)
+FLUIDS: Mapping[str, Mapping[str, float]] = {
+    "steel-in-water": {
+        "nu_f": 1.004e-6,
+        "rho_f": 998.2,
+        "rho_b": 7850.0,
+        "r": 5e-3,
+        "gravity": 9.81,
+    },
+    "steel-in-air": {"nu_f": 1.516e-5, "rho_f": 1.204, "rho_b": 7850.0, "r": 5e-3, "gravity": 9.81},
+    "glass-in-glycerine": {
+        "nu_f": 1.18e-3,
+        "rho_f": 1260.0,
+        "rho_b": 2500.0,
+        "r": 8e-3,
+        "gravity": 9.81,
+    },
+}
+"""Balls that fall in a fluid, SI."""
+
+
+class ContactLaw(NamedTuple):
+    """A law of a contact, by the quantity that shows how far it is off."""
+
+    quantity: str
+    law: str
+    contact: str
+
+
+def laws(
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """How far each law of contact is off at its worst in motions from rest, down the wall, and
+    along the floor.
+
+    And the speed at which balls sink in the middle of still fluid, off floor and wall.
+    """
+    tasks = []
+    for p in sets.values():
+        t_end, fast = RUN_LENGTH * coarse_step(p), 3.0 / time_unit(p)
+        up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
+        down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
+        half = Flow.steady(fast / 2)
+        starts = (
+            (up, State()),
+            (down, State(y=2 * p.R, omega_c=fast)),
+            (half, State(omega_c=fast / 3, h=p.R / 2)),
+        )
+        finer = [
+            (coarse_step(p) / parts, *start)
+            for parts in runner.sampling.laws_divisors
+            for start in starts
+        ]
+        tasks.append(
+            [runner.task(p, x, t_end, h, flow=flow, samples=RUN_LENGTH) for h, flow, x in finer]
+        )
+    for (name, p), own, runs in zip(sets.items(), tasks, runner.groups(tasks), strict=True):
+        if isinstance(runs, str):
+            yield Missing("laws", name, f"the run {runs}")
+            continue
+        coarse, fine = deviations(runs[: len(runs) // 2]), deviations(runs[len(runs) // 2 :])
+        for law, value in fine.items():
+            if math.isnan(value) or math.isnan(coarse[law]):
+                yield Missing("laws", name, f"no sample at {law.contact} to test: {law.law}", 0)
+                continue
+            # Halving the step may by chance change little: the larger change of the two contacts
+            # counts.
+            changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == law[:2]]
+            change, at = float(np.nanmax(changes)), law._asdict()
+            sure = estimate(value, time_step=change, rounding=ROUNDING)
+            yield measurement(
+                runner, "laws", name, p, at.pop("quantity"), sure, own[len(own) // 2 :], **at
+            )
+    balls = {
+        name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2)
+        for name, fluid in FLUIDS.items()
+    }
+    falls, divisors = [], runner.sampling.laws_divisors
+    for p in balls.values():
+        step, rest = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
+        begun = rest, rest._replace(v_y=-math.sqrt(p.g * p.R))
+        falls.append(
+            [
+                runner.task(p, x, 64 * step, step / parts, samples=64)
+                for parts in divisors
+                for x in begun
+            ]
+        )
+    for (name, p), own, runs in zip(balls.items(), falls, runner.groups(falls), strict=True):
+        if isinstance(runs, str):
+            yield Missing("laws", name, f"the run {runs}")
+            continue
+        (before, _), (speed, lasts) = _sinking_speed(*runs[:2]), _sinking_speed(*runs[2:])
+        # What is left of a fall that has only just begun is a difference of speeds, each of them
+        # rounded in every step.
+        rounding = ROUNDING * abs(speed) / (p.c * lasts)
+        sinking = estimate(speed, time_step=abs(speed - before), rounding=rounding)
+        yield measurement(
+            runner, "laws", name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name]
+        )
+
+
+def deviations(runs: Sequence[Trajectory]) -> dict[ContactLaw, float]:
+    """How far runs of one set are from every law, dimensionless; nan where no sample can show
+    it."""
+
+    def largest(values: Array, off: float) -> float:
+        return float(values[np.argmax(np.abs(values - off))]) if len(values) else math.nan
+
+    worst: dict[ContactLaw, float] = {}
+    for contact in "AB":
+        rows = [_rows(run, contact) for run in runs]
+        normal, friction, against, speed, gap, letter = (
+            np.concatenate(row) for row in zip(*rows, strict=True)
+        )
+        # A contact that slips so fast must have the friction of slipping, whatever case is
+        # detected.
+        slides = (speed > 0.02) & (normal > PRESSES) & (letter != "")
+        for law, values in (
+            ("where it rolls it doesn't slip", speed[letter == "R"]),
+            ("where it is closed there is no gap", np.abs(gap[(letter == "R") | (letter == "S")])),
+            ("(14), (15): friction opposes the slip", against[slides]),
+        ):
+            worst[ContactLaw("law_in_motion", law, contact)] = largest(values, 0.0)
+        ratios = friction[slides] / normal[slides]
+        usual = float(np.median(ratios)) if len(ratios) else 0.0
+        worst[ContactLaw("friction_ratio", "friction over normal force", contact)] = largest(
+            ratios, usual
+        )
+    return worst
+
+
+def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
+    """Normal force, friction, and its difference from friction against the slip, divided by the
+    weight.
+
+    Of the difference only what exceeds the turn of the slip from one sample to the next. Then slip
+    speed divided by sqrt(g R), gap divided by R and the contact's letter, empty within 5 samples of
+    a change of case, each (n,)."""
+    p, k = run.header.parameters, "AB".index(contact)
+    across, along = ((1, [0, 2]), (0, [1, 2]))[k]
+    force, slip = (run.force_A, run.force_B)[k], slip_velocities(run.x, p)[k][:, along]
+    normal, tangent, speed = force[:, across], force[:, along], np.hypot(*slip.T)
+    friction = np.hypot(*tangent.T)
+    direction = slip / np.maximum(speed, np.finfo(float).tiny)[:, None]
+    turns = np.hypot(*np.diff(direction, axis=0, prepend=direction[:1]).T)
+    against = np.maximum(
+        np.hypot(*(tangent + friction[:, None] * direction).T) - friction * turns, 0.0
+    )
+    changes = np.flatnonzero(np.diff(run.case))[:, None] + np.arange(-4, 6)
+    letters = np.array([case.name[k] for case in run.cases])
+    letters[np.clip(changes, 0, len(letters) - 1)] = ""
+    forces = (each / (p.m * p.g) for each in (normal, friction, against))
+    return *forces, speed / math.sqrt(p.g * p.R), (run.gap_A, run.gap_B)[k] / p.R, letters
+
+
+def _sinking_speed(slow: Trajectory, fast: Trajectory) -> tuple[float, float]:
+    """v_y in m/s at which gravity and drag balance, of two falls that differ in speed, and their
+    duration in s.
+
+    With a drag proportional to speed, v' = (v_end - v)/T: the fall from rest gains (1 - q) v_end
+    while the difference of the two shrinks to q of what it was."""
+    gap = fast.v_y - slow.v_y
+    lost = (gap[0] - gap[-1]) / gap[0]
+    return float(slow.v_y[0] + (slow.v_y[-1] - slow.v_y[0]) / lost), float(fast.time[-1])
+
 
 STATES_SEED = 53
 """Of the random states of the field of motion."""
@@ -435,3 +624,123 @@ def _after_landing(landing: StepPairResult) -> tuple[int, float] | Missing:
         return Missing("impacts", pair.set, why, len(LANDED))
     changes = np.abs(fine.x[2 * at] - coarse.x[at]) / state_units(pair.p)
     return at, float(changes[[VARIABLES.index(name) for name in LANDED]].max())
+
+
+RUN_STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
+    "thrown": (0.4, 3.0, (60.0, 1.0, 0.5, 0.6, -0.8, 0.4, 0.6, 0.1)),
+    "thrown up": (1.2, 2.0, (60.0, 5.0, -0.6, 0.3, 0.5, -0.9, 0.5, -0.05)),
+    "pulled off, at rest": (0.3, 0.4, (0.0, 0.0, 0.0, 0.0, 0.0, -1.5, 0.0, 0.0)),
+    "pulled off, going round": (0.3, 0.4, (0.0, 0.0, 0.15, 0.2, 0.3, -1.5, 0.0, 0.0)),
+    "slips at the floor": (1.2, 0.5, (0.0, 0.0, 1.3, -0.9, 0.0, 0.0, 0.0, 0.0)),
+    "slips at the wall": (0.6, 0.5, (0.0, 0.0, 0.4, 0.0, 1.5, 0.0, 0.0, 0.0)),
+    "slips at both": (1.5, 0.5, (0.0, 0.0, 1.2, 0.8, 0.6, 1.0, 0.0, 0.0)),
+    "slips off the wall": (0.8, 0.5, (0.0, 0.0, 0.4, 1.2, 0.3, 0.7, 0.5, -0.1)),
+    "rolls off the wall": (1.5, 1.0, (0.0, 0.0, 0.3, 0.0, 0.2, 0.2, 0.5, -0.2)),
+    "sinks along the wall": (1.0, 1.0, (5.0, -0.3, 0.7, 0.5, 0.6, 0.8, 0.0, 0.0)),
+}
+"""omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+
+
+def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
+    """A flow that is steady for half of a time in s, and then changes at a rate in rad/s^2."""
+    return Flow.ramp(p.omega_0, p.omega_0 + rate * time / 2, time / 2, time / 2)
+
+
+def torque(
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as
+    `Parameters.fluid_torque`."""
+    starts = []
+    for name, p in sets.items():
+        q = p.replace(mu=1.0, eta=1.0, fluid_torque=0.5 * p.c, omega_0=0.6 / time_unit(p))
+        starts.append(Start(name, q, "rest", np.zeros(8)))
+    yield from settled_readings(runner, "torque", starts)
+
+
+def whole_runs(
+    runner: Runner, sets: Mapping[str, Parameters], records: Records
+) -> Iterator[Measurement | Missing]:
+    """Where each start ends: its state, or on a smooth wall and a rough floor its case and
+    orbit."""
+    for run in carry_out(
+        runner, "runs", [pair for name, p in sets.items() for pair in _pairs(name, p)]
+    ):
+        if isinstance(run, Missing):
+            yield run
+            continue
+        p, how, coarse, fine = run.pair.p, run.pair.name, run.coarse, run.fine
+        time = float(fine.time[-1])
+        if coarse.case[-1] != fine.case[-1]:
+            yield Missing(
+                "runs",
+                run.pair.set,
+                f"{how}: with half the time step the ball ends in another case",
+                run.pair.rows,
+            )
+        elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
+            yield Missing(
+                "runs",
+                run.pair.set,
+                f"{how}: the contact force is so small that the ball may hover",
+                run.pair.rows,
+            )
+        else:
+            if apart := how in ("smooth wall", "rough floor"):
+                yield run.row(runner, "case", float(fine.case[-1]), time=time)
+            # The change of one variable may vanish by chance: the largest, in natural units, is
+            # used for all.
+            units, ends = state_units(p), (coarse.x[-1], fine.x[-1])
+            change = float(np.abs((ends[1] - ends[0]) / units).max())
+            if apart:  # where it may vanish in all, but for what forces do that lag behind
+                change = max(change, lag_error(p))
+            for variable, value, size in zip(
+                VARIABLES, ends[1].tolist(), units.tolist(), strict=True
+            ):
+                if variable == "omega_c" or not apart:
+                    row = estimate(value, size, time_step=uniform(change))
+                    yield run.row(runner, f"end_{variable}", row, time=time)
+
+
+def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
+    """Step pairs of a set from all starts."""
+    unit = time_unit(p)
+
+    def pair(
+        how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None
+    ) -> StepPair:
+        count = round(lasts * unit / coarse_step(p))
+        t_end, at = count * coarse_step(p), dict[str, Condition](start=how, **state_of(x.stacked()))
+        flow = None
+        if rate is not None:
+            flow, at = late_ramp(p, rate, t_end), at | {"rate": rate}
+        return StepPair(
+            name, p, how, x.stacked(), t_end, (8, 16), count, flow=flow, conditions=at, rows=rows
+        )
+
+    for how, (flow, lasts, x) in RUN_STARTS.items():
+        start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)
+        yield pair(how, q, start, lasts, rows=len(VARIABLES))
+        if how == "thrown" and p.drag == QUADRATIC:
+            blunter = q.replace(C_D=1.1)  # that of a disk
+            yield pair("thrown, blunter", blunter, start, lasts, rows=len(VARIABLES))
+    for how, rate in ("rolls while the flow rises", 0.2), ("rolls while the flow falls", -0.2):
+        q = p.replace(omega_0=0.5 / unit)
+        yield pair(how, q, State(omega_c=q.omega_0), 2.0, len(VARIABLES), rate / unit**2)
+    for flow in (0.5, 0.7, 0.9, 1.1, 1.3):
+        going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
+        yield pair("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0, rows=2)
+    for flow in (1.5, 1.7, 1.8, 2.0, 2.2):
+        spin = flow / unit * p.R / p.r
+        slight = State(omega_c=flow / unit, slip_x=-5e-4 * spin, slip_z=5e-3 * spin)
+        yield pair("rough floor", p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0, rows=2)
+
+
+PROTOCOLS = (
+    Protocol("laws", laws),
+    Protocol("field", field),
+    Protocol("motions", motions),
+    Protocol("runs", whole_runs),
+    Protocol("torque", torque),
+    Protocol("impacts", impacts),
+)
