@@ -20,7 +20,15 @@ from compare.kit import record
 from compare.kit.engines import Engine
 from compare.kit.levels import Level
 from compare.kit.plan import PLAN, planned
-from compare.kit.record import Measurement, Missing, Origin, Planned, Records
+from compare.kit.record import (
+    Measured,
+    Measurement,
+    Missing,
+    Origin,
+    Planned,
+    Records,
+    Sets,
+)
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
@@ -33,7 +41,7 @@ LONGEST_WAIT = 3e4
 """Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or
 more at a time; and contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c
 is three times that: as much as `omega_c` may be off in a state that counts as settled."""
-Measure = Callable[[Runner, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
+Measure = Callable[[Runner, Sets, Records], Measured]
 
 
 @dataclass(frozen=True)

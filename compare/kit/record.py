@@ -282,6 +282,10 @@ class Records:
         return Estimate(best.value, best.uncertainty) if best else None
 
 
+Sets = Mapping[str, Parameters]
+"""What a protocol measures, by name."""
+Measured = Iterator[Measurement | Missing]
+"""What it yields."""
 RecordsByEngine = Mapping[str, Mapping[int, Records]]
 """What was measured by each engine, by name, the one on trial first; by time steps in one that a
 protocol asks for."""

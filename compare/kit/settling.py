@@ -7,13 +7,13 @@ tapered window is free of it. Three overlapping windows show how far the mean st
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.record import Measured, Missing, Records, measurement
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed
 from compare.kit.statistics import COVERAGE, Estimate, estimate, steady_mean
@@ -229,9 +229,7 @@ def with_changes(
     )
 
 
-def settled_readings(
-    runner: Runner, protocol: str, starts: Sequence[Start]
-) -> Iterator[Measurement | Missing]:
+def settled_readings(runner: Runner, protocol: str, starts: Sequence[Start]) -> Measured:
     """Case and omega_c to which the ball settles from each start, uncertain by what half the step
     changes, too."""
     parts = runner.sampling.settled_divisor

@@ -17,7 +17,7 @@ others do.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -27,7 +27,15 @@ import numpy as np
 from compare.kit.engines import MOREAU
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.record import (
+    Measured,
+    Missing,
+    Records,
+    Sets,
+    if_found,
+    measurement,
+    state_of,
+)
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
@@ -66,11 +74,11 @@ SWUNG = 4.0
 
 def hopping(
     runner: Runner,
-    sets: Mapping[str, Parameters],
+    sets: Sets,
     records: Records,
     protocol: str = "recurrent",
     divisors: tuple[int, int] = HOPS_DIVISORS,
-) -> Iterator[Measurement | Missing]:
+) -> Measured:
     """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would
     begin.
 
@@ -212,9 +220,7 @@ WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
 are short: their starts are extrapolated from one or two hops, which attract from nearby only."""
 
 
-def followed(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def followed(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The wall friction beyond which disturbances of the hop grow, and whether balls hop on, on
     both sides of it."""
     p = Parameters.named(SET)
@@ -261,9 +267,7 @@ REBOUNDING, REBOUNDS_ALONE = (0.0, 0.2, 0.4, 0.48, 0.6), 20.0
 results had been seen: at 0.56 disturbances grow so slowly that this doesn't show it.)"""
 
 
-def rebounding(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def rebounding(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Whether balls that rebound hop on, and their hops, followed from one coefficient of
     restitution to the next.
 
@@ -313,9 +317,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate
     return of_no_step(slow, estimate(fast, part=abs(fast - later)))
 
 
-def swing(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Period, mean and size of the swing of omega_c, from its turning points, on a very rough
     floor.
 
@@ -358,9 +360,7 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
     return float(span / (len(at) - 1)), float(turn / span), float(size)
 
 
-def calm(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def calm(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Whether balls still hop after 60/c of the weakest drag, or how they go round: three of each
     of 16 sets."""
     reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
@@ -384,9 +384,7 @@ def calm(
             yield measurement(runner, "calm", "strong drag", p, "end_omega_c", end, [task], **at)
 
 
-def _hops_at_end(
-    runner: Runner, protocol: str, set: str, tasks: list[Task]
-) -> Iterator[Measurement | Missing]:
+def _hops_at_end(runner: Runner, protocol: str, set: str, tasks: list[Task]) -> Measured:
     """Whether each ball hops at the end of a run from a state: 1 or 0."""
     for task, run in zip(tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):
@@ -406,9 +404,7 @@ def _hops_at_end(
             )
 
 
-def choice(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def choice(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
     p = sets["reference"]
     rough = {

@@ -16,7 +16,7 @@ unloading and pushes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -29,9 +29,11 @@ from compare.kit import settling
 from compare.kit.programme import Protocol
 from compare.kit.record import (
     Condition,
+    Measured,
     Measurement,
     Missing,
     Records,
+    Sets,
     if_found,
     measurement,
     state_of,
@@ -50,9 +52,7 @@ NEIGHBOURS = (-1e-3, -5e-4, 5e-4, 1e-3)
 """The same from a settled state; the nearer ones show the effect of curvature."""
 
 
-def slope(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def slope(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there
     to unloading."""
     most = runner.sampling.slope_slipping
@@ -163,9 +163,7 @@ def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
     return None
 
 
-def hysteresis(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Case and omega_c at every level of the loop, and the case at the level before."""
     loops: dict[str, list[Start]] = {}  # starts at all levels of a set, up and down
     for name, p in sets.items():
@@ -271,9 +269,7 @@ WALL_PUSH = 1e-2
 wall."""
 
 
-def unloading(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
     """How a ball that rides the wall slips, falls and lands as the flow falls, or is lifted by a
     push."""
     starts, pairs = [], []

@@ -39,7 +39,15 @@ from typing import NamedTuple
 import numpy as np
 
 from compare.kit.programme import Protocol
-from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.kit.record import (
+    Condition,
+    Measured,
+    Missing,
+    Records,
+    Sets,
+    measurement,
+    state_of,
+)
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
@@ -98,9 +106,7 @@ class ContactLaw(NamedTuple):
     contact: str
 
 
-def laws(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
     """How far each law of contact is off at its worst in motions from rest, down the wall, and
     along the floor.
 
@@ -261,9 +267,7 @@ MOVING = {
 """The variables whose rates of change are measured."""
 
 
-def field(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def field(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Rates of change and contact forces, each with the state they belong to."""
     divisors = (STEP_RATIO * runner.sampling.halves[0], STEP_RATIO * runner.sampling.halves[1])
     pairs = []
@@ -424,9 +428,7 @@ three until the case is taken to have changed, and a few by which a change comes
 late."""
 
 
-def motions(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The case at the end of every piece, and how the ball turns there, with the state at its
     beginning."""
     starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
@@ -466,7 +468,7 @@ def motions(
             yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
-def _turns_at_end(runner: Runner, piece: StepPairResult) -> Iterator[Measurement | Missing]:
+def _turns_at_end(runner: Runner, piece: StepPairResult) -> Measured:
     """How the ball turns at the end of a piece that is run anew with both steps."""
     pair, ends = piece.pair, (piece.coarse.x[-1], piece.fine.x[-1])
     if {pair.name} != {Case(int(run.case[-1])).name for run in (piece.coarse, piece.fine)}:
@@ -557,9 +559,7 @@ LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 """Variables that a landing changes."""
 
 
-def impacts(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The state six coarse steps after every landing, and in how many runs the contact opens again.
     It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts
     are 4 to 5 times that high, and of a plastic landing nothing is left but the fall within a step.
@@ -646,9 +646,7 @@ def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
     return Flow.ramp(p.omega_0, p.omega_0 + rate * time / 2, time / 2, time / 2)
 
 
-def torque(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def torque(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as
     `Parameters.fluid_torque`."""
     starts = []
@@ -658,9 +656,7 @@ def torque(
     yield from settled_readings(runner, "torque", starts)
 
 
-def whole_runs(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Where each start ends: its state, or on a smooth wall and a rough floor its case and
     orbit."""
     for run in carry_out(

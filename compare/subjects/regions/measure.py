@@ -16,7 +16,7 @@ where that is born.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice, zip_longest
@@ -27,7 +27,7 @@ from scipy.spatial import Delaunay
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.levels import Level
 from compare.kit.programme import Protocol
-from compare.kit.record import Measurement, Missing, Records, if_found, measurement
+from compare.kit.record import Measured, Missing, Records, Sets, if_found, measurement
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import (
@@ -69,9 +69,7 @@ class Plane:
     """Points at which all runs settled, and bit masks of the cases reached."""
 
 
-def planes(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def planes(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is
     left out."""
     from scipy.stats import qmc  # slow to import
@@ -153,9 +151,7 @@ begins."""
 SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
 
 
-def borders(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The state on the border between two basins, at flows between omega_02 and omega_04; not with
     quadratic drag.
 
@@ -350,7 +346,7 @@ def _uncertainty(edge: Edge) -> Array:
     return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
-def _edge_rows(runner: Runner, edge: Edge) -> Iterator[Measurement | Missing]:
+def _edge_rows(runner: Runner, edge: Edge) -> Measured:
     """Measurements of the state on an edge: omega_c, slips and the spin on the wall."""
     if not (edge.moves and edge.bracket):  # it is to be crossed by the last line, and by one before
         at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
@@ -388,9 +384,7 @@ class BranchEnd:
     tasks: list[Task]
 
 
-def birth(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The drag at which the fold is born, where d omega_0/dA_y along the branch of SS is zero at
     its end, A_y = 0.
 

@@ -21,14 +21,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compare.kit import step_pairs
 from compare.kit.programme import Protocol
-from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
+from compare.kit.record import (
+    Measured,
+    Measurement,
+    Missing,
+    Records,
+    Sets,
+    if_found,
+    measurement,
+    state_of,
+)
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed, slip_unit, time_unit
 from compare.kit.settling import initial_condition, settle_groups
@@ -89,9 +98,7 @@ window."""
 FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
 
-def measure(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """gamma out of random states, along every arrow; where one contact may slip to either side,
     their shares (69)."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
@@ -320,9 +327,7 @@ def start_unit(p: Parameters, x: Array) -> float:
     return (p.g + p.R * float(State.of(x).omega_c) ** 2) / 2 / p.r * time_unit(p)
 
 
-def steepest(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def steepest(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The direction in which slip out of NR grows the most, for every state: that of the first
     harmonic."""
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
@@ -386,9 +391,7 @@ HANGING = (1.05, 1.6, 1.3)
 """Flows at which balls hang on a smooth wall, in units of the least that holds them."""
 
 
-def bounds(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def bounds(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Zero and slope of gamma along every line: from two flows, then from two more around the zero
     that these show."""
     yield from (
@@ -597,9 +600,7 @@ LIFT_DEGREES = (3, 2)
 """Of the polynomials; the lower one shows what the degree changes."""
 
 
-def lift(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the
     fastest orbit."""
     arrows = [Arrow(runner, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]

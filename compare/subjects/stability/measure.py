@@ -26,7 +26,7 @@ import numpy.typing as npt
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Missing, Records, measurement, state_of
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement, state_of
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
@@ -74,9 +74,7 @@ NOT_LINEAR = (
 Exponents = npt.NDArray[np.complex128]
 
 
-def measure(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
     found = [
         each
@@ -354,9 +352,7 @@ Row = Callable[..., Measurement]
 """Makes a measurement of a state from quantity, value and conditions."""
 
 
-def _modes(
-    state: Pushed, modes: Spectrum, step: float, row: Row
-) -> Iterator[Measurement | Missing]:
+def _modes(state: Pushed, modes: Spectrum, step: float, row: Row) -> Measured:
     """Measurements of decay rate and frequency of each mode, slowest first, one of each pair of
     conjugates."""
     p, parts, exponents = state.start.p, [], modes.exponents

@@ -8,28 +8,26 @@ different starts make of the same state."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
 from compare.kit import settling
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
 from compare.kit.runner import Runner
 from compare.kit.scales import time_unit
 from compare.kit.settling import SettlingCriteria, SteadyState
 from compare.kit.statistics import Estimate
 from compare.kit.step_pairs import Start
-from model import Case, Parameters, State
+from model import Case, State
 from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
 
 
-def measure(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The case that every start ends in, and once for every distinct state its values."""
     sharp = runner.sampling.settled_sharp
     alike: dict[Attractor, list[SteadyState]] = {}
@@ -101,9 +99,7 @@ def _why_drag_fades(state: SteadyState) -> str:
     )
 
 
-def _values(
-    runner: Runner, same: Sequence[SteadyState], fine: SteadyState
-) -> Iterator[Measurement | Missing]:
+def _values(runner: Runner, same: Sequence[SteadyState], fine: SteadyState) -> Measured:
     """Measured values of a settled state with half the step; uncertain by what step and start
     change, too."""
     p = fine.start.p
@@ -134,9 +130,7 @@ def _values(
                 yield _row(runner, fine, n, sure)
 
 
-def mirrored(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def mirrored(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Case and values to which a ball settles in a flow the other way round."""
     starts = [
         settling.initial_condition(name, p.replace(omega_0=-flow / time_unit(p)), how)

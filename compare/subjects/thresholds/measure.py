@@ -27,7 +27,7 @@ from compare.kit import settling
 from compare.kit.brackets import Answer, Attempt, Bracket, Search, narrow
 from compare.kit.engines import sliding_speeds
 from compare.kit.programme import Protocol
-from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import PRESSES, SettlingCriteria, SteadyState, physical_case
 from compare.kit.statistics import (
@@ -206,9 +206,7 @@ class Beside(Enum):
         return {Beside.NS: Case.NS, Beside.SS: Case.SS, Beside.SS_LAST: Case.SS}.get(self, Case.NR)
 
 
-def measure(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The thresholds of each set: bisected between flows whose settled cases differ, and
     extrapolated from states."""
     sure = not runner.sampling.granted
@@ -304,9 +302,7 @@ class Findings:
         unseen = of.width / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
-    def rows_of_zero(
-        self, kind: Beside, what: str, quantity: str, side: str, by: str
-    ) -> Iterator[Measurement | Missing]:
+    def rows_of_zero(self, kind: Beside, what: str, quantity: str, side: str, by: str) -> Measured:
         """The measurement of a threshold at which something is zero, extrapolated from settled
         states beside it."""
         if kind in self.states:
@@ -514,7 +510,7 @@ def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
         yield each.search(Passage.FOLD, change, narrowest * top.value, lambda _: nearest, time)
 
 
-def _rows(each: Findings) -> Iterator[Measurement | Missing]:
+def _rows(each: Findings) -> Measured:
     """Measurements of the end of rolling (omega_01 or omega_03), and of omega_02, the least that
     holds a ball up."""
     none = "no flow that was tried, up to twice the fastest of the settled states,"
@@ -548,7 +544,7 @@ def _rows(each: Findings) -> Iterator[Measurement | Missing]:
     )
 
 
-def _rows_of_slipping(each: Findings) -> Iterator[Measurement | Missing]:
+def _rows_of_slipping(each: Findings) -> Measured:
     """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the
     number of folds."""
     if Beside.SS_LAST not in each.states:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -29,9 +29,11 @@ from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import (
     Condition,
+    Measured,
     Measurement,
     Missing,
     Records,
+    Sets,
     if_found,
     measurement,
     state_of,
@@ -75,9 +77,7 @@ OCTAVE = 3
 """Octaves above the lowest frequency at which it is driven so."""
 
 
-def pulsation(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
     small = []  # about a flow at which a ball rolls, at several frequencies
     for name, p in sets.items():
@@ -355,9 +355,7 @@ def rolls_on(run: Trajectory) -> bool:
     return bool(np.convolve(gone, np.ones(LASTING)).max() < LASTING)
 
 
-def mean_errors(
-    runner: Runner, slipping: Sequence[tuple[Pulsation, float]]
-) -> Iterator[Measurement | Missing]:
+def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> Measured:
     """Means over the last period in pulsations of these amplitudes, with both steps, once periods
     repeat.
 
@@ -418,9 +416,7 @@ def _threshold(records: Records, set: str, threshold: str) -> float | None:
     )
 
 
-def jumps(
-    runner: Runner, sets: Mapping[str, Parameters], records: Records
-) -> Iterator[Measurement | Missing]:
+def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at
     which a ramp ends it."""
     # where slipping begins, the wall carries the ball, a jump ends
