@@ -99,18 +99,20 @@ def _why_drag_fades(state: SteadyState) -> str:
     )
 
 
-def _values(runner: Runner, same: Sequence[SteadyState], fine: SteadyState) -> Measured:
+def _values(
+    runner: Runner, same: Sequence[SteadyState], fine: SteadyState, protocol: str = PROTOCOL
+) -> Measured:
     """Measured values of a settled state with half the step; uncertain by what step and start
     change, too."""
     p = fine.start.p
     if fine.failure:
-        yield _unsettled(fine, len(fine.values))
+        yield _unsettled(fine, len(fine.values), protocol)
     elif settling.physical_case(fine.case) is not settling.physical_case(same[0].case):
         why = (
             f"{same[0].case.name} at omega_0 = {p.omega_0:.4g} rad/s is {fine.case.name} with "
             "half the time step"
         )
-        yield Missing(PROTOCOL, fine.start.set, why, len(fine.values))
+        yield Missing(protocol, fine.start.set, why, len(fine.values))
     else:
         for group in settling.ERROR_GROUPS:
             sizes = {
@@ -127,7 +129,7 @@ def _values(runner: Runner, same: Sequence[SteadyState], fine: SteadyState) -> M
             for n, size in sizes.items():
                 change = max(changes) * size
                 sure = settling.with_changes(fine.values[n], change, p, size, divisor)
-                yield _row(runner, fine, n, sure)
+                yield _row(runner, fine, n, sure, protocol)
 
 
 def mirrored(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -137,13 +139,15 @@ def mirrored(runner: Runner, sets: Sets, records: Records) -> Measured:
         for name, p in sets.items()
         for how, flow in (("rest", 0.62), ("rest", 1.4), ("on the wall", 4.2))
     ]
+    settled = []
     for state in settling.settle(runner, starts):
         if state.failure:
             yield _unsettled(state, 1 + len(state.values), "mirrored")
-            continue
-        yield _row(runner, state, "case", state.case, "mirrored")
-        for name, value in state.values.items():
-            yield _row(runner, state, name, value, "mirrored")
+        else:
+            settled.append(state)
+            yield _row(runner, state, "case", state.case, "mirrored")
+    for state, fine in zip(settled, settling.settle_finer(runner, settled), strict=True):
+        yield from _values(runner, [state], fine, "mirrored")
 
 
 def _unsettled(each: SteadyState, rows: int, protocol: str = PROTOCOL) -> Missing:
