@@ -90,9 +90,8 @@ class Classifier:
         first = self._latest.shape[1] - self._waiting
         steps = np.concatenate([self._latest, [*contacts, self._judge(contacts)]], axis=1)
         shown = steps[-1]
-        shown[:] = _carried_on(
-            shown, shown != _AS_BEFORE
-        )  # between the bands a contact is what it was
+        # between the bands a contact is what it was
+        shown[:] = _carried_on(shown, shown != _AS_BEFORE)
         shown[shown == _AS_BEFORE] = _R
         stop = max(first, len(shown) - (0 if last else PERSISTENCE - 1))
         if stop > first:
@@ -173,10 +172,8 @@ class Classifier:
         """Changes of case so far, up to a time in s."""
         changes = [change for change in self._changes[1:] if change[1] <= until]
         _, time, before, after = np.array(changes).reshape(-1, 4).T
-        none, codes = (
-            np.zeros((len(time), 3)),
-            {"from_case": before.astype(np.int8), "to_case": after.astype(np.int8)},
-        )
+        none = np.zeros((len(time), 3))
+        codes = {"from_case": before.astype(np.int8), "to_case": after.astype(np.int8)}
         return Events(time=time, **codes, impulse_A=none, impulse_B=none)
 
 
@@ -200,8 +197,7 @@ def _vanishes(values: Array, ahead: float, within: tuple[float, float]) -> float
     if len(values) < 3 or not np.isfinite(values[-3:]).all():
         return within[0]
     a, b, c = values[-3:].tolist()
-    roots = (
-        np.roots([(a - 2 * b + c) / 2, (a - 4 * b + 3 * c) / 2, c]).real + ahead - 1
-    )  # in steps after the last
+    # in steps after the last
+    roots = np.roots([(a - 2 * b + c) / 2, (a - 4 * b + 3 * c) / 2, c]).real + ahead - 1
     inside = np.clip(roots, *within)
     return float(inside[np.abs(inside - roots).argmin()]) if len(roots) else within[0]

@@ -86,11 +86,9 @@ def samples(time: Array, rows: Array, lead: float, p: Parameters) -> npt.NDArray
     place = place - lead * qvel[:, :3]
     block = trajectory.samples(time, place[:, 0], state(place, qvel, p), p)
     for k, (contact, sensor) in enumerate(zip("AB", np.split(sensors, 2, axis=1), strict=True)):
-        gap, speed, touches = (
-            block[f"gap_{contact}"],
-            block[f"slip_speed_{contact}"],
-            sensor[:, _FORCE.start] > 0,
-        )
+        gap = block[f"gap_{contact}"]
+        speed = block[f"slip_speed_{contact}"]
+        touches = sensor[:, _FORCE.start] > 0
         block[f"force_{contact}"] = loads[:, k]
         # Of a contact that bears nothing the coordinates say how far it is, and how fast.
         gap[touches] = sensor[touches, _DIST]

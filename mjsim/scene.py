@@ -66,9 +66,8 @@ def build(p: Parameters, settings: ContactModel, shown: bool = False) -> tuple[A
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
-    model, text = _compiled(
-        p.replace(omega_0=0.0), settings, shown
-    )  # the fluid is no part of a scene
+    # the fluid is no part of a scene
+    model, text = _compiled(p.replace(omega_0=0.0), settings, shown)
     return copy.copy(model), text
 
 

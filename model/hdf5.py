@@ -61,9 +61,8 @@ class WholeFile:
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         if not self._finished:
-            with suppress(
-                *_DAMAGE if self._disk.error else ()
-            ):  # HDF5 misses what could not be written
+            # HDF5 misses what could not be written
+            with suppress(*_DAMAGE if self._disk.error else ()):
                 self.file.close()
             self._disk.close()
             remove(self._temporary)

@@ -294,9 +294,8 @@ Trajectory.__doc__ = (Trajectory.__doc__ or "").replace(
 def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
     """The attributes of a column in a file and in xarray."""
     attributes = {key: meta[key] for key in ("units", "long_name", "equation") if meta[key]}
-    if (
-        meta["dtype"] is np.int8
-    ):  # the CF convention's names of the codes, for readers that drop the HDF5 enum
+    # the CF convention's names of the codes, for readers that drop the HDF5 enum
+    if meta["dtype"] is np.int8:
         attributes["flag_values"] = np.array([case.value for case in Case], np.int8)
         attributes["flag_meanings"] = " ".join(case.name for case in Case)
     return attributes

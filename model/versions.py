@@ -22,9 +22,8 @@ def current_versions() -> Mapping[str, str]:
 @functools.cache
 def version(package: str) -> str:
     """The version of an installed package."""
-    from importlib import (
-        metadata,
-    )  # here, because it takes longer to load than the program to say its version
+    # here, because it takes longer to load than the program to say its version
+    from importlib import metadata
 
     try:
         return metadata.version(package)

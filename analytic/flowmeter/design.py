@@ -189,10 +189,8 @@ def best(
 
     Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one
     can."""
-    from scipy.optimize import (
-        Bounds,
-        differential_evolution,
-    )  # here, because `predict` shall not wait for it
+    # here, because `predict` shall not wait for it
+    from scipy.optimize import Bounds, differential_evolution
 
     open_names = [name for name, (low, high) in bounds.items() if low < high]
     ends = np.array([bounds[name] for name in open_names]).reshape(-1, 2)

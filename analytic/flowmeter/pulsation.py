@@ -96,10 +96,8 @@ def lag_harmonics(
 def _collocation(harmonics: int) -> tuple[Array, npt.NDArray[np.complex128], Array]:
     """Phases of half a period, and matrices from values there to complex amplitudes and to
     derivatives by the phase."""
-    odd, phase = (
-        np.arange(1, 2 * harmonics, 2),
-        np.linspace(0.0, math.pi, 2 * harmonics, endpoint=False),
-    )
+    odd = np.arange(1, 2 * harmonics, 2)
+    phase = np.linspace(0.0, math.pi, 2 * harmonics, endpoint=False)
     waves = np.exp(1j * phase[:, None] * odd)
     amplitudes = waves.conj().T / harmonics
     return phase, amplitudes, np.real(waves * (1j * odd) @ amplitudes)
@@ -196,10 +194,8 @@ def mean_error(
         run = simulate(p, x, 1 / frequency, flow, settings, sample_interval=1 / frequency)
         if not len(starts) and not len(run.events.time) and run.case[0] == Case.RR:
             return 0.0
-        starts, ends = (
-            np.vstack([starts[-DEPTH:], x[TURNING]]),
-            np.vstack([ends[-DEPTH:], run.x[-1, TURNING]]),
-        )
+        starts = np.vstack([starts[-DEPTH:], x[TURNING]])
+        ends = np.vstack([ends[-DEPTH:], run.x[-1, TURNING]])
         change = ends - starts
         if np.abs(change[-1]).max() <= settled * abs(p.omega_0):
             return float(run.theta[-1]) * frequency - p.omega_0

@@ -96,10 +96,8 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
     # As in `rolling_forces`, with B_y = s m g free, but with forces along the orbit that differ.
     s = np.linspace(0.0, min(p.j * u, 1.0), _SHARES)
     with np.errstate(divide="ignore", invalid="ignore"):
-        floor, wall = (
-            np.hypot(p.j * u - s, z_A) / (p.mu * (1 - s)),
-            np.hypot(s, z_B) / (p.eta * ((1 + p.j) * u - s)),
-        )
+        floor = np.hypot(p.j * u - s, z_A) / (p.mu * (1 - s))
+        wall = np.hypot(s, z_B) / (p.eta * ((1 + p.j) * u - s))
     friction = float(np.nanmin(np.maximum(floor, wall))) if p.mu and p.eta else math.inf
     return Rolling(
         math.copysign(1.0, p.omega_0) * omega_c, omega_c / flow - 1, k, float(Re), friction

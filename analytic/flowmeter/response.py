@@ -90,10 +90,8 @@ def ramp_coefficient(p: Parameters) -> float:
     places = s + _BRANCH_STEP * np.array([-1.0, 0.0, 1.0])
     flows, values = slipping_branch.states(places, p)[1], slipping_branch.eigenvalues_at(places, p)
     slow = np.take_along_axis(values, np.abs(values).argmin(axis=-1)[:, None], axis=-1)[:, 0].real
-    slope, curvature = (
-        (slow[2] - slow[0]) / (2 * _BRANCH_STEP),
-        (flows[0] - 2 * flows[1] + flows[2]) / _BRANCH_STEP**2,
-    )
+    slope = (slow[2] - slow[0]) / (2 * _BRANCH_STEP)
+    curvature = (flows[0] - 2 * flows[1] + flows[2]) / _BRANCH_STEP**2
     return float(AIRY_ZERO * (-(slope**2) / (2 * curvature)) ** (-1 / 3))
 
 

@@ -218,11 +218,9 @@ def _implicit_step(
     y = _sweep_rate(at_A, at_B, Impulse(0.0, 1.0, 0.0), A, B, k)
     z = _sweep_rate(at_A, at_B, Impulse(0.0, 0.0, 1.0), A, B, k)
     d = 1 + 1 / span
-    x, y, z = (
-        Impulse(d - x.n, -x.s, -x.t),
-        Impulse(-y.n, d - y.s, -y.t),
-        Impulse(-z.n, -z.s, d - z.t),
-    )
+    x = Impulse(d - x.n, -x.s, -x.t)
+    y = Impulse(-y.n, d - y.s, -y.t)
+    z = Impulse(-z.n, -z.s, d - z.t)
     yz = _cross(y, z)
     size = _dot(x, yz)
     return Impulse(
@@ -276,10 +274,8 @@ def solve_pair(
                 span = min(span * growth, LONGEST_SPAN)
             # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
             else:
-                span, growth = (
-                    max(span / SHORTER, 1 / (10 + rough)),
-                    max(growth**CALMER, LEAST_GROWTH),
-                )
+                span = max(span / SHORTER, 1 / (10 + rough))
+                growth = max(growth**CALMER, LEAST_GROWTH)
             step, pace = _implicit_step(need_A, need_B, step, span, A, B, k), 1.0
         last = change
         at_B = Impulse(at_B.n + pace * step.n, at_B.s + pace * step.s, at_B.t + pace * step.t)

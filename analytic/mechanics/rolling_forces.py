@@ -145,10 +145,8 @@ def _loads(
     omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None
 ) -> tuple[Array, Array]:
     """Centrifugal load u and common friction |z| of (23), in units of G."""
-    omega_c, fluid = (
-        np.asarray(omega_c, dtype=float),
-        np.asarray(p.omega_0 if omega_0 is None else omega_0),
-    )
+    omega_c = np.asarray(omega_c, dtype=float)
+    fluid = np.asarray(p.omega_0 if omega_0 is None else omega_0)
     u, lag = p.R / p.g * omega_c**2, np.abs(omega_c - fluid)
     return np.asarray(u), np.asarray(
         p.j * drag.coefficient(p.R * lag, p) * p.R / p.g * lag / (1 + 2 * p.j)

@@ -118,10 +118,8 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     check_names(
         [name], [*(field.name for field in Parameters.quantities()), RESTITUTION], "parameter"
     )
-    low, high = (
-        check_number(f"lowest {name}", low, "SI"),
-        check_number(f"highest {name}", high, "SI"),
-    )
+    low = check_number(f"lowest {name}", low, "SI")
+    high = check_number(f"highest {name}", high, "SI")
     if not low <= (value := start.loop.value(name)) <= high or value == 0:
         raise InputError(
             f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, "
@@ -168,10 +166,8 @@ def _one_way(
             inside, outside = here.loop.value(name), there.loop.value(name)
             value = min(max(outside, span[0]), span[1])
             share = (value - inside) / (outside - inside)
-            x, period = (
-                here.loop.x + share * (there.loop.x - here.loop.x),
-                (1 - share) * here.period,
-            )
+            x = here.loop.x + share * (there.loop.x - here.loop.x)
+            period = (1 - share) * here.period
             try:
                 loop = here.loop.with_value(name, value)
                 orbit = closed_orbit(replace(loop, x=x, period=period + share * there.period))
@@ -231,11 +227,8 @@ def _places_between(
             orbit = _next_orbit(
                 here, brentq(sign_at, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix
             )
-        except (
-            NoOrbitError,
-            ValueError,
-        ):  # where the sequence of cases changes, too, the test may jump
-            orbit = there
+        except (NoOrbitError, ValueError):
+            orbit = there  # where the sequence of cases changes, too, the test may jump
         yield Place(kind, orbit.loop.value(name), orbit)
     before = _rotated_to_least(here.changes)
     if before == _rotated_to_least(there.changes):

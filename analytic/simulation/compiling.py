@@ -55,9 +55,8 @@ def compiled(function: F) -> F:
                     (Path(dispatcher.stats.cache_path) / "compiling").open("w")
                 )
                 fcntl.flock(file, fcntl.LOCK_EX)
-            if (
-                gc.isenabled()
-            ):  # looking for garbage among all that compiling makes takes a tenth of it
+            # looking for garbage among all that compiling makes takes a tenth of it
+            if gc.isenabled():
                 gc.disable()
                 stack.callback(gc.enable)
             return compile_(*given, **named)

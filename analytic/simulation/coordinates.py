@@ -125,13 +125,9 @@ def _begin_off_wall(
 
     In RN the spin follows; in NN all of it rests, and with Stokes' drag the fall is known
     (`drag.fall`). With another law c depends on all components of the velocity."""
-    turn, u, speed, n, fall = (
-        cmath.exp(1j * at.theta),
-        rigid_body.velocities(at.x, k),
-        k.R / k.unit,
-        4,
-        NO_FALL,
-    )
+    turn = cmath.exp(1j * at.theta)
+    u, speed = rigid_body.velocities(at.x, k), k.R / k.unit
+    n, fall = 4, NO_FALL
     place, moves = (k.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k)
     z[0], z[1], z[2], z[3] = place.real, place.imag, moves.real, moves.imag
     scale[0], scale[1], scale[2], scale[3] = k.R, k.R, speed, speed

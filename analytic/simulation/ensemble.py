@@ -102,11 +102,9 @@ def simulate_many(
     workers = int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True)))
 
     over, shape, t_end = np.zeros(1, bool), (count, len(times)), float(times[-1])
-    x, case, landings = (
-        np.full((*shape, 8), np.nan),
-        np.full(shape, -1, np.int8),
-        np.zeros(shape, np.int64),
-    )
+    x = np.full((*shape, 8), np.nan)
+    case = np.full(shape, -1, np.int8)
+    landings = np.zeros(shape, np.int64)
     x[:, 0], end, failure = states, np.zeros(count), [""] * count
     carry_out = _run_time_stepping if settings.method == "time-stepping" else _run_event_driven
 
@@ -167,10 +165,8 @@ class _Run:
 
 def _run_time_stepping(run: _Run) -> tuple[float, str]:
     """A run by time stepping, into its rows; when it ended, and why it failed, if it did."""
-    from analytic.simulation import (
-        stepping,
-        time_stepping,
-    )  # here, since numba takes a while to load
+    # here, since numba takes a while to load
+    from analytic.simulation import stepping, time_stepping
 
     ball, stretches, given = time_stepping.prepared(
         run.x0, 0.0, run.p, run.flow, run.settings, run.times

@@ -263,11 +263,9 @@ def guards(t: float, z: Any, k: Motion, out: Any) -> None:
     if k.case == RS:
         out[0], out[1] = q_B / k.spin, (k.mu * A_y - math.sqrt(A_x * A_x + A_z * A_z)) / G
     elif k.case == SR:
-        out[0], out[1], out[2] = (
-            q_A / k.spin,
-            (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G,
-            A_y / G,
-        )
+        out[0] = q_A / k.spin
+        out[1] = (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
+        out[2] = A_y / G
     elif k.case == SS:
         out[0], out[1], out[2], out[3] = q_A / k.spin, q_B / k.spin, A_y / G, B_x / G
     else:
@@ -346,11 +344,9 @@ def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
         friction = -k.mu * k.g * along
         turning = (push + (1 + 1 / k.j) * friction) / along
         push += friction
-        out[4], out[5], last = (
-            turning.real,
-            turning.imag / max(z[4], k.rtol * math.sqrt(k.R * k.g)),
-            6,
-        )
+        out[4] = turning.real
+        out[5] = turning.imag / max(z[4], k.rtol * math.sqrt(k.R * k.g))
+        last = 6
     elif k.fall.landing == math.inf:
         out[4], out[5], last = rise, -k.g - c * rise, 6
     out[0], out[1], out[2], out[3], out[last] = V.real, V.imag, push.real, push.imag, power

@@ -111,10 +111,8 @@ def follow(
     values, arm, level = room[3, :count], room[4, :count], room[5, :count]
     lands, until = k.fall.landing <= until, min(until, k.fall.landing)
     equations.guards(at.time, z, k, values)
-    opens, lasts = (
-        coordinates.arm_guards(values, k, arm, level),
-        coordinates.rebound_time(at, z, k, rate),
-    )
+    opens = coordinates.arm_guards(values, k, arm, level)
+    lasts = coordinates.rebound_time(at, z, k, rate)
     pace = first_pace(
         at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0
     )

@@ -111,9 +111,8 @@ class Recorder:
         self._blocks.append(block)
         energy = rigid_body.energy(state.y, rigid_body.velocities(state, self.p), self.p)
         gained = energy - work
-        self._energy["energy_residual"] = float(
-            np.abs(gained - gained[0]).max()
-        )  # an impact may precede the first
+        # an impact may precede the first
+        self._energy["energy_residual"] = float(np.abs(gained - gained[0]).max())
         self._energy["energy_scale"] = float(np.abs([energy, work]).max())
 
     def note(self, events: Array, time: float) -> None:

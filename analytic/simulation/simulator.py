@@ -66,9 +66,8 @@ def simulate(
     check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     settings = dataclasses.replace(settings or Settings(), **changes)
     if settings.method == "event":
-        from analytic.simulation.hybrid import (
-            run,
-        )  # here, because the integrators of scipy take half a second to load
+        # here, because the integrators of scipy take half a second to load
+        from analytic.simulation.hybrid import run
     else:
         from analytic.simulation.time_stepping import run
     flow = Flow.steady(p.omega_0) if flow is None else flow

@@ -245,12 +245,8 @@ def explicit_steps(
     k, until, z, scale, times, samples, arm, level = of
     n, span, rtol, slow, rejected = len(z), until - start, max(LOCAL * k.rtol, FINEST), 0, False
     K, F = np.empty((ALL, n)), np.empty((3 + len(D), n))
-    new, now, values, seen = (
-        np.empty(n),
-        np.empty(n),
-        np.empty(len(arm)),
-        np.empty((LOOKS_A_STEP + 1, len(arm))),
-    )
+    new, now = np.empty(n), np.empty(n)
+    values, seen = np.empty(len(arm)), np.empty((LOOKS_A_STEP + 1, len(arm)))
     five, three = np.empty(n), np.empty(n)
     equations.rates(start + tau, z, k, K[0])
     equations.guards(start + tau, z, k, seen[0])

@@ -402,15 +402,8 @@ def _step_to_landing(
 
 def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     """The ball a step of dt later, with omega_0 from the middle of the step."""
-    at, P, impact, case, work, landings, residual = (
-        ball.at,
-        NOTHING,
-        NOTHING,
-        ball.case,
-        ball.work,
-        ball.landings,
-        0.0,
-    )
+    at, case, work, landings = ball.at, ball.case, ball.work, ball.landings
+    P, impact, residual = NOTHING, NOTHING, 0.0
     q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
     start = Forces(
         q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z
@@ -433,10 +426,8 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
         if count < LANDINGS:
             at, s, time = _step_to_landing(at, left, omega_0, touching, start, p)
         else:
-            after, time = (
-                _moved(at, left, solve(at, left, omega_0, touching, start, p), touching, p.R),
-                left,
-            )
+            after = _moved(at, left, solve(at, left, omega_0, touching, start, p), touching, p.R)
+            time = left
             touching = Touching(in_A or after.y < 0, in_B or after.h < 0, 0.0, 0.0)
             s = solve(at, left, omega_0, touching, start, p)
             after = _moved(at, left, s, touching, p.R)
@@ -452,9 +443,8 @@ def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> S
     to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
     to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > p.g * dt / 200 else 0.0
     hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, to_A, to_B), NOTHING, p)
-    if (
-        hit.residual != 0 and p.mu >= 1 and p.eta >= 1
-    ):  # friction may lock the ball in the corner: no rebound
+    # friction may lock the ball in the corner: no rebound
+    if hit.residual != 0 and p.mu >= 1 and p.eta >= 1:
         hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, 0.0, 0.0), NOTHING, p)
     return hit
 

@@ -96,6 +96,7 @@ def prepared(
     steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)
     at = stepping.BallState(theta, x.y, x.h, rigid_body.velocities(x, p))
     given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution, p.fluid_torque
+    # an integer would be compiled for itself
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
         stepping.Stretches(
@@ -105,7 +106,5 @@ def prepared(
             np.isin(knots[1:], times),
             stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
         ),
-        stepping.Constants(
-            drag.law(p), *map(float, given)
-        ),  # an integer would be compiled for itself
+        stepping.Constants(drag.law(p), *map(float, given)),
     )

@@ -133,9 +133,8 @@ def choose(at: HybridState, k: Motion) -> tuple[int, HybridState]:
     """
     x = at.x
     slip_x = x.v_h + x.v_y + k.r * x.slip_z
-    if abs(slip_x) <= 4 * EPS * abs(
-        x.v_h
-    ):  # round-off of a ball that rolls on the floor away from the wall
+    # round-off of a ball that rolls on the floor away from the wall
+    if abs(slip_x) <= 4 * EPS * abs(x.v_h):
         slip_x = 0.0
     A = _contact(x.y == 0 and x.v_y == 0, slip_x, -k.r * x.slip_x)
     B = _contact(x.h == 0 and x.v_h == 0, -k.r * x.slip_z, k.r * x.slip_y)

@@ -60,11 +60,9 @@ def slip_rates(
 
     x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative
     normal force means that the contact opens instead of slipping that way."""
-    state, names, n = (
-        dynamics.check_state(inner, x, p),
-        normals(inner, outer),
-        np.asarray(n, dtype=float),
-    )
+    state = dynamics.check_state(inner, x, p)
+    names = normals(inner, outer)
+    n = np.asarray(n, dtype=float)
     push = State(**dict(zip(names, np.moveaxis(n, -1, 0), strict=True)))
     old_slips, new_slips = (dynamics.sliding_velocities(each, p) for each in (state, push))
     contacts = zip((inner.A, inner.B), (outer.A, outer.B), old_slips, new_slips, strict=True)
@@ -136,9 +134,8 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
             )
             kinds = {_by_sign(0.0, p.eta * Omega2), _by_sign(*slip)}
         case Case.SR | Case.NR:
-            smooth_floor = (
-                case is Case.SR and p.mu == 0
-            )  # the floor then carries the weight, the wall nothing
+            # the floor then carries the weight, the wall nothing
+            smooth_floor = case is Case.SR and p.mu == 0
             kinds = {_by_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
         case Case.RS:
             kinds = {_by_sign(p.j * Omega2, p.mu)}

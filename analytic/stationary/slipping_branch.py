@@ -62,10 +62,8 @@ def branch(
     For eta > j the branch has A_y < 0: it solves the equations once (12) is released (Fig. 12). It
     is nan where not even then a solution exists."""
     s, mu, eta = np.asarray(s, dtype=float), *_friction(p, mu, eta)
-    cos, sin = (
-        1 / np.hypot(1.0, np.exp(s)),
-        1 / np.hypot(1.0, np.exp(-s)),
-    )  # each to full relative accuracy
+    # each to full relative accuracy
+    cos, sin = 1 / np.hypot(1.0, np.exp(s)), 1 / np.hypot(1.0, np.exp(-s))
     den = _denominator(cos, p.j, mu, eta)
     den = np.where(den > 0, den, np.nan)
     Omega_c = np.sqrt(mu * (1 + eta * cos**2) / den)

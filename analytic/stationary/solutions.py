@@ -24,10 +24,8 @@ from model.arrays import Array
 from model.drag import QUADRATIC, STOKES
 from model.errors import check_type
 
-_MIRROR, _MIRROR_FORCE = (
-    State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0),
-    np.array([1.0, 1.0, -1.0]),
-)
+_MIRROR = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
+_MIRROR_FORCE = np.array([1.0, 1.0, -1.0])
 """Signs of state and forces of the other sense of rotation."""
 _LEAST_REAL_PART = 1e-9
 """Real part divided by modulus below which an eigenvalue counts as imaginary: the pair of NS is so,

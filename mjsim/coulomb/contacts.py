@@ -164,11 +164,9 @@ def find(model: Any, data: Any, memory: Any) -> None:
         for side in range(2):
             g = given.geom[side]
             contact.geoms[side] = g
-            x, y, z = (
-                given.pos[0] - xpos[g, 0],
-                given.pos[1] - xpos[g, 1],
-                given.pos[2] - xpos[g, 2],
-            )
+            x = given.pos[0] - xpos[g, 0]
+            y = given.pos[1] - xpos[g, 1]
+            z = given.pos[2] - xpos[g, 2]
             for axis in range(3):
                 u, v, w = xmat[g, 0, axis], xmat[g, 1, axis], xmat[g, 2, axis]
                 contact.place[side, axis] = u * x + v * y + w * z
@@ -208,11 +206,9 @@ def jacobian_length(model: Any, data: Any, memory: Any) -> int:
 def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
     """Copy the Jacobians of all rows, without zeros: MuJoCo's own are gone when the next step asks
     for forces."""
-    rows, sparse, limit = (
-        rows_of(memory),
-        mj_isSparse(memory.model),
-        reals(data.efc_frictionloss, data.nefc),
-    )
+    rows = rows_of(memory)
+    sparse = mj_isSparse(memory.model)
+    limit = reals(data.efc_frictionloss, data.nefc)
     lengths, begins = integers(data.efc_J_rownnz, data.nefc), integers(data.efc_J_rowadr, data.nefc)
     size, total = jacobian_length(model, data, memory), 0
     given, columns = reals(data.efc_J, size), integers(data.efc_J_colind, size)

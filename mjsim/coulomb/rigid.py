@@ -166,14 +166,10 @@ def add_dampers(model: Any, data: Any, memory: Any) -> None:
     for i in range(model.nv):
         inertia[starts[i] + lengths[i] - 1] += memory.dampers[0] * damping[i]
         some = some or damping[i] != 0
-    bias, kind = (
-        integers(model.actuator_biastype, model.nu),
-        integers(model.actuator_trntype, model.nu),
-    )
-    target, gear = (
-        integers(model.actuator_trnid, (model.nu, 2)),
-        reals(model.actuator_gear, (model.nu, 6)),
-    )
+    bias = integers(model.actuator_biastype, model.nu)
+    kind = integers(model.actuator_trntype, model.nu)
+    target = integers(model.actuator_trnid, (model.nu, 2))
+    gear = reals(model.actuator_gear, (model.nu, 6))
     numbers = reals(model.actuator_biasprm, (model.nu, BIASES))
     types, dofs = integers(model.jnt_type, model.njnt), integers(model.jnt_dofadr, model.njnt)
     for k in range(model.nu):

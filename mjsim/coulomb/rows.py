@@ -44,11 +44,9 @@ def set_up(data: Any, memory: Any) -> None:
 @kernel
 def write_references(data: Any, memory: Any) -> None:
     """Tell MuJoCo reference accelerations that hold what is remembered, less De Saxcé's shift."""
-    contacts, rows, reference = (
-        contacts_of(memory),
-        rows_of(memory),
-        reals(data.efc_aref, data.nefc),
-    )
+    contacts = contacts_of(memory)
+    rows = rows_of(memory)
+    reference = reals(data.efc_aref, data.nefc)
     for r in range(len(rows)):
         reference[r] = rows[r].reference + rows[r].R * rows[r].held
     for i in range(memory.contacts):
