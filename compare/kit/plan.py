@@ -57,42 +57,45 @@ class Entry:
     only: str = ""
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     seconds: float = 1.0
-    """Processor time at the quick level on some machine: its part of the whole."""
+    """Processor time at the quick level on some machine, of the engine on trial."""
 
 
+PACE = {Role.IN_THE_LIMIT: 0.25, Role.AS_IT_COMES: 10.0}
+"""How much longer others take for as many steps: they have no law to solve; but a free ball in
+facets settles slowly."""
 HOPS = "hops that last are those of the set hopping"
 # fmt: off
 PLAN: dict[str, Entry] = {
     # What is a single long run begins first: beside it there is work for the other workers. Then
     # what takes longest.
     # protocol          on trial, quick   in the limit     steps   as it comes
-    "recurrent":  Entry(ONE_BALL, only=HOPS, seconds=5),
+    "recurrent":  Entry(ONE_BALL, only=HOPS, seconds=12),
     "stepped":    Entry(ONE_BALL, only=HOPS, by=MOREAU),
-    "choice":     Entry(ONE_BALL,         ONE_BALL,        (4, 4),
+    "choice":     Entry(ONE_BALL,         ONE_BALL,        (4, 4), seconds=6,
                         only="it is one of balls with mu > 1"),
-    "thresholds": Entry(VARIED,           LIMIT_SETS,       (3, 4), seeded=True, seconds=20),
-    "settled":    Entry(VARIED,           LIMIT_SETS,       (4, 4), ONE_BALL, seconds=11),
-    "edge":       Entry(("reference", "rough-floor"), seconds=8),
-    "rates":      Entry((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL, seconds=7),
-    "pulsation":  Entry(DRAG_LAWS,        ONE_BALL, seconds=7),
-    "slope":      Entry(VARIED,           ONE_BALL, seconds=6),
-    "unsteady":   Entry(DRAG_LAWS,        ONE_BALL, seconds=5),
+    "thresholds": Entry(VARIED,           LIMIT_SETS,       (3, 4), seeded=True, seconds=49),
+    "settled":    Entry(VARIED,           LIMIT_SETS,       (4, 4), ONE_BALL, seconds=30),
+    "edge":       Entry(("reference", "rough-floor"), seconds=15),
+    "rates":      Entry((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL, seconds=9),
+    "pulsation":  Entry(DRAG_LAWS,        ONE_BALL, seconds=23),
+    "slope":      Entry(VARIED,           ONE_BALL, seconds=15),
+    "unsteady":   Entry(DRAG_LAWS,        ONE_BALL, seconds=12),
     "unloading":  Entry(ENDS_OF_ROLLING, seconds=4),
-    "laws":       Entry(VARIED,           ONE_BALL, settles=False, seconds=3),
+    "laws":       Entry(VARIED,           ONE_BALL, settles=False, seconds=5),
     "plane":      Entry(ONE_BALL, only="the planes of Figs. 7 and 8 are those of reference only",
-                        seconds=3),
-    "birth":      Entry(VARIED, seconds=3),
-    "bounds":     Entry(VARIED,           ONE_BALL, seconds=2),
-    "mirrored":   Entry(ONE_BALL,         ONE_BALL),
-    "growth":     Entry(VARIED,           LIMIT_SETS, settles=False),
-    "steepest":   Entry(VARIED,           LIMIT_SETS, settles=False),
-    "lift":       Entry(VARIED,           ENDS_OF_ROLLING, (4, 4), settles=False),
-    "field":      Entry(VARIED,           LIMIT_SETS, free=ONE_BALL, settles=False),
-    "motions":    Entry(ONE_BALL,         ONE_BALL, settles=False),
-    "runs":       Entry(DRAG_LAWS,        ONE_BALL, free=ONE_BALL, settles=False),
-    "torque":     Entry(ONE_BALL,         ONE_BALL,        (4, 4)),
-    "impacts":    Entry(ENDS_OF_ROLLING,  ONE_BALL, settles=False),
-    "hysteresis": Entry(ONE_BALL,         ONE_BALL,        (4, 4)),
+                        seconds=12),
+    "birth":      Entry(VARIED, seconds=10),
+    "bounds":     Entry(VARIED,           ONE_BALL, seconds=9),
+    "mirrored":   Entry(ONE_BALL,         ONE_BALL, seconds=0.4),
+    "growth":     Entry(VARIED,           LIMIT_SETS, settles=False, seconds=7),
+    "steepest":   Entry(VARIED,           LIMIT_SETS, settles=False, seconds=7),
+    "lift":       Entry(VARIED,           ENDS_OF_ROLLING, (4, 4), settles=False, seconds=3),
+    "field":      Entry(VARIED,           LIMIT_SETS, free=ONE_BALL, settles=False, seconds=7),
+    "motions":    Entry(ONE_BALL,         ONE_BALL, settles=False, seconds=1.5),
+    "runs":       Entry(DRAG_LAWS,        ONE_BALL, free=ONE_BALL, settles=False, seconds=1.7),
+    "torque":     Entry(ONE_BALL,         ONE_BALL,        (4, 4), seconds=1),
+    "impacts":    Entry(ENDS_OF_ROLLING,  ONE_BALL, settles=False, seconds=0.4),
+    "hysteresis": Entry(ONE_BALL,         ONE_BALL,        (4, 4), seconds=2),
     "followed":   Entry(ONE_BALL, level=Level.DEFAULT, only=HOPS),
     "rebounding": Entry(ONE_BALL, level=Level.DEFAULT, only=HOPS, by=MOREAU),
     "swing":      Entry(ONE_BALL, level=Level.DEFAULT,

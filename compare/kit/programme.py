@@ -19,7 +19,7 @@ from pathlib import Path
 from compare.kit import record
 from compare.kit.engines import Engine
 from compare.kit.levels import Level
-from compare.kit.plan import PLAN, planned
+from compare.kit.plan import PACE, PLAN, planned
 from compare.kit.record import (
     Measured,
     Measurement,
@@ -94,12 +94,12 @@ class Job:
 
     @property
     def cost(self) -> float:
-        """About its processor time at the quick level, relative to others."""
+        """About its processor time at the quick level on some machine, s."""
         name, engine, divisor = self.protocol.name, self.runner.engine, self.runner.divisor
         if not self.runner.has_own_steps:
             return PLAN[name].seconds
         share = len(planned(name, engine, divisor, Level.QUICK)) / len(PLAN[name].trial)
-        return PLAN[name].seconds * share * divisor
+        return PLAN[name].seconds * share * divisor * PACE.get(engine.role, 1.0)
 
     @cached_property
     def origin(self) -> Origin:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -24,10 +25,14 @@ from compare.kit.workers import Spread
 
 INTERVAL = 10.0
 """Seconds between plain lines."""
+READY = "getting ready"
+"""What is said before anything else is."""
 DRAWING = 0.1
 """Share of a validation's time that drawing its figures takes, about."""
 PATIENCE = 10.0
-"""Seconds for which a validation's pace is taken to be that of a machine that is free."""
+"""Processor time, s, of which a validation's pace is taken to be that of the table of costs."""
+LATE = 0.1
+"""Share of its cost that a protocol still takes, at least, however long it has taken."""
 Show = Callable[[str, int, int, int], None]
 """Called with what is being done, in words, how much of it is done, of how much in all, and how
 much failed."""
@@ -89,7 +94,7 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()
         with Progress(*columns, TimeElapsedColumn(), left, console=Console(stderr=True)) as bar:
             pace = _Pace()
-            line = bar.add_task("", total=None, pace=pace)
+            line = bar.add_task(READY, total=None, pace=pace)
 
             def show(what: str, done: int, total: int, failed: int) -> None:
                 pace.note(done, total)
@@ -99,7 +104,7 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
             yield show
     else:  # what is being done at once, and how far it is every `INTERVAL`, whatever happens
         began, ended = time.monotonic(), threading.Event()
-        pace, last = _Pace(), ("", 0, 0, 0)
+        pace, last = _Pace(), (READY, 0, 0, 0)
 
         def remember(what: str, done: int, total: int, failed: int) -> None:
             nonlocal last
@@ -110,8 +115,6 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         def print_progress() -> None:
             while not ended.wait(INTERVAL):
                 what, done, total, failed = last
-                if not what:
-                    continue
                 left = f", {pace}" if pace.left() else ""
                 share = f", {done / total:.0%}" if total else ""
                 bad = f", {failed} failed" if failed else ""
@@ -141,25 +144,32 @@ class ValidationProgress:
     claims: int
     workers: int = 1
     costs: Mapping[str, float] = field(default_factory=dict)
-    """Processor time of each protocol that isn't stored yet, s, on a machine that is free."""
+    """Processor time of each protocol that isn't stored yet, s, on some machine."""
     began: float = field(default_factory=lambda: time.monotonic())
     _under_way: dict[str, tuple[int, int, int]] = field(default_factory=dict)
-    _measured: float = 0.0
+    _spent: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    """Processor time of each protocol until now, s, if those under way share the workers evenly."""
+    _measured: set[str] = field(default_factory=set)
     _judged: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def __post_init__(self) -> None:
+        self._noted = self.began
 
     def measuring(self, protocol: str, done: int, total: int, failed: int) -> None:
         """Note how many runs of a protocol are done, how many are known so far, and how many
         failed."""
         with self._lock:
+            self._note_time()
             self._under_way[protocol] = done, total, failed
             self._tell()
 
     def measured(self, protocol: str) -> None:
         """Note that a protocol is done."""
         with self._lock:
+            self._note_time()
             self._under_way.pop(protocol, None)
-            self._measured += self.costs[protocol]
+            self._measured.add(protocol)
             self._tell()
 
     def judged(self) -> None:
@@ -184,13 +194,27 @@ class ValidationProgress:
         return counted
 
     def left(self) -> float:
-        """Seconds that are left of measuring and drawing: what isn't done yet, at the pace until
-        now, which counts for little at first, and as on a machine that is free."""
-        shares = {name: done / max(total, 1) for name, (done, total, _) in self._under_way.items()}
-        under_way = sum(self.costs.get(name, 0.0) * share for name, share in shares.items())
-        done = (self._measured + under_way) / self.workers
-        pace = (time.monotonic() - self.began + PATIENCE) / (done + PATIENCE)
-        return (1 + DRAWING) * pace * (sum(self.costs.values()) / self.workers - done)
+        """Seconds that are left of measuring and drawing: what isn't done yet, at the pace of the
+        protocols that are or should be, which counts for little at first."""
+        done = [
+            name for name in self.costs
+            if name in self._measured or self._spent[name] > self.costs[name]
+        ]  # fmt: skip
+        spent, cost = (sum(of[name] for name in done) for of in (self._spent, self.costs))
+        pace = (spent + PATIENCE) / (cost + PATIENCE)
+        rest = sum(
+            max(pace * cost - self._spent[name], LATE * pace * cost)
+            for name, cost in self.costs.items()
+            if name not in self._measured
+        )
+        left = rest / self.workers
+        return left + DRAWING * (time.monotonic() - self.began + left)
+
+    def _note_time(self) -> None:
+        """Share out the time since the last note among the protocols under way."""
+        passed, self._noted = time.monotonic() - self._noted, time.monotonic()
+        for name in self._under_way:
+            self._spent[name] += passed * self.workers / max(len(self._under_way), self.workers)
 
     def _tell(self) -> None:
         """Show how far claims and protocols are."""

@@ -1,5 +1,7 @@
 """What is announced of the time that is left is true on machines of any pace."""
 
+import time
+
 import pytest
 
 from compare.kit import progress
@@ -8,7 +10,7 @@ COSTS = {f"protocol {k}": 10.0 for k in range(30)}
 """Seconds on a machine that is free."""
 
 
-@pytest.mark.parametrize("pace", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("pace", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("workers", [1, 4])
 def test_the_time_left_is_right_within_a_factor_of_two_after_twenty_seconds(
     pace, workers, monkeypatch
@@ -16,17 +18,21 @@ def test_the_time_left_is_right_within_a_factor_of_two_after_twenty_seconds(
     now, said = 0.0, []
     monkeypatch.setattr(progress.time, "monotonic", lambda: now)
     far = progress.ValidationProgress(lambda *told: said.append(told), 30, workers, COSTS)
-    lasts = pace * sum(COSTS.values()) / workers  # of protocols that begin one after the other
-    for k, name in enumerate(COSTS):
-        for half in (1, 2):
-            now = (k + half / 2) / len(COSTS) * lasts
-            far.measuring(name, half, 2, 0)
+    lasts = pace * sum(COSTS.values()) / workers
+    at_once = 1 if workers == 1 else workers + 2  # each in many rounds of runs of its own
+    for k in range(0, len(COSTS), at_once):
+        names = list(COSTS)[k : k + at_once]
+        for part in range(5 * at_once):
+            now = (k + part / 5) / len(COSTS) * lasts
+            far.measuring(names[part % at_once], part % 3, 3, 0)
             done = said[-1][1] / said[-1][2]
             if now >= 20 and lasts - now > 0.2 * lasts:
                 extrapolated = now * (1 - done) / done  # as the reporter does
                 assert 0.5 < extrapolated / (lasts - now) < 2, (now, lasts)
-        far.measured(name)
-    assert far.left() == pytest.approx(0, abs=1e-9)
+        now = (k + at_once) / len(COSTS) * lasts
+        for name in names:
+            far.measured(name)
+    assert far.left() == pytest.approx(progress.DRAWING * lasts)
 
 
 def test_what_is_stored_tells_nothing_of_the_pace(monkeypatch):
@@ -37,6 +43,13 @@ def test_what_is_stored_tells_nothing_of_the_pace(monkeypatch):
     before = far.left()
     far.measured("protocol 0")
     assert far.left() == before
+
+
+def test_a_word_comes_before_anything_is_known(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "INTERVAL", 0.01)
+    with progress.reporter():
+        time.sleep(0.2)
+    assert "0 s: getting ready" in capsys.readouterr().err
 
 
 def test_silence_between_two_parts_is_no_sign_that_they_are_slow(monkeypatch):
