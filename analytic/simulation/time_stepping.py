@@ -30,9 +30,12 @@ from analytic.simulation.motion import Recorder
 from analytic.simulation.settings import Settings
 from model import Case, Flow, Parameters, State, time_scales
 from model.arrays import Array
+from model.parameters import Range, check_number
 
 AT_ONCE = 10_000
 """Most steps between two looks at progress and keyboard."""
+MAX_STEPS = 1e9
+"""Of a run, an hour or so."""
 
 
 def run(
@@ -91,6 +94,9 @@ def prepared(
     shortest, _ = time_scales.shortest_time(*problem)
     timestep = settings.timestep or min(math.sqrt(p.R / p.g) / 500, shortest / 2)
     time_scales.check_timestep(timestep, *problem)
+    check_number(
+        "t_end", t_end, "s", Range(high=MAX_STEPS * timestep), f"for at most {MAX_STEPS:g} steps it"
+    )
     knots = np.union1d(times, flow.knots(t_end))
     length = np.diff(knots)
     steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import math
 import os
+import re
 import shutil
 import sys
 from collections.abc import Iterable, Iterator
@@ -54,6 +55,10 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, *given: Any) -> tuple[argparse.Namespace, list[str]]:  # type: ignore[override]
         """As argparse does; no output may be a file that another argument names, or a link to
         one."""
+        for word in given[0]:  # one dash before a long name would be a short option and its value
+            option = word.partition("=")[0].replace("_", "-")
+            if re.match("-[^-]", option) and f"-{option}" in self._option_string_actions:
+                self.error(f"there is no option {option!r}: it is '-{option}'")
         found, rest = super().parse_known_args(*given)
         for word in rest:
             if word.startswith("-"):

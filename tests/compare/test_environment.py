@@ -122,7 +122,7 @@ def test_make_installs_all_that_readme_imports():
 def test_a_directory_in_which_nothing_can_be_written(monkeypatch, capsys):
     """Not even by the superuser."""
     monkeypatch.chdir("/proc")
-    assert carried_out(capsys, "simulate --start slip_x=1e11 --time 0.05")[0] == 1
+    assert carried_out(capsys, "simulate --start y=1e11 --time 0.05")[0] == 1
     for line in ("sweep --vary eta=0.1,0.2 --workers 0", "simulate -o run.h5"):
         assert "cannot write" in refused(capsys, line)
 
