@@ -516,9 +516,7 @@ def _complete(parser: Parser, commands: options.Commands, shell: Sequence[str]) 
     try:
         import shtab  # here, because it is optional
     except ImportError as error:
-        raise InputError(
-            "--print-completion needs shtab: pip install 'dualball[completion]'"
-        ) from error
+        raise InputError("--print-completion needs shtab: pip install shtab") from error
     if tuple(shell) not in {(each,) for each in shtab.SUPPORTED_SHELLS}:
         raise InputError(f"--print-completion takes one of {', '.join(shtab.SUPPORTED_SHELLS)}")
     for name in COMMANDS:

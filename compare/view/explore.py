@@ -280,7 +280,7 @@ def serve(p: Parameters, port: int, show: bool) -> None:
 
         from compare.view import guard
     except ImportError as error:
-        raise InputError("explore needs NiceGUI: pip install 'dualball[explore]'") from error
+        raise InputError("explore needs NiceGUI: pip install 'nicegui>=3.18'") from error
     with socket.socket() as tried:
         # As the server does: of one that ended nothing is left.
         tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

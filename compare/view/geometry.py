@@ -44,8 +44,8 @@ def geometry(
     """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled; see
     `ARROW`."""
     p = run.header.parameters
-    steps = max(1, math.ceil((run.time[-1] - run.time[0]) / STEP))
-    past = resampled(run, np.linspace(run.time[0], run.time[-1], steps + 1))
+    steps = max(1, math.ceil((now.time[-1] - run.time[0]) / STEP))
+    past = resampled(run, np.linspace(run.time[0], now.time[-1], steps + 1))
     centres, axes = to_world(now.x, now.theta, p).position, frame(now.theta)
     normals = np.stack([axes[:, 1], axes[:, 0]])
     forces, slips = (
@@ -88,7 +88,9 @@ def orientations(run: Trajectory) -> Rotation:
     upright at first."""
     middle = resampled(run, (run.time[1:] + run.time[:-1]) / 2)
     spin = to_world(middle.x, middle.theta, run.header.parameters).spin
-    turned = [Rotation.identity()]
-    for step in Rotation.from_rotvec(spin * np.diff(run.time)[:, None]):
-        turned.append(step * turned[-1])
-    return Rotation.concatenate(turned)
+    steps = Rotation.from_rotvec(spin * np.diff(run.time)[:, None])
+    turned, summed = Rotation.concatenate([Rotation.identity(), steps]), 1
+    while summed < len(turned):  # each holds the product of so many steps up to its own
+        turned = Rotation.concatenate([turned[:summed], turned[summed:] * turned[:-summed]])
+        summed *= 2
+    return turned

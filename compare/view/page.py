@@ -109,9 +109,7 @@ def write(
     told = {"p": p, "header": run and run.header, "force": FORCE, "slip": SLIP, "slips": slips}
     nicegui = importlib.util.find_spec("nicegui")
     if nicegui is None or nicegui.origin is None:
-        raise InputError(
-            "a page needs NiceGUI, which has three.js: pip install 'dualball[explore]'"
-        )
+        raise InputError("a page needs NiceGUI, which has three.js: pip install 'nicegui>=3.18'")
     try:
         source = (Path(nicegui.origin).parent / "elements/scene/dist/index.js").read_bytes()
     except FileNotFoundError:

@@ -108,7 +108,7 @@ def test_a_run_is_shown_between_its_samples(run):
         (
             "p.html",
             {"rate": 10},
-            r"needs NiceGUI, which has three\.js: pip install 'dualball\[explore\]'",
+            r"needs NiceGUI, which has three\.js: pip install 'nicegui>=3.18'",
         ),
     ],
 )
@@ -319,7 +319,7 @@ def test_who_is_slow_with_headers_is_not_waited_for(address):
 
 def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "nicegui", None)
-    with pytest.raises(InputError, match=r"pip install 'dualball\[explore\]'"):
+    with pytest.raises(InputError, match=r"pip install 'nicegui>=3.18'"):
         explore.serve(P, 8080, show=False)
 
 

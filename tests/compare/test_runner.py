@@ -144,13 +144,16 @@ def test_what_is_not_installed_says_what_to_do(tmp_path, monkeypatch, capsys):
 def test_an_adapter_that_gives_nothing_loses_all_cases(state, tmp_path, monkeypatch, capsys):
     """It has its page all the same."""
     functions = "build = lambda case, timestep: None; step = lambda n: None; state = lambda: "
-    (tmp_path / "mine.py").write_text(f"import numpy; {functions}{state}")
+    note = "NOTE = 'what is told of another case'"
+    (tmp_path / "mine.py").write_text(f"import numpy; {note}; {functions}{state}")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     shown = told(capsys, "league --engine mine --quick --quiet -o out --workers 1")
     assert re.search(r"mine +f64 +0 of \d\d lost lost lost lost", shown)
     assert "The shortest step is 2 ms." in shown
-    assert "lost" in (tmp_path / "out" / "league.html").read_text("utf-8")
+    page = (tmp_path / "out" / "league.html").read_text("utf-8")
+    assert "lost" in page
+    assert re.search(r"Worst: .*\. Known for: what is told of another case\.", page)
 
 
 def test_a_league_of_one(tmp_path, capsys):
