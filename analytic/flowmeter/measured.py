@@ -56,25 +56,29 @@ def fits(p: Parameters, flow: Array, read: Array) -> list[Fit]:
     """The fits `FITS` of a curve: readings omega_c > 0 (n,), rad s-1, at flows > 0 (n,) in
     proportion to omega_0; [] for a curve without a kink.
 
-    Raises `InputError` for fewer than `FEWEST` readings on either side of it, and for a set of
-    which theory's curve has none."""
+    Raises `InputError` for fewer than `FEWEST` readings on either side of it, for readings that
+    are on no curve, and for a set of which theory's curve has no kink."""
     from scipy.stats import f  # here, because it takes a second to load
 
     bifurcation.check_branch(p)
     if len(flow) < 2 * FEWEST:
-        raise InputError(f"{len(flow)} readings are too few: {2 * FEWEST} are needed")
+        raise InputError(f"too few readings: {len(flow)}, where {2 * FEWEST} are needed")
     found = list[Fit]()
     for free in FITS:
         found.append(_fit(p, free, flow, read, found[-1:]))
     straight, more = np.log(read / flow), len(FITS[-1])
     bent, left = np.log1p(found[-1].off) ** 2, len(flow) - more - 1
-    gained = (len(flow) * straight.var() - bent.sum()) / more
-    if f.sf(gained / (bent.sum() / left), more, left) > CHANCE:
+    rest = max(bent.sum(), len(flow) * np.finfo(float).eps ** 2)
+    gained = (len(flow) * straight.var() - rest) / more
+    if f.sf(gained / (rest / left), more, left) > CHANCE:
+        if (scatter := straight.std()) > TOLD:
+            said = f"follow no curve of theory, and scatter by {100 * scatter:.2g} %"
+            raise InputError(f"the readings {said} about proportion to the flow")
         return []
     below = int(np.sum(flow < found[-1].kink))
     if min(below, len(flow) - below) < FEWEST:
-        sides = f"{below} readings below the kink and {len(flow) - below} beyond"
-        raise InputError(f"{sides} are too few: {FEWEST} are needed on each side")
+        sides = f"{below} below the kink and {len(flow) - below} beyond"
+        raise InputError(f"too few readings: {sides}, where {FEWEST} are needed on each side")
     return found
 
 

@@ -29,7 +29,8 @@ COLUMNS: dict[str, tuple[str, Sequence[str]]] = {
 def run(args: argparse.Namespace) -> int:
     """Fit theory to the curve, say what it tells, and draw both."""
     if not (own := options.own_set(args)):
-        raise InputError("a measured curve needs its meter, --parameters FILE; motions come in two")
+        how = "--set NAME or --parameters FILE"
+        raise InputError(f"a measured curve needs its meter, {how}; motions come in two")
     (p,) = own.values()
     name, flow, read = curve(args.a)
     found = measured.fits(p, flow, read)
@@ -67,23 +68,26 @@ def in_words(found: list[Fit], best: Fit | None, name: str, flow: Array, read: A
     """What a curve tells: its kink, the factor of its flows, parameters, and what theory is off
     by."""
     symbol, unit = ("Q", "m³/s") if name == "Q" else ("ω₀", "rad/s")
+    per_flow, theory = "rad/m³ " * (name == "Q"), ", by theory 1" * (name == "omega_0")
     if not found:
-        within = _percent(read / flow / np.mean(read / flow) - 1)
-        top = f"up to {symbol} = {rounded(float(flow.max()))} {unit}"
-        said = (
-            f"No kink: {len(flow)} readings {top} are in proportion to the flow, within {within} %."
-        )
-        return [said, "The ball rolls, and tells nothing of friction and drag."]
+        factor = float(np.mean(read / flow))
+        return [
+            f"No kink: {len(flow)} readings up to {symbol} = {rounded(float(flow.max()))} {unit} "
+            "are in proportion to the flow.",
+            f"ω_c is {rounded(factor)} {per_flow}times {symbol}{theory}, within "
+            f"{_percent(read / flow / factor - 1)} %.",
+            "The ball rolls, and tells nothing of friction and drag.",
+        ]
     fit = best or found[0]
     rolls = flow < fit.kink
     others = " and ".join(_symbol(each) for each in found[-1].free if each not in fit.free)
     alone = ", ".join(map(_symbol, fit.free)) + (f", if {others} are as given" * bool(others))
     off = [f"{_percent(fit.off[side])} % in {side.sum()} readings" for side in (rolls, ~rolls)]
-    factor = f"{_with(fit.factor, fit.u['factor'])} {'rad/m³ ' * (name == 'Q')}times {symbol}"
+    factor = f"{_with(fit.factor, fit.u['factor'])} {per_flow}times {symbol}"
     return [
         f"Kink: from {symbol} = {_with(fit.kink, fit.u['kink'])} {unit} on it slips, ω₀₁ (84): one "
         "combination of μ and η.",
-        f"Flow: the fluid turns with {factor}{', by theory 1' * (name == 'omega_0')}.",
+        f"Flow: the fluid turns with {factor}{theory}.",
         f"Told: {alone if best else 'no parameter by itself'}.",
         f"Theory is off by {off[0]} before the kink, where any theory fits, and by {off[1]} "
         "beyond.",

@@ -93,15 +93,23 @@ def test_a_curve_without_a_kink_says_so(capsys, curve, factor):
     assert "Told" not in said
 
 
+def test_a_curve_without_any_scatter_has_no_kink(capsys, curve):
+    flows = np.arange(1.0, 12.0)
+    path = curve(flows, np.tile(3 * flows, 2), "omega_0 (rad/s)", 1.0)
+    said = told(capsys, f"compare {path} --set reference")
+    assert "ω_c is 3 times ω₀, by theory 1, within 0 %" in said
+
+
 @pytest.mark.parametrize(
     ("text", "given", "said"),
     [
         ("Q (l/s),omega_c\n1,2\n", "--set reference", "Q must be in m3/s, not in l/s"),
         ("omega_0,omega_c\n1,2\n0,1\n", "--set reference", "line 3: omega_0 = 0 rad s-1"),
         ("flow,omega_c\n1,2\n", "--set reference", "no column is called omega_0 (rad/s) or Q"),
-        ("1,2\n2,3\n", "--set reference", "2 readings are too few: 8 are needed"),
+        ("1,2\n2,3\n", "--set reference", "too few readings: 2, where 8"),
+        ("1,2\n2,1\n" * 5, "--set reference", "and scatter by 69 % about proportion to the flow"),
         ("1,2\n2,3\n", "--set high-wall-friction", "eta = 0.6 is out of range"),
-        ("1,2\n2,3\n", "", "needs its meter, --parameters FILE"),
+        ("1,2\n2,3\n", "", "needs its meter, --set NAME or --parameters FILE"),
         ("1,2\n2,3\n", "curve.csv --set reference", "are for a measured curve, without OTHER"),
     ],
 )
@@ -114,5 +122,5 @@ def test_what_is_no_curve_is_refused(capsys, monkeypatch, tmp_path, text, given,
 def test_a_kink_at_the_end_of_a_curve_is_not_fitted():
     flows, read = readings(P, 1.2, 1, noise=1e-4)
     few = (flows < T.omega_01) | (flows > 1.18 * T.omega_01)
-    with pytest.raises(Exception, match="beyond are too few: 4 are needed on each side"):
+    with pytest.raises(Exception, match="beyond, where 4 are needed on each side"):
         measured.fits(P, flows[few], read[few])
