@@ -41,7 +41,6 @@ test-all: $(VENV)/installed-dev
 
 benchmarks: $(VENV)/installed-dev
 	$(BIN)/python -m docs.studies.speed docs/records/speed.md
-	$(BIN)/python -m docs.studies.costs docs/records/speed.md
 
 verdicts:
 	$(MAKE) measured

@@ -117,25 +117,6 @@ def limits(results: Path) -> Rows:
     return rows
 
 
-def not_confirmed(results: Path) -> Rows:
-    """The claims that plain MuJoCo was asked and did not confirm."""
-    rows = [["claim", "outcome", "why"]]
-    for verdict in verdicts(results):
-        for said in verdict.engines:
-            if said.engine == PLAIN.name and said.outcome not in (
-                Outcome.CONFIRMED,
-                Outcome.NOT_ASKED,
-            ):
-                wrong = sum(not check.agrees for check in said.checks)
-                why = (
-                    f"{wrong} of {len(said.checks)} numbers disagree"
-                    if wrong
-                    else said.reason.split(";")[0]
-                )
-                rows.append([verdict.claim.id, said.outcome, why])
-    return rows
-
-
 @contextmanager
 def _required(times: float) -> Iterator[None]:
     """All required resolutions multiplied."""

@@ -1,48 +1,41 @@
-"""Where in parameter space the ball hops for ever: ``python -m docs.studies.search --save
-found.json``.
+"""Where in parameter space the ball hops for ever: ``python -m docs.studies.search 10000`` searches
+so many sets, in half an hour, keeps those that hop, and writes the page and the picture of them.
 
-A search screens random starts of sets, the points of a scrambled Sobol sequence over mu, eta, j,
-r/R, kappa = c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g); a ball that still hops after 60/c is
-looked at until its hopping closes, goes on, or ends. A chunk of sets is a file, named by the hash
-of all that determines it: a search goes on where it stopped, and a longer one contains the shorter
-ones. `docs.studies.figures` makes the page of what was found."""
+Sets are the points of a scrambled Sobol sequence over mu, eta, j, r/R, kappa = c sqrt(R/g) and
+Omega_0 = omega_0 sqrt(R/g). Random starts of each are screened; a ball that still hops after 60/c
+is looked at until its hopping closes, goes on, or ends."""
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-import hashlib
 import json
 import math
 import os
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from concurrent.futures import as_completed
-from dataclasses import dataclass, field
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.figure import Figure
 
 from analytic import simulate, simulate_many
 from analytic.orbits.attractors import periodic_limit
 from analytic.orbits.periodic import landings
 from analytic.simulation.ensemble import interval
-from compare.kit import pages, progress
-from compare.kit.engines import EVENT
-from compare.kit.progress import Show
-from compare.kit.sweep import Axis, sobol
-from compare.kit.tasks import sources
-from compare.kit.workers import Workers, processes
+from compare.kit import pages, style
+from compare.kit.sweep import sobol
 from compare.subjects.attractors.measure import with_groups
 from model import Parameters, SimulationError, State
 from model.arrays import Array
-from model.files import make_directory, reading_json, write_text
-from model.parameters import POSITIVE
+from model.files import write_text
 
-CHUNK = 50
-"""Sets in a file."""
+RECORDS = Path(__file__).parents[1] / "records"
+KEPT = Path(__file__).parent / "data" / "hopping.json"
 BOX = {
     "mu": (0.03, 3.0),
     "eta": (0.03, 2.0),
@@ -51,11 +44,12 @@ BOX = {
     "kappa": (0.005, 1.0),
     "Omega_0": (0.3, 6.0),
 }
-"""The box that is searched, unless another one is named."""
-SYMBOLS = {"mu": "μ", "eta": "η", "kappa": "κ", "Omega_0": "Ω₀"}
-"""How groups are written whose names are not their symbols."""
+"""The box that is searched."""
+SYMBOLS = style.SYMBOLS | {"Omega_0": "Ω₀"}
 LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""
+STARTS = 5
+"""Random starts of a set."""
 
 DURATION = 60.0
 """How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but
@@ -69,68 +63,24 @@ and samples."""
 CONFIRMING = 12.0
 """How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it
 counts."""
+Row = Mapping[str, Any]
+"""A set in which some start hops by the screen: its groups, "hops", how many starts do, and
+"confirmed", the fields of `Hopping` or None."""
 
 
-@dataclass(frozen=True)
-class AttractorSearch:
-    """A search: its box, how many starts a set, and the seed of both sets and starts."""
-
-    box: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(BOX))
-    starts: int = 5
-    seed: int = 0
-
-    def key(self, chunk: int) -> str:
-        """Hash of all that determines a chunk: the search, and the sources of screen and
-        confirmation."""
-        own = Path(__file__).read_text("utf-8")
-        text = json.dumps(
-            [dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, own, sources(*EVENT.sources)]
-        )
-        return hashlib.sha256(text.encode()).hexdigest()[:24]
-
-    def points(self, count: int) -> Array:
-        """The first `count` points, shape (count, 6), in the order of `BOX`."""
-        low, high = np.array([self.box[name] for name in BOX]).T
-        log = np.array([name in LOGARITHMIC for name in BOX])
-        low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
-        spread = low + sobol(len(BOX), count, self.seed) * (high - low)
-        return np.asarray(np.where(log, np.exp(spread), spread))
+def _edges(name: str, count: int) -> Array:
+    """Of equal parts of the range of a group."""
+    even = np.geomspace if name in LOGARITHMIC else np.linspace
+    return np.asarray(even(*BOX[name], count + 1))
 
 
-@dataclass(frozen=True)
-class Searched:
-    """What a search has found: the sets among its first `sets` in which some start still hops by
-    time stepping."""
-
-    search: AttractorSearch
-    sets: int
-    rows: tuple[Mapping[str, Any], ...]
-    """The groups of each; "hops", how many starts do; "confirmed", the fields of `Hopping` or
-    None."""
-    failed: int
-    """Runs that broke down."""
-
-    @property
-    def confirmed(self) -> list[Mapping[str, Any]]:
-        """The rows whose hopping the event-driven simulation confirms."""
-        return [row for row in self.rows if row["confirmed"]]
-
-    def save(self, path: Path) -> None:
-        """Write it as JSON."""
-        write_text(path, json.dumps(dataclasses.asdict(self), indent=0))
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of
-        these."""
-        with reading_json(path, "search") as data:
-            box = {name: tuple(ends) for name, ends in data["search"].pop("box").items()}
-            return cls(
-                AttractorSearch(box, **data["search"]),
-                data["sets"],
-                tuple(data["rows"]),
-                data["failed"],
-            )
+def points(count: int) -> Array:
+    """The first `count` points, shape (count, 6), in the order of `BOX`."""
+    low, high = np.array(list(BOX.values())).T
+    log = np.array([name in LOGARITHMIC for name in BOX])
+    low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
+    spread = low + sobol(len(BOX), count, 0) * (high - low)
+    return np.asarray(np.where(log, np.exp(spread), spread))
 
 
 def parameters(point: Array) -> Parameters:
@@ -183,7 +133,7 @@ class Hopping:
 
 
 def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
-    """The hopping that a state leads to by the event-driven simulation; None if it ends.
+    """The hopping that a state leads to; None if it ends.
 
     That is a stable periodic motion near it if there is one; else the ball is followed for
     `CONFIRMING`. Raises `SimulationError` if the simulation can't go on."""
@@ -209,127 +159,93 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     return Hopping(0, between / unit, omega_c / p.omega_0, float(run.y[last].max()) / p.R)
 
 
-def carry_out(search: AttractorSearch, chunk: int, points: Array, path: Path) -> None:
-    """Search the sets of a chunk and write its file.
-
-    Confirmed is the first hopping state that can be; if none can, "broken" says where the
-    simulation broke down."""
-    rows = []
-    for k, point in enumerate(points):
-        p = parameters(point)
-        hop, x, failed = screen(
-            p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k])
-        )
-        row: dict[str, Any] = {"hops": int(hop.sum()), "failed": failed}
-        if hop.any():
-            row |= {"x": x[hop][0].tolist(), "confirmed": None, "broken": ""}
-        for state in x[hop]:
-            try:
-                if confirmed := confirm(p, state):
-                    row["confirmed"] = dataclasses.asdict(confirmed)
-                    del row["broken"]
-                    break
-            except SimulationError as error:
-                row["broken"] = str(error)
-        rows.append(row)
-    write_text(path, json.dumps({"chunk": chunk, "rows": rows}))
+def look(numbered: tuple[int, Array]) -> Row:
+    """What starts of a set come to: the first hopping state that can be confirmed is."""
+    k, point = numbered
+    p = parameters(point)
+    hop, x, failed = screen(p, random_starts(p, STARTS, [0, k]))
+    confirmed = None
+    for state in x[hop]:
+        try:
+            confirmed = confirmed or confirm(p, state)
+        except SimulationError:
+            failed += 1
+    shown = dataclasses.asdict(confirmed) if confirmed else None
+    groups = dict(zip(BOX, point.tolist(), strict=True))
+    return groups | {"hops": int(hop.sum()), "failed": failed, "confirmed": shown}
 
 
-def run(
-    directory: Path, search: AttractorSearch, count: int, workers: Workers, show: Show
-) -> Searched:
-    """Search `count` sets, rounded up to whole chunks; finished chunks are read."""
-    make_directory(directory)
-    points = search.points(math.ceil(count / CHUNK) * CHUNK)
-    chunks = points.reshape(-1, CHUNK, len(BOX))
-    paths = [directory / f"{search.key(chunk)}.json" for chunk in range(len(chunks))]
-    todo = [chunk for chunk, path in enumerate(paths) if not path.exists()]
-    show("search", len(points) - len(todo) * CHUNK, len(points), 0)
-    with workers:
-        running = [workers.submit(carry_out, search, k, chunks[k], paths[k]) for k in todo]
-        for left, future in zip(reversed(range(len(todo))), as_completed(running), strict=True):
-            future.result()
-            show("search", len(points) - left * CHUNK, len(points), 0)
-    rows = [row for path in paths for row in json.loads(path.read_text("utf-8"))["rows"]]
-    sets = [dict(zip(BOX, point, strict=True)) for point in points.tolist()]
-    found = tuple(groups | row for groups, row in zip(sets, rows, strict=True) if row["hops"])
-    return Searched(search, len(rows), found, sum(row["failed"] for row in rows))
-
-
-def share(hits: int, of: int) -> tuple[float, float, float]:
-    """How many of all, in %, and the ends of the 95 % interval; a share of nothing is nan."""
-    low, high = interval(hits, of)
-    return (100 * hits / of if of else math.nan), 100 * low, 100 * high
-
-
-def table(record: Searched) -> pages.Rows:
-    """Each sixth of the range of each group, with the number of sets in it, and of those with
-    confirmed hopping."""
-    points, rows = record.search.points(record.sets), []
-    for k, name in enumerate(BOX):
-        edges = (np.geomspace if name in LOGARITHMIC else np.linspace)(*record.search.box[name], 7)
-        symbol = SYMBOLS.get(name, name)
-        sets, _ = np.histogram(points[:, k], edges)
-        hopping, _ = np.histogram([row[name] for row in record.confirmed], edges)
-        for low, high, n, hits in zip(
-            edges, edges[1:], sets.tolist(), hopping.tolist(), strict=False
-        ):
-            part, least, most = (f"{value:.2f}" for value in share(hits, n))
-            rows.append(
-                [symbol, f"{low:.3g}", f"{high:.3g}", str(n), str(hits), part, f"{least} … {most}"]
-            )
-    return [["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *rows]
-
-
-def summary(record: Searched) -> str:
-    """What a search has found in all, with confidence."""
-    count, broken = (
-        len(record.confirmed),
-        f" {record.failed} runs broke down." if record.failed else "",
+def share(hits: int, of: int) -> str:
+    """In per cent, with the 95 % interval."""
+    return "{:.2f} ({:.2f} … {:.2f})".format(
+        *(100 * each for each in (hits / of, *interval(hits, of)))
     )
-    periods = Counter(row["confirmed"]["landings"] for row in record.confirmed)
-    kinds = [
-        f"{periods[n]} with {n or 'no period found'}"
-        for n in sorted(periods, key=lambda n: (n == 0, n))
-    ]
-    box = ", ".join(
-        f"{SYMBOLS.get(name, name)} {a:.3g} to {b:.3g}"
-        for name, (a, b) in record.search.box.items()
-    )
-    return (
-        f"The box is {box}. In {count} of {record.sets} sets some of {record.search.starts} random "
-        f"starts lead to "
-        "hopping that the event-driven simulation confirms: {:.2f} %, or {:.2f} to {:.2f} % with "
-        "95 % confidence. "
-        f"Sets by landings in a period: {', '.join(kinds) or 'none'}. By the screen "
-        f"{len(record.rows)} sets still "
-        f"hopped after 60/c; in all others every ball stopped landing.{broken}"
-    ).format(*share(count, record.sets))
 
 
-def main() -> None:
-    """Search, and print what was found."""
-    parser = argparse.ArgumentParser(description="Where in parameter space the ball hops for ever.")
-    parser.add_argument("--sets", type=int, default=500)
-    parser.add_argument("--starts", type=int, default=5, help="random starts of each")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--range", nargs="*", default=[], metavar="NAME=FROM:TO", help=f"of {', '.join(BOX)}"
+def page(sets: int, rows: Sequence[Row], note: str = "") -> str:
+    """How often the ball hops for ever in each third of the range of each group, and in all."""
+    confirmed = [row for row in rows if row["confirmed"]]
+    table = [["", "from", "to", "sets", "hopping", "share, % (95 % interval)"]]
+    for name, tried in zip(BOX, points(sets).T, strict=True):
+        edges, own = _edges(name, 3), [row[name] for row in confirmed]
+        counts = (np.histogram(each, edges)[0].tolist() for each in (tried, own))
+        for low, high, n, hits in zip(edges, edges[1:], *counts, strict=False):
+            cells = f"{low:.3g}", f"{high:.3g}", str(n), str(hits), share(hits, n)
+            table.append([SYMBOLS.get(name, name), *cells])
+    periods = sorted(Counter(row["confirmed"]["landings"] for row in confirmed).items())
+    kinds = ", ".join(f"{n} with {k or 'no period found'}" for k, n in periods)
+    return f"""# Where the ball hops for ever
+
+A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: μ and
+η are the friction of floor and wall, κ = c√(R/g) and Ω₀ = ω₀√(R/g). An attractor with a small basin
+is missed by a few starts. Written by `python -m docs.studies.search {sets}`. {note}
+
+In {len(confirmed)} of {sets} sets some of {STARTS} random starts lead to hopping that stays:
+{share(len(confirmed), sets)} %. Sets by landings in a period: {kinds}. {len(rows)} sets still
+hopped after 60/c; in all others every ball stopped landing.
+
+{pages.markdown(table)}
+"""
+
+
+def draw(sets: int, rows: Sequence[Row]) -> Figure:
+    """Sets with hopping over pairs of groups, on the share of sets that have it."""
+    figure = style.figure(10.5, 3.5)
+    tried, symbols = (
+        dict(zip(BOX, points(sets).T, strict=True)),
+        style.SYMBOLS | {"Omega_0": style.FREE_0},
     )
-    parser.add_argument("--workers", type=int, default=os.cpu_count())
-    parser.add_argument(
-        "-o", "--output", type=Path, default=Path("search"), help="directory of the chunks"
-    )
-    parser.add_argument("--save", type=Path, help="write the sets with hopping as JSON")
-    args = parser.parse_args()
-    axes = Axis.several(args.range, dict.fromkeys(BOX, "1"), "group", POSITIVE)
-    asked = AttractorSearch(BOX | {axis.name: axis.ends for axis in axes}, args.starts, args.seed)
-    with progress.reporter(False) as show:
-        found = run(args.output, asked, args.sets, processes(args.workers), show)
-    if args.save:
-        found.save(args.save)
-    print(summary(found), pages.markdown(table(found)), sep="\n\n")
+    pairs = ("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0")
+    for axes, (a, b) in zip(figure.subplots(1, len(pairs)), pairs, strict=True):
+        edges = [_edges(a, 8), _edges(b, 8)]
+        x, y = ([row[name] for row in rows if row["confirmed"]] for name in (a, b))
+        of_all, *_ = np.histogram2d(tried[a], tried[b], edges)
+        hopping, *_ = np.histogram2d(x, y, edges)
+        ground = 100 * (hopping / np.maximum(of_all, 1)).T
+        shown = axes.pcolormesh(*edges, ground, cmap="Blues", vmin=0, zorder=0)
+        figure.colorbar(shown, ax=axes, label="sets that hop, %")
+        axes.plot(x, y, ".", ms=3, color="#D55E00")
+        across, up = ("log" if name in LOGARITHMIC else "linear" for name in (a, b))
+        axes.set(xlabel=symbols[a], ylabel=symbols[b], xscale=across, yscale=up)
+    return figure
+
+
+def show(kept: Mapping[str, Any]) -> None:
+    """Write the page, and draw the picture, of what a search kept."""
+    sets, rows = kept["sets"], kept["rows"]
+    write_text(RECORDS / "hops.md", page(sets, rows, kept["note"]))
+    draw(sets, rows).savefig(RECORDS / "attractors" / "where.png", dpi=110)
+
+
+def main(sets: int) -> None:
+    """Search, keep what was found, and show it."""
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        looked = pool.map(look, enumerate(points(sets)), chunksize=50)
+        rows = [row for row in looked if row["hops"]]
+    kept = {"sets": sets, "note": "", "rows": rows}
+    write_text(KEPT, json.dumps(kept, indent=0))
+    show(kept)
 
 
 if __name__ == "__main__":
-    main()
+    main(int(sys.argv[1]))

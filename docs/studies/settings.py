@@ -1,82 +1,122 @@
-"""What ways of setting MuJoCo, and other methods, reach and take: ``python -m
-docs.studies.settings`` draws it.
+"""What ways of setting MuJoCo, and other methods, reach and take: tables and pictures of
+docs/records/settings.md, made by `docs.studies.tables`.
 
-Each is tried on the stationary states and the approach to one of `docs.studies.states`. Runs
-are kept in results/settings, as those of the tables of the same page (`docs.studies.tables`).
-"""
+Each is tried on the stationary states and the approach to one of `docs.studies.states`."""
 
 from __future__ import annotations
 
-import itertools
-import math
-import os
+import json
+import statistics
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from compare.kit import drawing, progress, style
+from compare.kit import drawing, style
 from compare.kit.campaign import Campaign
-from compare.kit.engines import (
-    DEFAULTS,
-    ENGINES,
-    EVENT,
-    MOREAU,
-    PLAIN,
-    AnySettings,
-    default_settings,
-    plain,
-)
+from compare.kit.engines import DEFAULTS, EVENT, MOREAU, PLAIN, AnySettings, default_settings, plain
 from compare.kit.pages import Rows
-from compare.kit.tasks import carry_out
-from docs.studies import states
-from docs.studies.states import CONTACT, ERRORS, OPEN, Contestant, Entry
+from compare.kit.tasks import Task, carry_out
+from docs.studies.states import (
+    APPROACH,
+    HITTING,
+    LANDING,
+    SLIPPING,
+    STATES,
+    Asked,
+    Stationary,
+    Transient,
+)
 from mjsim import ContactSettings, RigidContacts
 from mjsim.contact_settings import ContactModel
-from model.files import make_directory
+from model.files import write_text
 
+PICTURES = Path(__file__).parents[1] / "settings"
 STEP = 1e-3
 """Time step of the ladder, s."""
-HIGHER = (1e-4, 2e-4, 3e-4, 4e-4)
-"""By how much higher a landing ball begins, m, to land elsewhere within a step of 1 ms."""
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 """Time steps of error against cost, s."""
+HIGHER = (1e-4, 2e-4, 3e-4, 4e-4)
+"""By how much higher a landing ball begins, m, to land elsewhere within a step of 1 ms."""
+REPEATS = 3
+"""Cost is the median of as many timings."""
+LEAST = 1e-16
+"""Smaller errors are drawn here: an error may be zero."""
 Ways = Mapping[str, AnySettings]
 """Ways to set MuJoCo, named after ours or MuJoCo's defaults and what differs from them."""
 LONE = "MuJoCo's defaults"
 OURS, LAW = "our settings", "under Coulomb's law"
 FACETS = f"{LONE}, a free ball in facets, cone pyramidal"
-LOOKS: list[dict[str, Any]] = [
-    {"marker": mark, "color": colour, "mfc": "white"}
-    for mark, colour in zip(
-        "os^vDP*X",
-        ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
-        strict=True,
-    )
-]
+TRIED: tuple[Stationary | Transient, ...] = (*STATES, APPROACH)
+MARKS, COLOURS = "os^vD", ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 
 
-def main() -> None:
-    """Measure what isn't there yet, and draw both figures into docs/settings/."""
-    matplotlib.rcParams["svg.hashsalt"] = "dualball"  # equal figures make equal files
-    runs, pictures = Path("results/settings"), Path(__file__).parents[1] / "settings"
-    make_directory(pictures)
-    with (
-        progress.reporter(counted=True) as show,
-        Campaign(runs, os.cpu_count() or 1, report=show) as campaign,
-    ):
-        drawing.save(draw_ladder(reached(campaign, rungs(STEP))), pictures / "ladder.svg")
-        drawing.save(draw_frontier(frontier(campaign, STEPS)), pictures / "frontier.svg")
+@dataclass(frozen=True)
+class Contestant:
+    """An engine with settings."""
+
+    name: str
+    engine: str
+    settings: AnySettings
+    step: float | None
+    """s; None for one that chooses its own."""
+
+    def task(self, asked: Asked) -> Task:
+        """A run; it samples no more often than it steps."""
+        p, x0, lasts, interval = asked
+        every = max(interval, self.step or 0.0)
+        return Task(
+            engine=self.engine,
+            parameters=p,
+            x0=x0,
+            t_end=lasts,
+            settings=self.settings,
+            sample_interval=every,
+        )
+
+    def errors(self, campaign: Campaign) -> list[float]:
+        """Relative errors of omega_c, one for each of `TRIED`; raises as `Campaign.run`."""
+        return [of.error(campaign.run([self.task(of.run)])[0]) for of in TRIED]
+
+    def open(self, campaign: Campaign) -> float:
+        """Largest share of time in which contact is lost that should not be."""
+        return max(of.open(campaign.run([self.task(of.run)])[0]) for of in TRIED)
+
+    def cost(self, kept: Path) -> float:
+        """Processor time divided by simulated time, without what it takes to begin; measured
+        once."""
+        task = self.task(APPROACH.run)
+        half, file = replace(task, t_end=task.t_end / 2), kept / f"{task.key}.cost.json"
+
+        def seconds(task: Task) -> float:
+            begin = time.process_time()
+            carry_out(task)
+            return time.process_time() - begin
+
+        if not file.exists():
+            differences = [seconds(task) - seconds(half) for _ in range(REPEATS)]
+            write_text(file, json.dumps(statistics.median(differences) / half.t_end))
+        return float(json.loads(file.read_text("utf-8")))
+
+
+def contestants(ways: Ways) -> list[Contestant]:
+    """They run without a warning where contacts chatter: what poor settings do is the question
+    here."""
+    return [
+        Contestant(
+            name, (PLAIN if isinstance(way, ContactModel) else DEFAULTS).name, way, way.timestep
+        )
+        for name, way in ways.items()
+    ]
 
 
 def rungs(step: float) -> Ways:
     """From default settings to the law, each with one thing more than the one before."""
     return {
-        FACETS: DEFAULTS.at(step, states.SLIPPING.p),
+        FACETS: DEFAULTS.at(step, SLIPPING.p),
         f"{LONE}, cone pyramidal": replace(default_settings(step), cone="pyramidal"),
         LONE: default_settings(step),
         OURS: ContactSettings.at(step),
@@ -84,115 +124,98 @@ def rungs(step: float) -> Ways:
     }
 
 
-def rivals(step: float) -> Ways:
-    """Settings whose error is compared with their cost."""
-    named = rungs(step)
-    return {name: named[name] for name in (LAW, OURS, LONE)}
-
-
-def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
-    """Errors of ways to set MuJoCo, and how often contact is lost."""
-    return states.scored(campaign, _contestants(ways), [*ERRORS, CONTACT])
-
-
-def landings(step: float) -> Rows:
-    """What a landing, and motions with one, come to: relative errors of omega_c.
-
-    That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball
-    rebounds within 0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of
-    `states.HITTING`."""
-    bare = plain(step)
-    ways: Ways = {
-        f"{LAW} (mujoco)": RigidContacts(timestep=step),
-        f"{OURS}, integrator implicit (mujoco-plain)": bare,
-        "mujoco-plain, damping ratio 2": replace(bare, solref=(2 * step, 2.0)),
-        "mujoco-plain, damping ratio 2, step divided by 10": replace(
-            plain(step / 10), solref=(step / 5, 2.0)
+def ablation(campaign: Campaign) -> Rows:
+    """Errors from rung to rung, and how often contact is lost; drawn, too."""
+    those = contestants(rungs(STEP))
+    campaign.complete(each.task(of.run) for each in those for of in TRIED)
+    errors = {each.name: each.errors(campaign) for each in those}
+    drawing.save(draw_ladder(errors), PICTURES / "ladder.svg")
+    return [
+        ["settings", *(of.name for of in TRIED), "open"],
+        *(
+            [each.name, *map(number, errors[each.name]), f"{each.open(campaign):.0%}"]
+            for each in those
         ),
-        "mujoco-plain, step divided by 10": plain(step / 10),
-        "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
-        "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
-        LONE: default_settings(step),
-        f"{FACETS} (mujoco-defaults)": DEFAULTS.at(step, states.LANDING.p),
-    }
-    rows = [
-        [
-            "settings",
-            "ω_c 5 ms after a landing",
-            "rebound",
-            "motion with it",
-            "motion that hits the wall",
-        ]
     ]
-    for name, way in ways.items():
-        (contestant,), land, hit = _contestants({name: way}), states.LANDING, states.HITTING
-        lands, hits, *others = (
-            carry_out(contestant.task((each.p, x0, lasts, step)))
-            for each, x0, lasts in (
-                *((each, each.x0, each.lasts) for each in (land, hit)),
-                *((land, land.x0._replace(y=land.x0.y + more), 0.25) for more in HIGHER),
-            )
-        )
-        exact = states.LANDING.exact
-        landed = float(exact.time[np.flatnonzero(exact.y <= 0)[0]])
-        after = float(np.interp(landed + 5e-3, lands.time, lands.omega_c))
-        off = after / float(np.interp(landed + 5e-3, exact.time, exact.omega_c)) - 1
-        high = [
-            run.y[(run.time > landed + 2e-3) & (run.time < landed + 0.1)].max()
-            for run in (lands, *others)
-        ]
-        height = float(max(high))
-        motions = (
-            each.errors(run.time, run.x)[0]
-            for each, run in ((states.LANDING, lands), (states.HITTING, hits))
-        )
-        rebound = f"{1e3 * height:.2g} mm" if height > 1e-5 else "none"
-        rows.append([name, states.number(abs(off)), rebound, *map(states.number, motions)])
+
+
+def frontier(campaign: Campaign) -> Rows:
+    """Errors of MuJoCo under several settings and of theory's two simulators at several steps, and
+    their cost; drawn, too."""
+    those = [
+        each
+        for name in (LAW, OURS, LONE)
+        for h in STEPS
+        for each in contestants({name: rungs(h)[name]})
+    ]
+    those += [Contestant(MOREAU.name, MOREAU.name, MOREAU.at(h, SLIPPING.p), h) for h in STEPS]
+    those += [Contestant(EVENT.name, EVENT.name, EVENT.at(None, SLIPPING.p), None)]
+    campaign.complete(each.task(of.run) for each in those for of in TRIED)
+    found = [(each, each.errors(campaign), each.cost(campaign.directory)) for each in those]
+    drawing.save(draw_frontier(found), PICTURES / "frontier.svg")
+    rows = [["engine", "step", *(of.name for of in TRIED), "cost"]]
+    for each, errors, cost in found:
+        step = f"{1e3 * each.step:g} ms" if each.step else "its own"
+        rows.append([each.name, step, *map(number, errors), f"{cost:.2g}"])
     return rows
 
 
-def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:
-    """Entries, with their cost, of MuJoCo under several settings and of theory's two simulators, at
-    several steps."""
-    ways = [
-        each
-        for alike in zip(*(_contestants(rivals(step)) for step in steps), strict=True)
-        for each in alike
-    ]
-    theory = [each for name in (MOREAU.name, EVENT.name) for each in _theory(name, steps)]
-    return states.scored(campaign, [*ways, *theory], ERRORS, states.cost)
+def landings() -> Rows:
+    """What a landing, and motions with one, come to: relative errors of omega_c.
 
-
-def _theory(name: str, steps: Sequence[float]) -> list[Contestant]:
-    """One of theory's simulators, once if it chooses its own steps."""
-    engine = ENGINES[name]
-    chosen: list[float | None] = [*steps] if "timestep" in engine.options else [None]
-    return [Contestant(name, engine, step, engine.at(step, states.SLIPPING.p)) for step in chosen]
-
-
-def _contestants(ways: Ways) -> list[Contestant]:
-    """They run without a warning where contacts chatter: what poor settings do is the question
-    here."""
-    engines = {
-        name: PLAIN if isinstance(each, ContactModel) else DEFAULTS for name, each in ways.items()
+    That of `LANDING` 5 ms after it has landed and its rms over the motion, how high the ball
+    rebounds within 0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of
+    `HITTING`."""
+    bare, shorter = plain(STEP), plain(STEP / 10)
+    ways: Ways = {
+        f"{LAW} (mujoco)": RigidContacts(timestep=STEP),
+        f"{OURS}, integrator implicit (mujoco-plain)": bare,
+        "mujoco-plain, damping ratio 2": replace(bare, solref=(2 * STEP, 2.0)),
+        "mujoco-plain, step divided by 10": shorter,
+        "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
+        "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
+        LONE: default_settings(STEP),
+        f"{FACETS} (mujoco-defaults)": DEFAULTS.at(STEP, LANDING.p),
     }
-    return [Contestant(name, engines[name], each.timestep, each) for name, each in ways.items()]
+    landed = float(LANDING.exact.time[np.flatnonzero(LANDING.exact.y <= 0)[0]])
+    asked: list[Asked] = [(of.p, of.x0, of.lasts, STEP) for of in (LANDING, HITTING)]
+    asked += [
+        (LANDING.p, LANDING.x0._replace(y=LANDING.x0.y + more), 0.25, STEP) for more in HIGHER
+    ]
+    head = ["ω_c 5 ms after a landing", "rebound", "motion with it", "motion that hits the wall"]
+    rows = [["settings", *head]]
+    for each in contestants(ways):
+        lands, hits, *others = (carry_out(each.task(of)) for of in asked)
+        after = float(np.interp(landed + 5e-3, lands.time, lands.omega_c))
+        height = max(
+            run.y[(run.time > landed + 2e-3) & (run.time < landed + 0.1)].max()
+            for run in (lands, *others)
+        )
+        rows.append(
+            [
+                each.name,
+                number(abs(after / float(LANDING.at(landed + 5e-3)) - 1)),
+                f"{1e3 * height:.2g} mm" if height > 1e-5 else "none",
+                number(LANDING.error(lands)),
+                number(HITTING.error(hits)),
+            ]
+        )
+    return rows
 
 
-def draw_ladder(entries: Sequence[Entry]) -> Figure:
-    """Rows of settings, a mark for each error of omega_c; a run that diverged has none."""
-    figure = style.figure(9, 1.1 + 0.33 * len(entries))
+def number(value: float) -> str:
+    """An error: round-off is shown as such."""
+    return "< 1e-14" if value < 1e-14 else f"{value:.1e}"
+
+
+def draw_ladder(errors: Mapping[str, Sequence[float]]) -> Figure:
+    """Rows of settings, a mark for each error of omega_c."""
+    figure = style.figure(9, 1.1 + 0.33 * len(errors))
     axes = figure.add_subplot()
-    for name, look in zip(
-        (name for name in entries[0].scores if name != OPEN), LOOKS, strict=False
-    ):
-        own = [
-            (max(e.scores[name], states.LEAST), k)
-            for k, e in enumerate(entries)
-            if math.isfinite(e.scores[name])
-        ]
-        axes.plot([x for x, _ in own], [k for _, k in own], "-", lw=0.6, label=name, **look)
-    axes.set_yticks(range(len(entries)), [entry.name for entry in entries], fontsize=8.5)
+    shown, rows = np.maximum(list(errors.values()), LEAST), range(len(errors))
+    for of, x, mark, colour in zip(TRIED, shown.T, MARKS, COLOURS, strict=True):
+        axes.plot(x, rows, f"-{mark}", color=colour, mfc="white", lw=0.6, label=of.name)
+    axes.set_yticks(rows, list(errors), fontsize=8.5)
     axes.invert_yaxis()
     axes.set(xscale="log", xlabel="$|\\Delta\\omega_c|/\\omega_c$")
     axes.grid(alpha=0.3)
@@ -200,13 +223,21 @@ def draw_ladder(entries: Sequence[Entry]) -> Figure:
     return figure
 
 
-def draw_frontier(entries: Sequence[Entry]) -> Figure:
-    """A panel for each state, a line for each method."""
-    names = dict.fromkeys(entry.name for entry in entries)
-    return states.draw_error_over_cost(
-        entries, dict(zip(names, itertools.cycle(LOOKS), strict=False))
-    )
-
-
-if __name__ == "__main__":
-    main()
+def draw_frontier(found: Sequence[tuple[Contestant, Sequence[float], float]]) -> Figure:
+    """A panel for each error of omega_c; those of one name at several time steps are joined."""
+    figure = style.figure(11, 6.9)
+    panels = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
+    names = dict.fromkeys(each.name for each, _, _ in found)
+    for k, (axes, of) in enumerate(zip(panels, TRIED, strict=False)):
+        for name, mark, colour in zip(names, MARKS, COLOURS, strict=True):
+            own = sorted((cost, max(e[k], LEAST)) for each, e, cost in found if each.name == name)
+            look = {"ms": 6, "lw": 1, "color": colour, "mfc": "white"}
+            axes.plot(*np.transpose(own), f"-{mark}", label=name, **look)
+        axes.set(xscale="log", yscale="log")
+        axes.set_title(of.name, fontsize=10)
+        axes.set_xlabel("processor time divided by simulated time")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("relative error")
+    panels[-1].set_visible(False)
+    style.legend(figure, loc="outside lower center", ncols=4)
+    return figure

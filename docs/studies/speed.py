@@ -1,157 +1,89 @@
-"""What theory costs: ``python -m docs.studies.speed docs/records/speed.md`` writes the tables of
-that page, in ten minutes."""
+"""What theory, MuJoCo, campaigns and commands cost, as ratios in one run: ``python -m
+docs.studies.speed docs/records/speed.md`` writes the tables of that page, in some ten minutes."""
 
 from __future__ import annotations
 
-import resource
+import itertools
+import os
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
-import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
-from unittest import mock
 
+import mujoco
 import numpy as np
-from scipy.integrate import solve_ivp
+from mujoco.batch import Batch
 
-from analytic import Settings, simulate, simulate_many
-from analytic.simulation import equations, hybrid
+import mjsim
+from analytic import Settings, simulate, simulate_many, solution, stable_solutions
 from analytic.simulation.ensemble import random_starts
-from analytic.simulation.equations import FINER
-from analytic.simulation.integrator import Pace
-from analytic.simulation.solvers import DONE, FIRED, STUCK, Stretch
-from analytic.stationary.solutions import solution
-from compare.kit.engines import engine
+from compare.kit.campaign import Campaign
+from compare.kit.engines import MUJOCO
 from compare.kit.pages import Rows
-from compare.kit.tasks import Task, carry_out
-from docs.studies.costs import REPEATS, two_against_one
-from docs.studies.costs import seconds as clocked
+from compare.kit.tasks import Task
+from compare.kit.workers import processes
 from docs.studies.tables import write_all
-from model import Case, Flow, Parameters, SimulationError, State, Trajectory
+from mjsim import scene
+from mjsim.contact_settings import ContactSettings
+from mjsim.engine import Run
+from mjsim.recorder import COLUMNS
+from mjsim.stepping import JointedBall
+from model import Case, Flow, Parameters, State
 from model.arrays import Array
-from model.kinematics import SLIP_XYZ, TURNING
+from model.kinematics import SLIP_XYZ
+from tests.by_scipy import runs_by_scipy
 
-LEAST, BEST = 0.3, 1e-13
-"""Seconds that the runs of which the quickest counts take at least, and the tolerance of the run
-that others are held against."""
-RUNS = 100
-"""Random runs at once."""
-TOLERANCES = [10.0**-k for k in range(6, 14)]
-METHODS = "LSODA", "Radau"
+REPEATS, RUNS, BATCH = 5, 100, 64
+BEST = 1e-13
+"""The tolerance of the run that others are held against."""
+PROGRAM = [sys.executable, "-m", "compare"]
 P = Parameters.named("reference")
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A run of theory."""
-
-    p: Parameters
-    x: State
-    t_end: float
-    flow: Flow
-
-
-_ON_THE_WALL = solution(P.replace(omega_0=45.0), Case.NR).state
-MOTIONS = {
-    "slipping at both points, 20 s": Motion(
-        P, State(omega_c=13.0, slip_x=-3.0, slip_y=0.08, slip_z=8.7), 20.0, Flow.steady(25.0)
-    ),
-    "rolling on the wall alone, 20 s": Motion(
-        P, _ON_THE_WALL._replace(y=0.5, omega_c=44.5), 20.0, Flow.steady(45.0)
-    ),
-    "rolling at both points, Schiller and Naumann's drag, 20 s": Motion(
-        P.replace(drag="schiller-naumann", nu_f=1e-5), State(omega_c=4.0), 20.0, Flow.steady(6.0)
-    ),
-    "staircase of five flows, 30 s": Motion(
-        P, State(omega_c=5.0), 30.0, Flow.staircase([10, 25, 40, 25, 10], 6.0)
-    ),
-    "pulsation, 20 events in 20 s": Motion(P, State(omega_c=20.0), 20.0, Flow.sine(25.0, 8.0, 0.5)),
+SLIPPING = P.replace(omega_0=25.0)
+"""Slipping at both points: both contacts closed, and friction on its cone."""
+_KICKED = State(omega_c=13.0, slip_x=-3.0, slip_y=0.08, slip_z=8.7)
+_RIDING = solution(P.replace(omega_0=45.0), Case.NR).state._replace(y=0.5, omega_c=44.5)
+_STAIRS = Flow.staircase([10, 25, 40, 25, 10], 6.0)
+MOTIONS: dict[str, tuple[State, float, Flow]] = {
+    "slipping at both points, 20 s": (_KICKED, 20.0, Flow.steady(25.0)),
+    "rolling on the wall alone, 20 s": (_RIDING, 20.0, Flow.steady(45.0)),
+    "staircase of five flows, 30 s": (State(omega_c=5.0), 30.0, _STAIRS),
+    "pulsation, 20 events in 20 s": (State(omega_c=20.0), 20.0, Flow.sine(25.0, 8.0, 0.5)),
 }
+"""Runs of theory: start, duration, flow."""
 
 
-def seconds(work: Callable[[], Any], repeats: int = REPEATS) -> float:
+def seconds(work: Callable[[], Any], clock: Callable[[], float] = time.perf_counter) -> float:
+    """What some work takes, s."""
+    start = clock()
+    work()
+    return clock() - start
+
+
+def quickest(work: Callable[[], Any]) -> float:
     """Processor time, s, of the quickest of some."""
-    spent = list[float]()
-    while len(spent) < repeats or sum(spent) < LEAST:
-        begin = time.process_time()
-        work()
-        spent.append(time.process_time() - begin)
-    return min(spent)
+    return min(seconds(work, time.process_time) for _ in range(REPEATS))
 
 
-def run(motion: Motion, rtol: float = 1e-9) -> Any:
-    """By the study."""
-    return simulate(motion.p, motion.x, motion.t_end, motion.flow, rtol=rtol)
+def event_driven() -> Rows:
+    """What event-driven runs cost and how exact they are, compiled and by integrators of scipy."""
+    rows = [["", "the study, ms", "error", "in Python by scipy, ms", "error", "times as long"]]
+    for name, (start, lasts, flow) in MOTIONS.items():
+        run = partial(simulate, P, start, lasts, flow)
+        right = run(rtol=BEST).x
+        ours, error = quickest(run), deviation(run().x, right)
+        with runs_by_scipy():
+            theirs, other = quickest(run), deviation(run().x, right)
+        costs = f"{1e3 * ours:.2f}", f"{error:.1e}", f"{1e3 * theirs:.0f}", f"{other:.1e}"
+        rows.append([name, *costs, f"{theirs / ours:.0f}"])
+    return rows
 
 
-def _solved(
-    method: str, of: Stretch, pace: Pace, taken: int, most: int
-) -> tuple[int, Pace, int, int]:
-    """In the place of `integrator.stretch`: scipy's `solve_ivp`, to which what ends a case is an
-    event.
-
-    The time of the solver runs from zero, since a direction of slip settles very soon.
-    """
-    k, until, z, scale, times, samples, arm, _ = of
-    start, span = pace[0], until - pace[0]
-    due = times[taken : np.searchsorted(times, until, side="right")] - start
-
-    def rates(t: float, z: Any) -> list[float]:
-        out = [0.0] * len(z)
-        equations.rates(start + t, z, k, out)
-        return out
-
-    def falling(guard: int) -> Callable[[float, Any], float]:
-        def value(t: float, z: Any) -> float:
-            out = [0.0] * len(arm)
-            equations.guards(start + t, z, k, out)
-            return out[guard]
-
-        value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
-        return value
-
-    found: Any = solve_ivp(  # type: ignore[call-overload]
-        rates,
-        (0.0, span),
-        z,
-        method=method,
-        t_eval=np.union1d(due, [span]).clip(0.0, span),
-        events=[falling(guard) for guard in range(len(arm))],
-        first_step=pace[2] or None,
-        rtol=k.rtol,
-        atol=k.rtol / FINER * scale,
-    )
-    fired = [guard for guard, times in enumerate(found.t_events) if len(times)]
-    end = float(found.t_events[fired[0]][0]) if fired else span
-    if fired or len(found.y):
-        z[:] = found.y_events[fired[0]][0] if fired else found.y[:, -1]
-    count = int(np.searchsorted(due, end, side="right"))
-    if count and found.status >= 0:
-        samples[taken : taken + count] = found.y.T[:count]
-    why = STUCK if found.status < 0 else FIRED if fired else DONE
-    return why, (start + end, 0.0, 0.0, False, 0), fired[0] if fired else -1, taken + count
-
-
-def by_scipy(motion: Motion, method: str, rtol: float) -> Any:
-    """By a solver of `solve_ivp` and its events, the equations and what follows an event as the
-    study has them."""
-    with _by_solver(method), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it fails with one line more
-        return run(motion, rtol)
-
-
-def _by_solver(method: str) -> Any:
-    """A context in which runs are made in plain Python, by a solver of `solve_ivp`."""
-    plain: Any = hybrid.run_through_flow
-    return mock.patch.multiple(
-        hybrid, run_through_flow=plain.py_func, stretch=partial(_solved, method)
-    )
-
-
-def deviation(x: Any, right: Any) -> float:
+def deviation(x: Array, right: Array) -> float:
     """Largest deviation of states, each variable in units of its largest, slips of the largest of
     all three."""
     sizes = np.abs(right).max(axis=0) + 1e-300
@@ -159,176 +91,199 @@ def deviation(x: Any, right: Any) -> float:
     return float(np.abs((x - right) / sizes).max())
 
 
-def event_driven() -> Rows:
-    """What event-driven simulation costs and how exact it is, and `solve_ivp` at no greater
-    error."""
-    rows = [["", "the study, ms", "error"]]
-    rows[0] += [
-        cell
-        for method in METHODS
-        for cell in (f"solve_ivp with {method}, ms", "divided by the study's", "error")
-    ]
-    for name, motion in MOTIONS.items():
-        right = run(motion, BEST).x
-        error, spent = deviation(run(motion).x, right), seconds(partial(run, motion))
-        row = [name, f"{1e3 * spent:.2f}", f"{error:.1e}"]
-        for method in METHODS:
-            row += _no_worse(motion, method, error, right, spent)
-        rows.append(row)
-    return rows
-
-
-def _no_worse(
-    motion: Motion, method: str, worst: float, right: Array, compiled: float
-) -> list[str]:
-    """Time, that divided by a compiled run's, and error of `solve_ivp` at the first of the
-    tolerances that errs by no more than `worst`."""
-    for rtol in TOLERANCES:
-        try:
-            error = deviation(by_scipy(motion, method, rtol).x, right)
-        except SimulationError:
-            return ["fails", "–", "–"]
-        if error <= worst or rtol == TOLERANCES[-1]:
-            spent = seconds(lambda rtol=rtol: by_scipy(motion, method, rtol), 2)  # type: ignore[misc]
-            return [f"{1e3 * spent:.1f}", f"{spent / compiled:.1f}", f"{error:.1e}"]
-    raise AssertionError
-
-
-def states() -> Rows:
-    """The same without the forces and samples that are made of states by the same code: what
-    `solve_ivp` gives alone.
-
-    By LSODA, of the motions that it gets through, at the tolerance at which it errs by no more than
-    compiled runs."""
-    rows = [["", "the study, ms", "solve_ivp with LSODA, ms", "divided by the study's"]]
-    for name, motion in list(MOTIONS.items())[:3]:
-        right = run(motion, BEST).x
-
-        def compiled(rtol: float = 1e-9, of: Motion = motion) -> Array:
-            x: Array = simulate_many(
-                of.p, of.x, of.t_end, of.flow, Settings(rtol=rtol), threads=1
-            ).x[0]
-            return x
-
-        def by_lsoda(rtol: float, own: Callable[[float], Array] = compiled) -> Array:
-            with _by_solver("LSODA"):
-                return own(rtol)
-
-        worst = deviation(compiled(), right)
-        rtol = next(
-            each
-            for each in TOLERANCES
-            if deviation(by_lsoda(each), right) <= worst or each == TOLERANCES[-1]
-        )
-        ours, theirs = seconds(compiled), seconds(partial(by_lsoda, rtol))
-        rows.append([name, f"{1e3 * ours:.2f}", f"{1e3 * theirs:.1f}", f"{theirs / ours:.1f}"])
-    return rows
-
-
-STEPPED, ALLOWED = [0.02 / n for n in (2, 4, 5, 8, 10, 20, 40)], 5e-3
-"""Time steps, s, parts of the time between samples, and the error up to which one of them will
-do."""
-
-
-def stepped() -> Rows:
-    """What the longest time step that errs by no more than `ALLOWED` costs, of the study's
-    Moreau-Jean and of Siconos.
-
-    Siconos runs in a process of its own, which is told the fluid's force and asked for the state at
-    every step."""
-    motion, siconos = MOTIONS["slipping at both points, 20 s"], engine("siconos")
-    given = motion.p, motion.x, motion.t_end, motion.flow
-    turning = np.isin(np.arange(8), np.arange(8)[TURNING])  # gaps and their rates are round-off
-    right = run(motion, BEST).x * turning
-
-    def longest(name: str, work: Callable[[float], Any]) -> list[str]:
-        for step in STEPPED:
-            begin = time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-            x = work(step).x
-            ours, own = (
-                time.process_time() - begin[0],
-                resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin[1],
-            )
-            if len(x) == len(right) and (error := deviation(x * turning, right)) <= ALLOWED:
-                return [
-                    name,
-                    f"{1e3 * step:.3g}",
-                    f"{error:.1e}",
-                    f"{1e3 * (ours + own):.0f}",
-                    f"{1e3 * own:.0f}",
-                ]
-        return [name, "none", "–", "–", "–"]
-
-    if siconos.missing:
-        sys.exit(siconos.missing)
-    step_by_step = partial(simulate, *given, method="time-stepping")
-
-    def take(step: float) -> Trajectory:
-        way: dict[str, Any] = {
-            "settings": siconos.at(step, motion.p),
-            "sample_interval": motion.t_end / 1000,
-        }
-        task = Task(
-            engine=siconos.name,
-            parameters=motion.p,
-            x0=motion.x,
-            t_end=motion.t_end,
-            flow=motion.flow,
-            **way,
-        )
-        return carry_out(task)
-
-    step_by_step(timestep=STEPPED[0])  # which compiles it
-    error, spent = deviation(run(motion).x * turning, right), seconds(lambda: run(motion))
-    return [
-        ["", "time step, ms", "error", "processor time, ms", "of which its own process"],
-        ["event-driven", "–", f"{error:.1e}", f"{1e3 * spent:.1f}", "–"],
-        longest("Moreau-Jean", lambda step: step_by_step(timestep=step)),
-        longest("Siconos", take),
-    ]
-
-
 def many() -> Rows:
-    """Random runs by `simulate_many` against `simulate`, and threads, of the turn in which the
-    machine allowed most."""
+    """Random runs of theory one by one and at once, and by both methods."""
     starts = random_starts(P, RUNS)
 
     def apart() -> None:
         for x in starts:
             simulate(P, x, 5.0, sample_interval=1.0)
 
-    def at_once(threads: int = 1, method: str = "event") -> None:
-        simulate_many(
-            P, starts, 5.0, settings=Settings(method=method), sample_interval=1.0, threads=threads
-        )
+    def at_once(method: str) -> None:
+        settings = Settings(method=method)
+        simulate_many(P, starts, 5.0, settings=settings, sample_interval=1.0, threads=1)
 
-    each = {name: 1e3 * seconds(way) / RUNS for name, way in (
-        ("simulate, one after the other", apart),
-        ("simulate_many, one thread", at_once),
-        ("simulate_many, one thread, time stepping", lambda: at_once(method="time-stepping")),
-    )}  # fmt: skip
-    _, whole, *_ = each.values()
-    inside, carry_out = list[float](), hybrid.run_through_flow
-
-    def timed(*given: Any) -> Any:
-        begin = time.thread_time()
-        done = carry_out(*given)
-        inside.append(1e3 * (time.thread_time() - begin))
-        return done
-
-    with mock.patch.object(hybrid, "run_through_flow", timed):
-        spent = 1e3 * seconds(at_once, 1) / RUNS
-    share = statistics.fmean(inside) / spent
-    ratio, limit = two_against_one(lambda number: clocked(partial(at_once, number)))
+    ways: dict[str, Callable[[], None]] = {
+        "simulate, one after the other": apart,
+        "simulate_many, one thread": partial(at_once, "event"),
+        "simulate_many, one thread, time stepping": partial(at_once, "time-stepping"),
+    }
+    took = {name: 1e3 * quickest(way) / RUNS for name, way in ways.items()}
     return [
-        [f"{RUNS} random runs of 5 s", "a run, ms", "divided by one thread's"],
-        *([name, f"{took:.2f}", f"{took / whole:.1f}"] for name, took in each.items()),
-        ["share of that in compiled calls, for which other threads don't wait", "", f"{share:.2f}"],
-        ["speed of two threads divided by that of one", "", f"{ratio:.2f}"],
-        ["two processes of bare arithmetic at that time: the machine's limit", "", f"{limit:.2f}"],
+        [f"{RUNS} random runs of 5 s", "a run, ms"],
+        *([name, f"{each:.2f}"] for name, each in took.items()),
     ]
 
 
+def costs() -> Rows:
+    """The loop over bare steps, alone and in a batch; two threads and processes; campaigns."""
+    rows = [["", "bare mj_step", "whole loop", "ratio"]]
+    for name, runs in (("one simulation", 1), (f"batch of {BATCH}", BATCH)):
+        bare, whole, ratio = cost(runs)
+        rows.append([name, f"{1e6 * bare:.2f} µs", f"{1e6 * whole:.2f} µs", f"{ratio:.2f}"])
+    count = 4 * BATCH
+    given = [task.parameters for task in _tasks(count)], [State()] * count, 2.0
+
+    def on_threads(number: int) -> float:
+        return seconds(partial(mjsim.simulate_many, *given, sample_interval=0.2, threads=number))
+
+    for name, taken in (
+        (f"simulate_many of {count}: two threads against one", on_threads),
+        ("campaign: two processes against one", _campaign),
+    ):
+        ratio, limit = two_against_one(taken)
+        rows += [[name, "", "", f"{ratio:.2f}"]]
+        rows += [["the same of bare arithmetic: the machine's limit", "", "", f"{limit:.2f}"]]
+    return rows
+
+
+def two_against_one(taken: Callable[[int], float]) -> tuple[float, float]:
+    """Speed of two at work, of what one or two take in s, divided by that of one; and what the
+    machine allows two processes; of the turn in which it allowed most, since other programs take
+    their share."""
+    loop = [sys.executable, "-c", "for _ in range(20_000_000): pass"]
+
+    def loops(number: int) -> None:
+        for each in [subprocess.Popen(loop) for _ in range(number)]:
+            each.wait()
+
+    def allowed() -> float:
+        return 2 * seconds(partial(loops, 1)) / seconds(partial(loops, 2))
+
+    taken(2)
+    turns = []
+    for _ in range(REPEATS):
+        before, one, two = allowed(), taken(1), taken(2)
+        turns.append((min(before, allowed()), one / two))
+    limit, ratio = max(turns)
+    return ratio, limit
+
+
+def start_up() -> Rows:
+    """Processor time until commands have answered, beside that of importing MuJoCo."""
+    asked = {
+        f"import {name}": [sys.executable, "-c", f"import {name}"] for name in ("mujoco", "mjsim")
+    }
+    for words in ("--version", "--help", "predict", "cases"):
+        asked[f"dualball {words}"] = [*PROGRAM, words]
+    took = {name: min(_spent(words)[0] for _ in range(REPEATS)) for name, words in asked.items()}
+    first = took["import mujoco"]
+    return [
+        ["", "processor time", "by import mujoco"],
+        *([name, f"{own:.2f} s", f"{own / first:.2f}"] for name, own in took.items()),
+    ]
+
+
+def growth() -> Rows:
+    """What a run of 0.1 s takes in sweeps of more and more of them, of which only means are
+    stored."""
+    rows = [
+        ["runs", "sweep: ms a run", "memory, MB", "kB a run", "collect: ms a run", "memory, MB"]
+    ]
+    for count in (1000, 10_000):
+        with tempfile.TemporaryDirectory() as directory:
+            runs = Path(directory) / "runs"
+            sweep = f"sweep --vary omega_0=5:45:{count} --time 0.1 --means-only -o {runs}"
+            collect = f"collect {runs} -o {runs}.h5"
+            (swept, held), (gathered, kept) = (
+                _spent([*PROGRAM, *line.split(), "--workers", "0"]) for line in (sweep, collect)
+            )
+            size = sum(file.stat().st_size for file in runs.iterdir())
+        cells = 1e3 * swept, held, size / 1e3, 1e3 * gathered, kept
+        per_run = (1 / count, 1, 1 / count, 1 / count, 1)
+        rows.append([str(count), *(f"{x * y:.3g}" for x, y in zip(cells, per_run, strict=True))])
+    return rows
+
+
+def _spent(words: list[str]) -> tuple[float, float]:
+    """Processor time of a program and its workers, s, and its largest memory, MB."""
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        sys.exit(f"ends with {os.waitstatus_to_exitcode(status)}: {' '.join(words)}")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+def cost(runs: int, steps: int = 2500) -> list[float]:
+    """Processor time of a bare and of a whole step of one simulation, s, and their ratio: medians
+    over `REPEATS`.
+
+    There is a sample every 100 steps. Timings are taken in turn, each whole one between two bare
+    ones: a machine that slows down does so for both. The bare steps are those of a settled run with
+    its forces left as they are, and the ball held at its azimuth,
+    where the wall stands, by an assignment a step."""
+    settings, p = ContactSettings(), SLIPPING
+    (state,) = stable_solutions(p)
+    model, _ = scene.build(p, settings)
+    settled = JointedBall(model, p, settings, State.one(state.x), 0.0)
+    settled.advance(np.full(500, p.omega_0), np.empty((500, COLUMNS)))
+    start = p, state.x, steps * settings.timestep, None, settings
+    bare, whole = [_bare(settled, runs, steps)], []
+    for _ in range(REPEATS):
+        loops = itertools.chain(
+            *(Run(*start, sample_interval=100 * settings.timestep) for _ in range(runs))
+        )
+        whole.append(seconds(partial(list, loops), time.process_time))
+        bare.append(_bare(settled, runs, steps))
+    ratios = [
+        2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)
+    ]
+    each = steps * runs
+    return [
+        statistics.median(bare) / each,
+        statistics.median(whole) / each,
+        statistics.median(ratios),
+    ]
+
+
+def _bare(settled: JointedBall, runs: int, steps: int) -> float:
+    """Time in s of the given steps with no more around them than a loop."""
+    model, data = settled.model, settled.data
+    if runs == 1:
+        azimuth, step = data.qpos[:1], partial(mujoco.mj_step, model, data)
+    else:
+        batch = Batch(model, nsim=runs, nthread=1)
+        for name in ("qpos", "qvel", "qfrc_applied", "mocap_quat", "qacc_warmstart"):
+            batch.bind(name)[:] = getattr(data, name)
+        azimuth, step = batch.bind("qpos")[:, 0], batch.step
+    held = float(data.qpos[0])
+
+    def loop() -> None:
+        for _ in range(steps):
+            step()
+            azimuth[:] = held
+
+    return seconds(loop, time.process_time)
+
+
+def _campaign(number: int) -> float:
+    """Time in s that a campaign of twice the tasks takes more: what processes take to begin and to
+    end cancels."""
+
+    def run(size: int) -> None:
+        with (
+            tempfile.TemporaryDirectory() as directory,
+            Campaign(Path(directory), processes(number)) as campaign,
+        ):
+            campaign.complete(_tasks(4 * size * BATCH, 2.0))
+
+    return seconds(partial(run, 2)) - seconds(partial(run, 1))
+
+
+def _tasks(count: int, t_end: float = 0.01) -> list[Task]:
+    """Runs from rest at different omega_0."""
+    sets = [SLIPPING.replace(omega_0=15 + 10 * k / count) for k in range(count)]
+    return [Task(engine=MUJOCO.name, parameters=p, x0=State(), t_end=t_end) for p in sets]
+
+
+TABLES = {
+    "event-driven": event_driven,
+    "many": many,
+    "growth": growth,
+    "costs": costs,
+    "start": start_up,
+}
+
+
 if __name__ == "__main__":
-    tables = {"event-driven": event_driven, "states": states, "siconos": stepped, "many": many}
-    sys.exit(write_all(tables, "Write the tables on the speed of theory.", "docs/records/speed.md"))
+    sys.exit(write_all(TABLES, "Write the tables on what it costs.", "docs/records/speed.md"))

@@ -1,5 +1,7 @@
 """Basins are those of theory, are kept, and go on where they stopped."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -8,8 +10,7 @@ from analytic.simulation.ensemble import interval
 from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
 from compare.subjects.attractors.basins import ATTRACTORS, Basins, basins
-from docs.studies.figures import SEARCHES
-from docs.studies.search import BOX, Searched, confirm, parameters, random_starts, screen
+from docs.studies.search import BOX, KEPT, confirm, parameters, random_starts, screen
 from model import Parameters, StorageError, storage
 from tests.commands import told
 
@@ -21,8 +22,8 @@ def test_screen_and_confirmation_tell_hopping_from_rest():
     starts with."""
     row = next(
         r
-        for r in Searched.load(SEARCHES[0]).confirmed
-        if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1
+        for r in json.loads(KEPT.read_text("utf-8"))["rows"]
+        if r["confirmed"] and r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1
     )
     p = parameters(np.array([row[name] for name in BOX]))
     hops, x, failed = screen(p, random_starts(p, 20, [0]))
@@ -110,6 +111,5 @@ def test_the_command_draws_the_map_or_keeps_its_data(tmp_path, capsys):
     told(capsys, f"{line} -o {tmp_path / 'map.json'}")
     assert Basins.load(tmp_path / "map.json").parameters.omega_0 == 40.0
     (tmp_path / "map.json").write_text("[]", "utf-8")
-    for kind, what in ((Basins, "basins"), (Searched, "search")):
-        with pytest.raises(StorageError, match=f"holds no {what}"):
-            kind.load(tmp_path / "map.json")
+    with pytest.raises(StorageError, match="holds no basins"):
+        Basins.load(tmp_path / "map.json")
