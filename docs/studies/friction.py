@@ -1,7 +1,7 @@
 """Write the tables on Coulomb's law: ``python -m docs.studies.friction docs/friction.md``, and
 ``docs/records/law.md``.
 
-All take some twenty minutes, half of them the piles (``--only piles``).
+All take some ten minutes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import math
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -44,7 +43,7 @@ WAYS: dict[str, dict[str, Any]] = {
     "rigid": RIGID,
 }
 """Options of the model, and what is asked of `Coulomb`, if it is there."""
-PILES, CHOSEN, BODIES, SETTLING, LAST = 30, 10, 18, 5.0, 1.0
+CHOSEN, BODIES, SETTLING, LAST = 10, 18, 5.0, 1.0
 STILL, RISE = 1e-9, 1e-9
 """Most that a body at rest moves in the last second, m; and that energy rises, J."""
 
@@ -515,25 +514,6 @@ def settle(data: Any, stepper: Stepper) -> tuple[float, float]:
     return float(np.abs(data.xpos - place).max()), rise
 
 
-def fallen(way: dict[str, Any], mixed: bool, seed: int) -> tuple[float, float]:
-    """What `settle` finds of a pile."""
-    return settle(*start(pile(seed, mixed), **way))
-
-
-def piles() -> Rows:
-    """How many piles come to rest, and how energy rises."""
-    rows = [["piles", "way", f"at rest to {STILL:g} m", "energy rises by: median, J", "most, J"]]
-    ways: dict[str, dict[str, Any]] = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
-    for mixed, (name, way) in itertools.product((False, True), ways.items()):
-        with ProcessPoolExecutor() as pool:
-            done = pool.map(functools.partial(fallen, way, mixed), range(PILES))
-            drift, rise = np.transpose(list(done))
-        kind = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}"
-        rises = f"{np.median(rise):.1e}", f"{rise.max():.1e}"
-        rows.append([kind, name, str((drift < STILL).sum()), *rises])
-    return rows
-
-
 TABLES: dict[str, Callable[[], Rows]] = {
     "holding": holding,
     "sliding": sliding,
@@ -541,7 +521,6 @@ TABLES: dict[str, Callable[[], Rows]] = {
     "costs": costs,
     "choices": choices,
     "servo": servo,
-    "piles": piles,
 }
 
 

@@ -17,7 +17,16 @@ from matplotlib.figure import Figure
 
 from compare.kit import drawing, style
 from compare.kit.campaign import Campaign
-from compare.kit.engines import DEFAULTS, EVENT, MOREAU, PLAIN, AnySettings, default_settings, plain
+from compare.kit.engines import (
+    DEFAULTS,
+    EVENT,
+    MOREAU,
+    MUJOCO,
+    PLAIN,
+    AnySettings,
+    default_settings,
+    plain,
+)
 from compare.kit.pages import Rows
 from compare.kit.tasks import Task, carry_out
 from docs.studies.states import (
@@ -31,7 +40,6 @@ from docs.studies.states import (
     Transient,
 )
 from mjsim import ContactSettings, RigidContacts
-from mjsim.contact_settings import ContactModel
 from model.files import write_text
 
 PICTURES = Path(__file__).parents[1] / "settings"
@@ -105,10 +113,9 @@ class Contestant:
 def contestants(ways: Ways) -> list[Contestant]:
     """They run without a warning where contacts chatter: what poor settings do is the question
     here."""
+    engines = {RigidContacts: MUJOCO, ContactSettings: PLAIN}
     return [
-        Contestant(
-            name, (PLAIN if isinstance(way, ContactModel) else DEFAULTS).name, way, way.timestep
-        )
+        Contestant(name, engines.get(type(way), DEFAULTS).name, way, way.timestep)
         for name, way in ways.items()
     ]
 
