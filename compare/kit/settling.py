@@ -93,13 +93,14 @@ def settle(
 ) -> list[SteadyState]:
     """Run the ball from each start until it is settled; the states, in order.
 
-    Of an engine as it comes every state counts, for what it is when time is up. What isn't settled
+    Of an engine as it comes every state counts, for what it is after a round. What isn't settled
     goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land."""
-    span, loose = criteria.span, math.inf if runner.engine.relative_tolerance else criteria.loose
     rounds = criteria.rounds or runner.sampling.settling_rounds
-    steps = runner.sampling.settling_steps
+    span, loose, steps = criteria.span, criteria.loose, runner.sampling.settling_steps
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
+    if runner.engine.relative_tolerance:
+        loose, left = math.inf, [[rounds[0]] for _ in starts]
     states: dict[int, SteadyState] = {}
     todo = dict(enumerate(starts))
     while todo:
