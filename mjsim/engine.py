@@ -37,6 +37,8 @@ from model.parameters import Range, check_number
 
 EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
+DEEP = 1e-4
+"""How deep in floor or wall a ball may start, in R: rigid contacts end that deep at most."""
 NOTED = 4096
 """Steps that are noted before their cases are told, and samples handed out."""
 RUNS_A_THREAD = 16
@@ -153,7 +155,8 @@ class Run:
 
 
 def check_start(x: State, p: Parameters, settings: ContactModel) -> None:
-    """`check_place`, and a warning if friction at both contacts makes soft ones chatter."""
+    """`check_place`, but a run may go on where another one ended, and a warning if friction at both
+    contacts makes soft ones chatter."""
     if isinstance(settings, ContactSettings) and settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
             f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters "
@@ -161,7 +164,7 @@ def check_start(x: State, p: Parameters, settings: ContactModel) -> None:
             "ContactSettings.suited gives slower contacts",
             stacklevel=4,
         )
-    check_place(x, p, settings.touching(p.g))
+    check_place(x, p, max(settings.touching(p.g), DEEP * p.R))
 
 
 def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float, x0: State) -> None:

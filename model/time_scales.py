@@ -25,8 +25,9 @@ def shortest_time(
     Within two steps h an acceleration a may not move the ball by the size of the vessel, a (2 h)^2
     <= R: gravity's, a = g, asks for 2 h <= sqrt(R/g). The orbit's, a = R omega^2, asks for half of
     that, 4 h <= 1/omega: on its joints a ball leaves theory between .30 and .35 of a radian a step.
-    Other speeds v of the start are held to that of an orbit, R omega; its slip to fifty radians a
-    step, where friction on a ball that spins so fast is still right to 1e-3.
+    Other speeds v of the start, 2 h <= R/v, may take the ball half as far, and as much further as
+    it is above the floor; its slip may be fifty radians a step, where friction on a ball that spins
+    so fast is still right to 1e-3.
     Drag, extrapolated to mid step, leaves z of a speed in a step, where z^2 - (1 -
     3/2 c h) z - c h/2 = 0; that is stable up to c h = 1, and 2 h <= 1/c keeps to half of it. Where
     c depends on the speed w, c w changes by up to 2 c(w) with w, taken where the ball lags by all
@@ -39,7 +40,8 @@ def shortest_time(
         "sqrt(R/g)": math.sqrt(p.g / p.R),
         "1/(2 omega_0)": 2 * fastest,
         "1/(2 omega_c)": 2 * abs(float(x0.omega_c)) * (1 - float(x0.h) / p.R),
-        **{f"R/(2 {name})": 2 * abs(float(getattr(x0, name))) / p.R for name in ("v_y", "v_h")},
+        "(R+y)/v_y": abs(float(x0.v_y)) / (p.R + float(x0.y)),
+        "R/v_h": abs(float(x0.v_h)) / p.R,
         **{f"100/{name}": abs(float(getattr(x0, name))) / 100 for name in SLIP},
         "1/fluid_torque": p.fluid_torque,
         "1/(2 pi f)": 2 * math.pi * float(flow.waves[:, 1].max(initial=0.0)),

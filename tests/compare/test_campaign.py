@@ -32,7 +32,7 @@ from tests.commands import refused, started, told
 
 REST = (0.0,) * 8
 P = Parameters.named("reference")
-WILD = Task(engine="mujoco", parameters=P, x0=(0, 0, 0, 1e11, 0, 0), t_end=0.2)
+WILD = Task(engine="mujoco", parameters=P, x0=(1e11, 0, 0, 0, 0, 0), t_end=0.2)
 """Diverges."""
 
 

@@ -368,7 +368,7 @@ USERS = {  # a slice of some 330 lines that were drawn by hand: what must be in 
     "simulate --time 0.0005": "to hold a time step it must be >= 0.001",
     "simulate --time 1e6 --engine event --sample-interval 1e-3": "for at most 5e+07 samples",
     "simulate --start omega_c=1e6": "half of 1/(2 omega_c), the shortest time of the problem",
-    "simulate --start v_h=1e9": "half of R/(2 v_h), the shortest time of the problem",
+    "simulate --start v_h=1e9": "half of R/v_h, the shortest time of the problem",
     "simulate --start v_h=1e9 --engine time-stepping": "for at most 1e+09 steps it must be <=",
     "predict -omega_0 25": "there is no option '-omega-0': it is '--omega-0'",
     "simulate --sine 10 1 1e9 --time 0.1": "half of 1/(2 pi f), the shortest time",

@@ -62,7 +62,7 @@ def test_a_run_begins_at_the_azimuth_that_is_asked_for(settings) -> None:
 def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> None:
     """Also of a run that breaks down, beside others; progress is that of all of them."""
     sets = [P.replace(omega_0=omega_0) for omega_0 in (5.0, 12.0, 25.0, 40.0, 60.0)]
-    x0s, told = [[0.0, 0, 10.0, 0, 0, 0]] * 4 + [[0, 0, 0, 1e11, 0, 0]], []
+    x0s, told = [[0.0, 0, 10.0, 0, 0, 0]] * 4 + [[1e11, 0, 0, 0, 0, 0]], []
     one, *others = (
         mjsim.simulate_many(
             sets, x0s, 0.1, settings=settings, sample_interval=0.01, threads=n, progress=told.append
@@ -79,9 +79,17 @@ def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> N
                 np.testing.assert_array_equal(getattr(run, name), getattr(exact, name))
 
 
-@pytest.mark.parametrize(("settings", "slip_x"), [(None, 1e11), (None, 1e9), (SOFT, 1e11)])
-def test_divergence_stops_a_run_and_keeps_what_there_is(settings, slip_x) -> None:
-    wild = [0, 0, 0, slip_x, 0, 0]
+def test_a_run_goes_on_where_another_one_ended() -> None:
+    """Contacts end in it by round-off, or a little more on the bent wall."""
+    deep = [-1e-11, 0, 11.0, 0, 0, 0, -5e-5 * P.R, 0]
+    assert mjsim.simulate(P, deep, 0.1).cases[-1] is Case.RR
+
+
+@pytest.mark.parametrize(
+    ("settings", "wild"),
+    [(None, [1e11, *5 * [0]]), (None, [0, 0, 5.0, 0, 0, 0, 0.01, 12.0]), (SOFT, [1e11, *5 * [0]])],
+)
+def test_divergence_stops_a_run_and_keeps_what_there_is(settings, wild) -> None:
     with pytest.raises(SimulationError, match=r"diverged by t = .* s") as caught:
         mjsim.simulate(P, wild, 0.1, settings=settings)
     assert caught.value.trajectory.header.failure
